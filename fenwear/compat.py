@@ -1,0 +1,19 @@
+"""What differs between versions of the stack, found by feature, never by version number."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import dolfinx.io
+from dolfinx.mesh import Mesh, MeshTags
+from mpi4py import MPI
+
+
+def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Distribute the gmsh model of rank 0: its mesh, cell tags and facet tags.
+
+    dolfinx 0.9 has io.gmshio and returns three items, later versions io.gmsh and more.
+    """
+    gmsh_io = getattr(dolfinx.io, "gmsh", None) or __import__("dolfinx.io.gmshio", fromlist=["gmshio"])
+    mesh, cell_tags, facet_tags = gmsh_io.model_to_mesh(model, comm, 0, gdim=gdim)[:3]
+    return mesh, cell_tags, facet_tags

@@ -1,0 +1,177 @@
+"""Contact as one variational inequality on both bodies' meshes, with unknown (u, p, a).
+
+The reference that the condensed inequality is compared with: nothing is eliminated, so every
+change of the active set factors the whole system again.
+
+    K_1 u_1 - C_1 p = f_1,    K_2 u_2 + C_2 p = f_2,
+    gap = N_1 u_1 - N_2 u_2 + H a + g >= 0,    p >= 0,    p gap = 0,
+    (H + d mu H_t)^T W p + F = 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from petsc4py import PETSc
+
+from fenwear.contact import ContactState, Layer
+from fenwear.elasticity import ElasticBody
+from fenwear.inequality import Array, check, configure
+from fenwear.interface import Interface
+from fenwear.surface import SurfaceNodes
+
+
+class FullContact:
+    """The inequality on the full system in one sliding direction, distributed over the ranks.
+
+    The rows and unknowns of the displacements belong to the ranks of the meshes; pressure and
+    rigid modes to rank 0, coupled through global numbers: no partition can lose a contact pair.
+    """
+
+    def __init__(
+        self, punch: ElasticBody, strip: ElasticBody, interface: Interface, friction: float, direction: int
+    ) -> None:
+        self.interface = interface
+        self.comm = punch.body.mesh.comm
+        statics = interface.statics
+        facing = statics.facing
+        self._pressure_scale = statics.mean_pressure
+        self._gap_scale = self._pressure_scale * interface.elastic_length
+        self._force_scale = self._pressure_scale * float(facing.weights.sum())
+        n, modes = len(facing.weights), len(statics.resultant)
+        self._size = (n, modes)
+
+        slip = direction * friction
+        weights = np.diag(facing.weights)
+        rows = [
+            [punch.stiffness, None, -_forces(punch, facing.punch, weights, slip)],
+            [None, strip.stiffness, _forces(strip, facing.strip, facing.transfer.T @ weights, slip)],
+            [_normals(punch, facing.punch, np.eye(n)), -_normals(strip, facing.strip, facing.transfer), None],
+        ]
+        if modes:
+            rows = [[*rows[0], None], [*rows[1], None], [*rows[2], self._rank0_matrix(statics.rigid_normal)]]
+            rows.append([None, None, self._rank0_matrix(statics.equilibrium(direction, friction)), None])
+        nest = PETSc.Mat().createNest(rows, comm=self.comm)
+        self._operator = nest.convert("aij" if self.comm.size == 1 else "mpiaij")
+        self._offset = self._operator.createVecLeft()
+        self._x = self._operator.createVecRight()
+        sizes = [body.stiffness.getLocalSize()[0] for body in (punch, strip)]
+        self._free = sum(sizes)
+        self._scale_system()
+        self._constant = self._offset.array.copy()
+        self._constant[: sizes[0]] = -punch.load.array_r / self._force_scale
+        self._constant[sizes[0] : self._free] = -strip.load.array_r / self._force_scale
+        if self.comm.rank == 0:
+            self._constant[self._free + n :] = statics.resultant / self._force_scale
+        self._build_snes()
+
+    def _scale_system(self) -> None:
+        """Divide rows and unknowns by their scales, so that PETSc's tolerances fit every case."""
+        n, _ = self._size
+        left, right = self._operator.createVecLeft(), self._operator.createVecRight()
+        right.array[: self._free] = self._gap_scale
+        right.array[self._free :] = self._pressure_scale
+        right.array[self._free + n :] = self._gap_scale
+        left.array[: self._free] = 1 / self._force_scale
+        left.array[self._free :] = 1 / self._gap_scale
+        left.array[self._free + n :] = 1 / self._force_scale
+        self._right = right
+        self._operator.diagonalScale(left, right)
+
+    def _build_snes(self) -> None:
+        n, _ = self._size
+        lower, upper = self._x.duplicate(), self._x.duplicate()
+        lower.set(PETSc.NINFINITY)
+        upper.set(PETSc.INFINITY)
+        if self.comm.rank == 0:
+            lower.array[self._free : self._free + n] = 0.0
+        self._bounds = (lower, upper)
+        self.snes = PETSc.SNES().create(self.comm)
+        self.snes.setFunction(self._residual, self._x.duplicate())
+        self.snes.setJacobian(lambda snes, x, J, P: None, self._operator)
+        configure(self.snes, "fenwear_full_contact_")
+        self.snes.setTolerances(atol=1e-9)  # the rounding of a system with all displacements in it
+        self.snes.ksp.pc.setFactorSolverType("mumps")
+        self.snes.setVariableBounds(lower, upper)
+        self.snes.setFromOptions()
+
+    def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+        self._operator.mult(x, f)
+        f.axpy(1.0, self._offset)
+
+    def solve(self, gap: Array, start: ContactState | None = None, layer: Layer | None = None) -> ContactState:
+        """Return the contact for the undeformed gap (n,), mm; collective.
+
+        Newton starts from the last solution of this object, whatever `start` is.
+
+        Raises:
+            ConvergenceError: SNES did not converge.
+            NotImplementedError: a layer is given; only the condensed inequality takes one.
+        """
+        if layer is not None:
+            raise NotImplementedError("the full inequality has no layer")
+        n, modes = self._size
+        contact = slice(self._free, self._free + n)
+        self._offset.array[:] = self._constant
+        if self.comm.rank == 0:
+            self._offset.array[contact] += gap / self._gap_scale
+            if start is None:
+                self._x.array[contact] = 1.0
+        self.snes.solve(None, self._x)
+        check(self.snes, "the contact of punch and strip (full system)")
+        self._residual(self.snes, self._x, self.snes.getFunction()[0])
+        values = self._x.array_r[self._free :] * self._right.array_r[self._free :]
+        gaps = self.snes.getFunction()[0].array_r[contact] * self._gap_scale
+        values, gaps = self.comm.bcast((values, gaps))
+        return ContactState(values[None, :n], gaps[None], values[None, n:], self.snes.getIterationNumber())
+
+    def _rank0_matrix(self, values: Array) -> PETSc.Mat:
+        """Return a sparse matrix whose rows and columns all belong to rank 0."""
+        here = self.comm.rank == 0
+        (rows, columns) = values.shape
+        sizes = ((rows * here, rows), (columns * here, columns))
+        matrix = PETSc.Mat().createAIJ(sizes, nnz=(columns, 0), comm=self.comm)
+        if here:
+            matrix.setValues(range(rows), range(columns), np.ascontiguousarray(values))  # read in C order
+        matrix.assemble()
+        return matrix
+
+
+def _forces(elastic: ElasticBody, nodes: SurfaceNodes, distribution: Array, slip: float) -> PETSc.Mat:
+    """Return C (dofs, n): nodal forces p (e_n + d mu e_t), zero where supported; collective.
+
+    Args:
+        distribution: Force at each node of this surface from each pressure (nodes, n).
+        slip: d mu.
+    """
+    vectors = nodes.normal + slip * nodes.tangent
+    values = vectors[:, :, None] * distribution[:, None, :]  # node, component, pressure
+    comm = elastic.body.mesh.comm
+    count = distribution.shape[1]
+    sizes = (elastic.stiffness.getSizes()[0], (count if comm.rank == 0 else 0, count))
+    matrix = PETSc.Mat().createAIJ(sizes, nnz=(count, count), comm=comm)
+    start, stop = elastic.space.dofmap.index_map.local_range
+    held = set((elastic.supported + 2 * start).tolist())
+    for node, block in enumerate(nodes.block):
+        if start <= block < stop:
+            columns = np.flatnonzero(distribution[node]).astype(np.int32)
+            for component in (0, 1):
+                row = 2 * int(block) + component
+                if row not in held:
+                    matrix.setValues([row], columns, values[node, component, columns])
+    matrix.assemble()
+    return matrix
+
+
+def _normals(elastic: ElasticBody, nodes: SurfaceNodes, transfer: Array) -> PETSc.Mat:
+    """Return N (n, dofs): the normal displacement of this surface at the interface nodes; collective."""
+    comm = elastic.body.mesh.comm
+    count = transfer.shape[0]
+    sizes = ((count if comm.rank == 0 else 0, count), elastic.stiffness.getSizes()[1])
+    matrix = PETSc.Mat().createAIJ(sizes, nnz=(2 * transfer.shape[1], 2 * transfer.shape[1]), comm=comm)
+    if comm.rank == 0:
+        columns = (2 * nodes.block[:, None] + np.arange(2)).astype(np.int32)
+        for row in range(count):
+            used = np.flatnonzero(np.abs(transfer[row]) > 1e-14)
+            matrix.setValues([row], columns[used].ravel(), (transfer[row, used, None] * nodes.normal[used]).ravel())
+    matrix.assemble()
+    return matrix

@@ -1,0 +1,32 @@
+"""The errors that fenwear raises on purpose; the command line maps each to an exit status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+
+class FenwearError(Exception):
+    """Base of all errors below."""
+
+
+class Problem(NamedTuple):
+    """One thing wrong with a case: the key's path and what was expected there."""
+
+    key: str
+    message: str
+
+
+class CaseError(FenwearError):
+    """The case, its geometry or the usage is wrong; lists every problem found."""
+
+    def __init__(self, problems: Sequence[Problem] | Problem) -> None:
+        self.problems = [problems] if isinstance(problems, Problem) else list(problems)
+        super().__init__("\n".join(f"{p.key}: {p.message}" if p.key else p.message for p in self.problems))
+
+    def __reduce__(self) -> tuple[type[CaseError], tuple[list[Problem]]]:
+        return type(self), (self.problems,)  # crosses ranks by pickle
+
+
+class ConvergenceError(FenwearError):
+    """A solver did not converge; names the solver, the reason and what may help."""

@@ -1,0 +1,115 @@
+"""The optimal pressure: the minimum of the wear dissipation power, without any elasticity.
+
+With the rigid-body wear velocity w_n = H lambda the steady pressure is p = (w_n / K)^(1/b), with
+K the mean of beta~ v^a, and zero where it would turn negative (8), (15), (16); lambda follows from
+the equilibrium of force and moment (7), (18) by Newton's method. For a tilting punch lambda is
+(lambda_F, lambda_M): w_n = lambda_F - lambda_M (x - x_O).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from fenwear.errors import CaseError, ConvergenceError, Problem
+from fenwear.inequality import Array
+from fenwear.interface import Statics
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The optimal state of one-way sliding.
+
+    Attributes:
+        pressure: (n,), MPa.
+        velocity: Rigid-body wear velocity lambda of each mode: mm/s for lambda_F, rad/s for lambda_M.
+        residual: Largest error of the equilibrium relative to the load.
+    """
+
+    pressure: Array
+    velocity: dict[str, float]
+    residual: float
+
+
+def check_equilibrium(statics: Statics, direction: int, friction: float) -> None:
+    """Make sure that some pressure p >= 0 balances the loads.
+
+    Raises:
+        CaseError: the loads would lift the punch or tip it over.
+    """
+    rows = statics.equilibrium(direction, friction)
+    scale = np.abs(rows).max(axis=1, initial=1e-300)
+    target = -statics.resultant / scale
+    _, error = nnls(rows / scale[:, None], target) if len(target) else (None, 0.0)
+    if error > 1e-9 * np.abs(target).max(initial=0.0) or (len(target) and not np.abs(target).any()):
+        way = "rightward" if direction > 0 else "leftward"
+        raise CaseError(
+            Problem(
+                "punch.loads",
+                f"no pressure on the contact balances the loads in {way} sliding: the punch lifts off or tips over; "
+                "expected a load that presses on it between the contact's edges, friction included",
+            )
+        )
+
+
+def optimum(
+    statics: Statics,
+    direction: int,
+    friction: float,
+    wear_rate: float,
+    pressure_exponent: float,
+    zone: Array | None = None,
+) -> Optimum:
+    """Return the optimal pressure and the wear velocity.
+
+    Args:
+        direction: Sliding direction d.
+        wear_rate: K, the mean of beta~ v^a, mm/s MPa^-b.
+        pressure_exponent: b.
+        zone: Nodes that are in contact (n,) bool; by default all.
+
+    Raises:
+        ConvergenceError: Newton's method found no equilibrium.
+    """
+    weights_rows = statics.equilibrium(direction, friction)
+    modes = statics.rigid_normal
+    if zone is not None:
+        weights_rows = weights_rows * zone
+    p_mean, b = statics.mean_pressure, pressure_exponent
+    lengths = np.abs(modes).max(axis=0, initial=1e-300)
+    shape = modes / lengths
+    rows = weights_rows / (lengths[:, None] * p_mean * statics.facing.weights.sum())
+    resultant = statics.resultant / (lengths * p_mean * statics.facing.weights.sum())
+    # Unknown y: w_n / (K p_mean^b) = shape y, so that p / p_mean = (shape y)_+^(1/b).
+    y = np.linalg.lstsq(shape, np.ones(len(shape)), rcond=None)[0]
+    pressure, residual = _pressure(shape @ y, b), np.inf
+    force = rows @ pressure * p_mean + resultant
+    for _ in range(200):
+        residual = float(np.abs(force).max(initial=0.0))
+        if residual < 1e-13:
+            break
+        w = shape @ y
+        slope = np.where(w > 0, np.maximum(w, 1e-12) ** (1 / b - 1) / b, 0.0)
+        step = np.linalg.lstsq((rows * p_mean * slope) @ shape, -force, rcond=None)[0]
+        for halving in range(40):
+            trial = y + step / 2**halving
+            trial_pressure = _pressure(shape @ trial, b)
+            trial_force = rows @ trial_pressure * p_mean + resultant
+            if np.abs(trial_force).max() < residual:
+                break
+        else:
+            break  # at the rounding of the residual, or no descent
+        y, pressure, force = trial, trial_pressure, trial_force
+    if residual > 1e-10:
+        raise ConvergenceError(f"the optimum did not converge: residual {residual:.3g} of the load")
+    velocity = wear_rate * p_mean**b * y / lengths
+    names = statics.mode_names
+    if zone is not None:
+        pressure = pressure * zone
+    return Optimum(pressure * p_mean, dict(zip(names, velocity.tolist(), strict=True)), residual)
+
+
+def _pressure(w: Array, b: float) -> Array:
+    return np.maximum(w, 0.0) ** (1 / b)

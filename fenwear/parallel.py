@@ -1,0 +1,36 @@
+"""Errors under MPI: what one rank finds, every rank raises."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from mpi4py import MPI
+
+T = TypeVar("T")
+
+
+def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
+    """Call `function` on rank 0 alone and return its result on every rank; collective.
+
+    Raises:
+        Exception: what `function` raised, on every rank.
+    """
+    result: T | None = None
+    error: Exception | None = None
+    if comm.rank == 0:
+        try:
+            result = function()
+        except Exception as caught:  # raised again below, on all ranks
+            error = caught
+    error = comm.bcast(error)
+    if error is not None:
+        raise error
+    return comm.bcast(result)  # type: ignore[return-value]
+
+
+def agree(comm: MPI.Comm, error: Exception | None) -> None:
+    """Raise the lowest rank's error on every rank, if any rank has one; collective."""
+    for found in comm.allgather(error):
+        if found is not None:
+            raise found

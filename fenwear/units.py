@@ -1,0 +1,74 @@
+"""Quantities with units: strings such as "55 W/(m K)" become numbers in mm, N, s, K.
+
+Internal units, and so the unit of every number in the code: mm, N, s, K; hence MPa = N/mm² for
+stress and W/(m K) = N/(s K) for conductivity.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pint
+
+_NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
+_HARMLESS_UNIT = re.compile(r"[A-Za-zµμ°²³\d\s*/().^-]{1,64}")
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[Any]:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+def convert(value: object, unit: str) -> float:
+    """Return `value` as a finite number in `unit`.
+
+    Args:
+        value: A number, already in `unit`, or a string of a number and a unit.
+        unit: The unit of the result as pint writes it; "" for a pure number.
+
+    Raises:
+        ValueError: not a number, not finite, or a unit of another kind; says what was expected.
+    """
+    expected = f"expected a number or a string with a unit such as '1 {unit}'" if unit else "expected a number"
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"{expected}, got {value!r}")
+    if isinstance(value, str):
+        number = _convert_text(value, unit, expected)
+    else:
+        number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{expected} that is finite, got {value!r}")
+    return number
+
+
+def _convert_text(text: str, unit: str, expected: str) -> float:
+    import pint
+
+    match = _NUMBER_AND_UNIT.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{expected}, got {text!r}")
+    number, given = float(match[1]), match[2]
+    if not given:
+        return number
+    if not _HARMLESS_UNIT.fullmatch(given) or re.search(r"\d{3}|\*\*|\^\s*\^", given):
+        raise ValueError(f"{expected}, got {text!r}")
+    if "rad" in unit and re.search(r"[Hh](?:z|ertz)", given):
+        raise ValueError(f"{expected}, got {text!r}: multiply the frequency by 2 pi")
+    registry = _registry()
+    try:
+        return float(registry.Quantity(number, registry.parse_units(given)).to(unit or "dimensionless").magnitude)
+    except pint.DimensionalityError as error:
+        raise ValueError(f"{expected}, got {text!r}, which is of another kind") from error
+    except Exception as error:  # pint's parser raises many types on nonsense
+        raise ValueError(f"{expected}, got {text!r}, whose unit is not known") from error
+
+
+def quantity_text(value: float, unit: str) -> str | float:
+    """Return `value` as a case file shows it: with its unit, or bare where it has none."""
+    return f"{value!r} {unit}" if unit else value

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import pydantic
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
@@ -169,6 +169,7 @@ class Reciprocating(_Part):
     kind: Literal["reciprocating"]
     amplitude: Annotated[Length, Field(gt=0)]
     angular_frequency: Annotated[AngularFrequency, Field(gt=0)]
+    phases: ClassVar[int] = 2
 
 
 class OneWay(_Part):
@@ -178,12 +179,17 @@ class OneWay(_Part):
     direction: Literal["leftward", "rightward"]
     speed: Annotated[Speed, Field(gt=0)]
     duration: Annotated[Time, Field(gt=0)]
+    phases: ClassVar[int] = 1
 
 
 class Run(_Part):
     """How far a run goes and how it integrates the wear."""
 
     half_cycles: Annotated[int, Field(ge=1, strict=True)]
+    integration: Literal["explicit", "implicit", "jump"] = "explicit"
+    jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=3e-3, description="largest error of pressure in a cycle jump, over the mean pressure"
+    )
     periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
         default=None, description="stop when pressure repeats within this fraction of the mean pressure"
     )
@@ -192,8 +198,12 @@ class Run(_Part):
 class Output(_Part):
     """What a run keeps."""
 
-    every: Annotated[int, Field(ge=1, strict=True)] = 1
-    figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = ()
+    every: Annotated[int, Field(ge=1, strict=True)] = Field(
+        default=1, description="keep every k-th cycle in history.nc, and always the last one"
+    )
+    figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = Field(
+        default=(), description="half-cycles that the figures show; by default six spread over the run"
+    )
 
 
 class Case(_Part):
@@ -227,6 +237,10 @@ class Case(_Part):
                 for name, material in self.materials.items()
                 if material.poisson >= 0.5
             ]
+        if self.contact.solver == "full" and self.run.integration != "explicit":
+            problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
+        if self.run.integration == "jump" and self.run.half_cycles < self.motion.phases:
+            problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
         if not any(load.force or load.traction for load in self.punch.loads):
             problems.append("punch.loads: expected at least one load that presses the punch on the strip")
         if problems:
@@ -238,9 +252,17 @@ class Case(_Part):
         """The folder of the case file, None for a built-in case or one made in Python."""
         return self._folder
 
+    def at(self, folder: Path | None) -> Case:
+        """Return this case with the folder that its geometry's path starts from."""
+        placed = self.model_copy()
+        placed._folder = folder
+        return placed
+
     def resolved(self) -> dict[str, Any]:
         """Return every key with its value and unit: what case.toml holds."""
         data = self.model_dump(exclude_none=True)
+        if self._folder is not None and (self._folder / self.geometry.file).is_file():
+            data["geometry"]["file"] = str((self._folder / self.geometry.file).resolve())  # wherever it is read next
         law = self.wear.punch
         data["wear"]["punch"]["coefficient"] = quantity_text(
             law.coefficient, law.coefficient_unit(law.pressure_exponent, law.speed_exponent)
@@ -295,11 +317,9 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
     try:
-        case = Case.model_validate(data)
+        return Case.model_validate(data).at(folder)
     except pydantic.ValidationError as error:
         raise CaseError([p for e in error.errors() for p in _problems(e)]) from None
-    case._folder = folder
-    return case
 
 
 def _read_text(path: Path) -> str:

@@ -10,6 +10,7 @@ from fenwear.case import Body, Case
 from fenwear.contact import CondensedContact, ContactSolver
 from fenwear.contact_full import FullContact
 from fenwear.elasticity import ElasticBody
+from fenwear.inequality import Array
 from fenwear.interface import Facing, Interface, Statics, face, join, statics
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
@@ -66,12 +67,17 @@ class System:
     def contact(self, directions: tuple[int, ...]) -> ContactSolver:
         """Return the contact of the given phases, by the solver that the case names."""
         friction = self.case.contact.friction
-        if self.case.contact.solver == "full" and len(directions) == 1:
+        if self.case.contact.solver == "full":
             return FullContact(self.punch, self.strip, self.interface, friction, directions[0])
         return CondensedContact(self.interface, friction, directions)
 
-    def optimum(self, direction: int) -> Optimum:
-        """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate."""
+    def optimum(self, direction: int, zone: Array | None = None) -> Optimum:
+        """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
+
+        Args:
+            direction: Sliding direction d.
+            zone: Nodes in contact (n,) bool; by default all.
+        """
         law = self.case.wear.punch
         rate = self.wear.per_power / self.motion.duration
-        return optimum(self.statics, direction, self.case.contact.friction, rate, law.pressure_exponent)
+        return optimum(self.statics, direction, self.case.contact.friction, rate, law.pressure_exponent, zone)

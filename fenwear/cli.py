@@ -1,0 +1,183 @@
+"""The command line: parses, calls, prints; nothing else."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from mpi4py import MPI
+
+import fenwear
+from fenwear.case import Case, builtin_cases, load_case
+from fenwear.errors import CaseError, Problem
+from fenwear.parallel import on_root
+
+app = typer.Typer(
+    help="Thermo-mechanical sliding wear with FEniCSx. Without a command: runs the built-in Example 1.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+
+DEFAULT_CASE = "example1"
+
+CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (TOML) or the name of a built-in case.")]
+SetOption = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+
+
+def log(message: str) -> None:
+    """Print to standard error; every rank but 0 has it closed."""
+    print(message, file=sys.stderr, flush=True)
+
+
+def _load(case: str, settings: list[str]) -> Case:
+    loaded = on_root(MPI.COMM_WORLD, lambda: (c := load_case(case, settings), c.folder))
+    return loaded[0].at(loaded[1])
+
+
+def _print_json(data: dict[str, Any]) -> None:
+    print(json.dumps(data), flush=True)
+
+
+@app.callback(invoke_without_command=True)
+def main(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and end.")] = False,
+) -> None:
+    """Run the built-in Example 1 where no command is given."""
+    if version:
+        print(f"fenwear {fenwear.__version__}")
+    elif context.invoked_subcommand is None:
+        run(DEFAULT_CASE)
+
+
+@app.command("run")
+def run(
+    case: CaseArgument = DEFAULT_CASE,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    settings: SetOption = [],  # noqa: B006  (typer wants a list)
+    as_json: JsonOption = False,
+) -> None:
+    """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.run import run_case
+
+    summary, directory = run_case(_load(case, settings), Path(case).stem, output, log)
+    if as_json:
+        _print_json(summary)
+    else:
+        log(f"results in {directory}")
+
+
+@app.command("steady")
+def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+    """Solve for the cyclic steady state directly."""
+    from fenwear.cycle import cycles_to_reach, steady
+    from fenwear.system import System
+
+    system = System(_load(case, settings))
+    begin = time.perf_counter()
+    system.interface  # noqa: B018  (made here, so that the two times are told apart)
+    setup = time.perf_counter() - begin
+    state = steady(system)
+    cycles = cycles_to_reach(system, state, 0.01)
+    if as_json:
+        pressures = dict(zip(state.directions, state.pressure.tolist(), strict=True))
+        _print_json(
+            {
+                "x": system.facing.x.tolist(),
+                "pressure_plus": pressures.get(1),
+                "pressure_minus": pressures.get(-1),
+                "shape": state.shape.tolist(),
+                "temperature": None,
+                "contact_width": state.contact_width.tolist(),
+                "wear_per_cycle": state.wear_per_cycle.tolist(),
+                **{name: value for name, value in state.velocity.items()},
+                "cycles_to_1_percent": cycles,
+                "seconds": state.seconds,
+            }
+        )
+        return
+    print(f"cyclic steady state of {case} ({state.iterations} Newton iterations, {1e3 * state.seconds:.0f} ms; "
+          f"set-up {setup:.1f} s)")  # fmt: skip
+    for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
+        print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
+              f"contact width {width:7.3f} mm")  # fmt: skip
+    print(f"  mean pressure {system.statics.mean_pressure:.4f} MPa")
+    print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
+    if cycles is None:
+        print("  pressure within 1 % of the mean pressure: not within ten million cycles from the initial shape")
+    else:
+        print(f"  pressure within 1 % of the mean pressure after {cycles:,} cycles from the initial shape")
+
+
+def _velocities(velocity: dict[str, float], per: str) -> str:
+    units = {"lambda_F": "mm", "lambda_M": "rad"}
+    separator = "/" if len(per) == 1 else " "
+    return ", ".join(f"{name} = {value:.5g} {units[name]}{separator}{per}" for name, value in velocity.items())
+
+
+@app.command("optimum")
+def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+    """Print lambda_F, lambda_M and the optimal pressure of both directions."""
+    from fenwear.system import System
+
+    system = System(_load(case, settings))
+    found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
+    if as_json:
+        x = system.facing.x.tolist()
+        _print_json({n: {**o.velocity, "x": x, "pressure": o.pressure.tolist()} for n, o in found.items()})
+        return
+    for name, state in found.items():
+        at_ends = f"p = {state.pressure[0]:.4f} MPa at x = {system.facing.x[0]:g} mm to {state.pressure[-1]:.4f} at {system.facing.x[-1]:g}"
+        print(f"{name:9}  {_velocities(state.velocity, 's')}; {at_ends}")
+
+
+@app.command("check")
+def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
+    """Validate a case with its geometry and print it with all defaults."""
+    from fenwear.cycle import stability_number
+    from fenwear.system import System
+
+    loaded = _load(case, settings)
+    system = System(loaded)
+    print(loaded.to_toml())
+    log(f"the case is valid: {len(system.facing.x)} contact nodes, "
+        f"{system.punch.stiffness.size[0] + system.strip.stiffness.size[0]:,} displacement degrees of freedom, "
+        f"wear step {100 * stability_number(system):.3g} % of the explicit limit")  # fmt: skip
+
+
+@app.command("mesh")
+def mesh_command(
+    case: CaseArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
+    settings: SetOption = [],  # noqa: B006
+) -> None:
+    """Write the mesh of a case with its physical groups."""
+    from fenwear.mesh import write_msh
+
+    loaded = _load(case, settings)
+    if output.suffix != ".msh":
+        raise CaseError(Problem("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output))
+    log(f"mesh in {output}")
+
+
+@app.command("info")
+def info_command(as_json: JsonOption = False) -> None:
+    """Print the versions of the stack and the built-in cases."""
+    from fenwear.versions import versions
+
+    if as_json:
+        _print_json({"versions": versions(), "cases": builtin_cases()})
+        return
+    for name, version in versions().items():
+        print(f"{name:14} {version}")
+    print("\nbuilt-in cases:")
+    for name, title in builtin_cases().items():
+        print(f"  {name:26} {title}")

@@ -1,0 +1,12 @@
+"""The cycle controller: march half-cycle by half-cycle, jump over cycles, or solve for the end.
+
+`march` and `jump` yield blocks of half-cycles; `steady` returns the cyclic steady state.
+"""
+
+from fenwear.cycle.block import Block
+from fenwear.cycle.jump import jump
+from fenwear.cycle.march import march
+from fenwear.cycle.stability import stability_number
+from fenwear.cycle.steady import Steady, cycles_to_reach, steady
+
+__all__ = ["Block", "Steady", "cycles_to_reach", "jump", "march", "stability_number", "steady"]

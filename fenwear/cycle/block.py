@@ -1,0 +1,124 @@
+"""Half-cycles in blocks: what the controller yields, with the measures of each half-cycle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.contact import ContactState
+from fenwear.inequality import Array
+from fenwear.system import System
+
+
+@dataclass(frozen=True)
+class Block:
+    """k consecutive records of half-cycles, of n contact nodes.
+
+    Attributes:
+        system: What they were computed on.
+        half_cycle: Number of each half-cycle (k,), from 1.
+        direction: Its sliding direction d (k,).
+        pressure: p during it (k, n), MPa.
+        gap: Gap during it (k, n), mm.
+        wear: Worn depth at its end (k, n), mm.
+        rigid: Amplitudes of the rigid modes (k, modes).
+        worn_area: Cross-section worn off in it, the integral of its wear (k,), mm².
+        optimum_distance: Largest distance to the optimal pressure of the present contact zone,
+            over the mean pressure (k,).
+        periodicity: Largest change of pressure against the same phase one cycle earlier, over the
+            mean pressure (k,); NaN in the first cycle.
+    """
+
+    system: System
+    half_cycle: NDArray[np.int64]
+    direction: NDArray[np.int64]
+    pressure: Array
+    gap: Array
+    wear: Array
+    rigid: Array
+    worn_area: Array
+    optimum_distance: Array
+    periodicity: Array
+
+    def __len__(self) -> int:
+        return len(self.half_cycle)
+
+    @property
+    def max_pressure(self) -> Array:
+        """Largest pressure of each half-cycle (k,), MPa."""
+        return self.pressure.max(axis=1)
+
+    @property
+    def contact_width(self) -> Array:
+        """Width of the nodes in contact, by their weights (k,), mm."""
+        return (self.pressure > 0) @ self.system.statics.facing.weights
+
+    @cached_property
+    def equilibrium_error(self) -> Array:
+        """Largest error of the force and moment balance relative to the load (k,)."""
+        statics, friction = self.system.statics, self.system.case.contact.friction
+        lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
+        scale = lengths * statics.mean_pressure * statics.facing.weights.sum()
+        error = np.zeros(len(self))
+        for d in set(self.direction.tolist()):
+            rows = self.direction == d
+            balance = self.pressure[rows] @ statics.equilibrium(d, friction).T + statics.resultant
+            error[rows] = np.abs(balance / scale).max(axis=1, initial=0.0)
+        return error
+
+
+@dataclass
+class Recorder:
+    """Collects half-cycles into blocks; one append a half-cycle, one copy a block."""
+
+    system: System
+    size: int
+    _rows: list[tuple[object, ...]] = field(default_factory=list)
+    _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
+
+    def add(
+        self,
+        half_cycle: int,
+        direction: int,
+        phase: int,
+        state: ContactState,
+        wear: Array,
+        worn: Array,
+        previous: Array | None,
+    ) -> float:
+        """Record one half-cycle and return its periodicity."""
+        pressure = state.pressure[phase]
+        scale = self.system.statics.mean_pressure
+        change = float("nan") if previous is None else float(np.abs(pressure - previous).max()) / scale
+        distance = float(np.abs(pressure - self._optimum(direction, pressure)).max()) / scale
+        area = float(self.system.statics.facing.weights @ worn)
+        row = (half_cycle, direction, pressure, state.gap[phase], wear, state.rigid[phase], area, distance, change)
+        self._rows.append(row)
+        return change
+
+    @property
+    def full(self) -> bool:
+        """Whether the block is as large as asked for."""
+        return len(self._rows) >= self.size
+
+    def take(self) -> Block:
+        """Return the block and begin the next one."""
+        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
+        self._rows = []
+        return Block(self.system, *columns)
+
+    def __bool__(self) -> bool:
+        return bool(self._rows)
+
+    def _optimum(self, direction: int, pressure: Array) -> Array:
+        """Return the optimal pressure on the present contact zone; solved anew only when that changes."""
+        zone = pressure > 0
+        key = (direction, zone.tobytes())
+        if key not in self._optima:
+            if len(self._optima) > 1000:
+                self._optima.clear()
+            self._optima[key] = self.system.optimum(direction, zone).pressure
+        return self._optima[key]

@@ -1,0 +1,178 @@
+"""The cyclic steady state in one inequality, without any time stepping.
+
+At the end the wear of a cycle is a rigid motion of the punch, H lambda, and the shape omega (worn
+depth, initial gap and the rigid motion of the first phase together) no longer changes:
+
+    gap_d = S_d p_d + H a_d + omega + g_load >= 0,  p_d >= 0,  p_d gap_d = 0     for each phase,
+    beta~ S (sum of p_d^b) - H lambda >= 0,  omega <= a bound far above any elastic gap,
+
+with the equilibrium of each phase; a of the first phase is zero by the choice of omega. Where the
+wear outruns the rigid motion for ever the surface opens without limit: there omega is at its bound.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.cycle.jump import jump
+from fenwear.inequality import Array, DenseInequality
+from fenwear.system import System
+
+OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
+
+
+@dataclass(frozen=True)
+class Steady:
+    """The cyclic steady state; for one-way sliding the steady state, equal to the optimum.
+
+    Attributes:
+        directions: Sliding direction of each phase.
+        pressure: (phases, n), MPa.
+        gap: (phases, n), mm.
+        shape: Worn depth without its rigid part (n,), mm; NaN where the surfaces never touch.
+        contact_width: Width in contact in each phase (phases,), mm.
+        wear_per_cycle: Depth worn in a cycle (n,), mm.
+        velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
+        iterations: Newton iterations.
+        seconds: Wall time of the solve.
+    """
+
+    directions: tuple[int, ...]
+    pressure: Array
+    gap: Array
+    shape: Array
+    contact_width: Array
+    wear_per_cycle: Array
+    velocity: dict[str, float]
+    iterations: int
+    seconds: float
+
+
+class _SteadyInequality:
+    """Unknown: p of each phase, omega, the rigid modes a of all phases but the first, lambda."""
+
+    def __init__(self, system: System) -> None:
+        statics, interface = system.statics, system.interface
+        self.system = system
+        self.directions = system.motion.directions
+        m, n, r = len(self.directions), len(system.facing.weights), len(statics.resultant)
+        self.m, self.n, self.r = m, n, r
+        self.p_scale = statics.mean_pressure
+        self.gap_scale = self.p_scale * interface.elastic_length
+        self.wear_scale = float(system.wear.depth(np.array(self.p_scale)))
+        self.lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
+        shape = statics.rigid_normal / self.lengths
+        moment = self.lengths[:, None] * self.p_scale * statics.facing.weights.sum()
+        friction = system.case.contact.friction
+        size = m * n + n + m * r
+        self.matrix = np.zeros((size, size))
+        self.offset = np.zeros(size)
+        omega = slice(m * n, m * n + n)
+        last = m * n + n
+        for k, d in enumerate(self.directions):
+            rows = slice(k * n, (k + 1) * n)
+            self.matrix[rows, rows] = interface.compliance(d, friction) * (self.p_scale / self.gap_scale)
+            self.matrix[rows, omega] = np.eye(n)
+            if k > 0:
+                self.matrix[rows, last + (k - 1) * r : last + k * r] = shape
+            self.offset[rows] = interface.load_gap / self.gap_scale
+            balance = slice(last + k * r, last + (k + 1) * r)
+            self.matrix[balance, rows] = statics.equilibrium(d, friction) * self.p_scale / moment
+            self.offset[balance] = statics.resultant / moment[:, 0]
+        # At its upper bound a variational inequality wants F <= 0: the wear balance with its sign turned.
+        self.matrix[omega, size - r :] = shape
+        self.omega = omega
+        lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+        lower[: m * n] = 0.0
+        upper[omega] = OPEN
+        self.inequality = DenseInequality(
+            lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
+        )
+
+    def _residual(self, x: Array, f: Array) -> None:
+        m, n = self.m, self.n
+        f[:] = self.matrix @ x + self.offset
+        pressure = x[: m * n].reshape(m, n) * self.p_scale
+        f[self.omega] -= self.system.wear.depth(pressure).sum(axis=0) / self.wear_scale
+
+    def _jacobian(self, x: Array, jacobian: Array) -> None:
+        from fenwear.wear import WornLayer
+
+        m, n = self.m, self.n
+        jacobian[:] = self.matrix
+        slope = WornLayer(self.system.wear).slope(x[: m * n].reshape(m, n) * self.p_scale) * self.p_scale
+        rows = np.arange(n)
+        for k in range(m):
+            jacobian[m * n + rows, k * n + rows] -= slope[k] / self.wear_scale
+
+    def start(self) -> Array:
+        """Return the uniform pressure with the shape that would carry it."""
+        m, n, r = self.m, self.n, self.r
+        x = np.zeros(len(self.offset))
+        x[: m * n] = 1.0
+        x[self.omega] = -(self.matrix[:n, :n].sum(axis=1) + self.offset[:n])
+        shape = self.system.statics.rigid_normal / self.lengths
+        if r:
+            x[-r:] = np.linalg.lstsq(shape, np.full(n, float(m)), rcond=None)[0]
+        return x
+
+
+def steady(system: System) -> Steady:
+    """Solve for the cyclic steady state; collective.
+
+    Raises:
+        ConvergenceError: the inequality did not converge.
+    """
+    interface = system.interface
+    begin = time.perf_counter()
+    problem = _SteadyInequality(system)
+    x = problem.inequality.solve(problem.start())
+    m, n, r = problem.m, problem.n, problem.r
+    pressure = x[: m * n].reshape(m, n) * problem.p_scale
+    f = np.empty_like(x)
+    problem._residual(x, f)
+    omega = x[problem.omega] * problem.gap_scale
+    touched = x[problem.omega] < OPEN
+    weights = system.facing.weights
+    shape = np.where(touched, omega - _rigid_part(system, omega - system.facing.initial_gap, touched), np.nan)
+    velocity = x[len(x) - r :] * problem.wear_scale / problem.lengths
+    return Steady(
+        problem.directions,
+        pressure,
+        f[: m * n].reshape(m, n) * problem.gap_scale,
+        shape - system.facing.initial_gap,
+        (pressure > 0) @ weights,
+        system.wear.depth(pressure).sum(axis=0),
+        dict(zip(interface.statics.mode_names, velocity.tolist(), strict=True)),
+        problem.inequality.snes.getIterationNumber(),
+        time.perf_counter() - begin,
+    )
+
+
+def _rigid_part(system: System, values: Array, where: Array) -> Array:
+    """Return the rigid motion that fits `values` best in the weighted least-squares sense."""
+    modes = system.statics.rigid_normal
+    root = np.sqrt(system.facing.weights * where)
+    values = np.where(where, values, 0.0)
+    return modes @ np.linalg.lstsq(modes * root[:, None], values * root, rcond=None)[0]
+
+
+def cycles_to_reach(system: System, state: Steady, fraction: float, limit: int = 10_000_000) -> int | None:
+    """Return after how many cycles from the initial shape the pressures come this near to the end.
+
+    Found by a run of cycle jumps, and so exact to the length of the jump that crosses.
+
+    Args:
+        state: The steady state.
+        fraction: Of the mean pressure.
+        limit: Cycles tried; None is returned beyond.
+    """
+    phases = len(state.directions)
+    for block in jump(system, limit * phases, tolerance=fraction / 2, block=phases):
+        near = np.abs(block.pressure - state.pressure).max() < fraction * system.statics.mean_pressure
+        if near:
+            return int(block.half_cycle[-1]) // phases
+    return None

@@ -1,0 +1,185 @@
+"""What a run leaves: case.toml, history.nc, summary.json. Nothing here computes or draws."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+
+from fenwear.case import Case
+from fenwear.cycle import Block
+from fenwear.errors import CaseError, Problem
+from fenwear.system import System
+from fenwear.versions import versions
+
+HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
+SECONDS_BETWEEN_WRITES = 2.0
+
+# name: (dimensions, units, long_name); a Block has an attribute of each name
+VARIABLES = {
+    "half_cycle": (("half_cycle",), "1", "number of the half-cycle"),
+    "direction": (("half_cycle",), "1", "sliding direction of the strip: 1 rightward, -1 leftward"),
+    "pressure": (("half_cycle", "x"), "MPa", "contact pressure during the half-cycle"),
+    "gap": (("half_cycle", "x"), "mm", "gap between punch and strip during the half-cycle"),
+    "wear": (("half_cycle", "x"), "mm", "worn depth of the punch at the end of the half-cycle"),
+    "max_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
+    "contact_width": (("half_cycle",), "mm", "width in contact"),
+    "worn_area": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
+    "optimum_distance": (("half_cycle",), "1", "largest distance to the optimal pressure over the mean pressure"),
+    "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the mean pressure"),
+    "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
+}
+
+
+def make_directory(path: Path) -> None:
+    """Make the new folder of a run.
+
+    Raises:
+        CaseError: it exists and is not empty, or cannot be made.
+    """
+    try:
+        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            raise CaseError(Problem("-o", f"{path} exists already; expected a new or an empty folder"))
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / CASE
+        probe.touch()
+    except OSError as error:
+        raise CaseError(Problem("-o", f"{path} cannot be written: {error.strerror}")) from None
+
+
+def free_directory(stem: Path) -> Path:
+    """Return `stem`, or the first of stem-2, stem-3, ... that does not exist."""
+    if not stem.exists():
+        return stem
+    number = 2
+    while (path := stem.with_name(f"{stem.name}-{number}")).exists():
+        number += 1
+    return path
+
+
+class HistoryWriter:
+    """Writes blocks of half-cycles to history.nc, at most every few seconds; for one rank.
+
+    Between two writes the file is closed, and so complete and readable.
+    """
+
+    def __init__(self, directory: Path, system: System) -> None:
+        self.path = directory / HISTORY
+        self._phases = len(system.motion.directions)
+        self._every = system.case.output.every
+        self._pending: list[dict[str, np.ndarray]] = []
+        self._last: dict[str, np.ndarray] | None = None
+        self._written = time.monotonic()
+        self.rows = 0
+        self._create(system)
+
+    def _create(self, system: System) -> None:
+        facing = system.facing
+        with h5netcdf.File(self.path, "w") as file:
+            file.attrs["title"] = system.case.title or "fenwear run"
+            file.attrs["Conventions"] = "CF-1.11"
+            file.attrs["case"] = system.case.to_toml()
+            file.attrs["versions"] = json.dumps(versions())
+            file.dimensions = {"half_cycle": None, "x": len(facing.x)}
+            for name, values, long_name in (
+                ("x", facing.x, "position along the contact, from the centre of the geometry"),
+                ("weight", facing.weights, "length that each contact node stands for"),
+            ):
+                variable = file.create_variable(name, ("x",), float)
+                variable[:] = values
+                variable.attrs.update(units="mm", long_name=long_name)
+            for name, (dimensions, units, long_name) in VARIABLES.items():
+                kind = int if name in ("half_cycle", "direction") else float
+                chunks = (256, *(len(facing.x) for _ in dimensions[1:]))
+                variable = file.create_variable(name, dimensions, kind, chunks=chunks)
+                variable.attrs.update(units=units, long_name=long_name)
+
+    def add(self, block: Block) -> None:
+        """Take a block; write what has gathered if the last write is some seconds ago."""
+        rows = {name: getattr(block, name) for name in VARIABLES}
+        cycle = (block.half_cycle - 1) // self._phases
+        # A jump run has gaps in its numbers: it keeps all it has.
+        regular = bool((np.diff(block.half_cycle) == 1).all())
+        keep = (cycle % self._every == 0) | (not regular)
+        self._pending.append({name: values[keep] for name, values in rows.items()})
+        self._last = {name: values[-self._phases :] for name, values in rows.items()}
+        if time.monotonic() - self._written > SECONDS_BETWEEN_WRITES:
+            self._write()
+
+    def close(self) -> None:
+        """Write the rest, with the last cycle whatever `output.every` is."""
+        if self._last is not None:
+            seen = {int(n) for rows in self._pending for n in rows["half_cycle"]} | self._stored_tail()
+            new = np.array([int(n) not in seen for n in self._last["half_cycle"]])
+            self._pending.append({name: values[new] for name, values in self._last.items()})
+        self._write()
+
+    def _stored_tail(self) -> set[int]:
+        with h5netcdf.File(self.path, "r") as file:
+            return {int(n) for n in file["half_cycle"][max(0, self.rows - self._phases) :]}
+
+    def _write(self) -> None:
+        if self._pending:
+            joined = {name: np.concatenate([rows[name] for rows in self._pending]) for name in VARIABLES}
+            count = len(joined["half_cycle"])
+            if count:
+                with h5netcdf.File(self.path, "a") as file:
+                    file.resize_dimension("half_cycle", self.rows + count)
+                    for name, values in joined.items():
+                        file[name][self.rows : self.rows + count] = values
+                self.rows += count
+            self._pending = []
+        self._written = time.monotonic()
+
+
+def summarise(system: System, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
+    """Return the key numbers of a run, each with its unit in its name.
+
+    Args:
+        last: The last block.
+        extremes: Largest errors over all half-cycles.
+        run: How the run went: stop, times, warnings.
+    """
+    facing = system.facing
+    width = facing.x[-1] - facing.x[0]
+    centre = (facing.x[-1] + facing.x[0]) / 2
+    places = centre + width * np.array([-0.25, 0.0, 0.25])
+    phases = len(system.motion.directions)
+    names = {1: "rightward", -1: "leftward"}
+    return {
+        "title": system.case.title,
+        "half_cycles": int(last.half_cycle[-1]),
+        **run,
+        "mean_pressure_MPa": system.statics.mean_pressure,
+        "x_mm": places.tolist(),
+        "wear_mm": facing.interpolate(last.wear[-1], places).tolist(),
+        **{
+            names[int(d)]: {
+                "half_cycle": int(last.half_cycle[-phases:][i]),
+                "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
+                "pressure_MPa": facing.interpolate(last.pressure[-phases:][i], places).tolist(),
+                "contact_width_mm": float(last.contact_width[-phases:][i]),
+            }
+            for i, d in enumerate(last.direction[-phases:])
+        },
+        "periodicity": float(last.periodicity[-1]),
+        **extremes,
+        "contact_nodes": len(facing.x),
+        "degrees_of_freedom": system.punch.stiffness.size[0] + system.strip.stiffness.size[0],
+        "ranks": system.comm.size,
+        "versions": versions(),
+    }
+
+
+def write_summary(directory: Path, summary: dict[str, Any]) -> None:
+    """Write summary.json."""
+    (directory / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", "utf-8")
+
+
+def write_case(directory: Path, case: Case) -> None:
+    """Write the resolved case.toml, which runs again as it is."""
+    (directory / CASE).write_text(case.to_toml(), "utf-8")

@@ -13,7 +13,18 @@ from typing import Any
 
 __version__ = "0.1.0"
 
-__all__ = ["Case", "CaseError", "ConvergenceError", "FenwearError", "System", "jump", "load_case", "make_case", "march", "steady"]
+__all__ = [
+    "Case",
+    "CaseError",
+    "ConvergenceError",
+    "FenwearError",
+    "System",
+    "jump",
+    "load_case",
+    "make_case",
+    "march",
+    "steady",
+]
 
 _HOMES = {
     "Case": "case",

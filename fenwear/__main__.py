@@ -66,7 +66,6 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
     except Exception:
         # Another rank may wait in a collective call for this one: end them all.
         traceback.print_exc(file=sys.__stderr__)
-        sys.__stderr__.flush()
         if comm.size > 1:
             comm.Abort(1)
         return 1

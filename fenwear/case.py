@@ -279,8 +279,8 @@ class Case(_Part):
 def builtin_cases() -> dict[str, str]:
     """Return the names of the built-in cases with their titles."""
     folder = resources.files("fenwear") / "cases"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".toml")), key=lambda f: f.name)
-    return {f.name.removesuffix(".toml"): tomllib.loads(f.read_text("utf-8"))["title"] for f in files}
+    files = {f.name.removesuffix(".toml"): f for f in folder.iterdir() if f.name.endswith(".toml")}
+    return {name: tomllib.loads(files[name].read_text("utf-8"))["title"] for name in sorted(files)}
 
 
 def load_case(source: str | Path, settings: Sequence[str] = ()) -> Case:
@@ -293,21 +293,45 @@ def load_case(source: str | Path, settings: Sequence[str] = ()) -> Case:
     Raises:
         CaseError: the file cannot be read, or anything in it is wrong; lists all problems.
     """
+    data, folder = _read_tables(str(source))
+    for setting in settings:
+        _apply(data, setting)
+    return make_case(data, folder)
+
+
+def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path | None]:
+    """Return the tables of a case, laid over those of the case it names as its base, and its folder."""
     path = Path(source)
     if path.suffix != ".toml" and not path.exists():
-        if str(source) not in builtin_cases():
+        if source not in builtin_cases():
             known = ", ".join(builtin_cases())
-            raise CaseError(Problem(str(source), f"no such case file, nor a built-in case ({known})"))
+            raise CaseError(Problem(source, f"no such case file, nor a built-in case ({known})"))
         text, folder = (resources.files("fenwear") / "cases" / f"{source}.toml").read_text("utf-8"), None
     else:
         text, folder = _read_text(path), path.parent
     try:
         data = tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise CaseError(Problem(str(source), f"not a TOML file: {error}")) from None
-    for setting in settings:
-        _apply(data, setting)
-    return make_case(data, folder)
+        raise CaseError(Problem(source, f"not a TOML file: {error}")) from None
+    base = data.pop("base", None)
+    if base is None:
+        return data, folder
+    if not isinstance(base, str):
+        raise CaseError(Problem("base", f"expected the name of a case, got {base!r}"))
+    if base in base_of or len(base_of) > 8:
+        raise CaseError(Problem("base", f"{base!r} has itself as its base"))
+    if folder is not None and base.endswith(".toml"):
+        base = str(folder / base)
+    below, base_folder = _read_tables(base, (*base_of, base))
+    own_geometry = "file" in data.get("geometry", {})
+    return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
+
+
+def _laid_over(below: Any, above: Any) -> Any:
+    """Return nested tables, those `above` before those `below`; one that states its kind stands alone."""
+    if not (isinstance(below, dict) and isinstance(above, dict)) or "kind" in above:
+        return above
+    return {**below, **{key: _laid_over(below.get(key), value) for key, value in above.items()}}
 
 
 def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
@@ -359,7 +383,7 @@ def _step(place: Any, name: str, setting: str) -> Any:
     raise CaseError(Problem("--set", f"{setting!r} reaches into {name!r}, which is not a table"))
 
 
-def _problems(error: Any) -> list[Problem]:
+def _problems(error: Any) -> list[Problem]:  # noqa: PLR0911
     """Turn one pydantic error into problems with the key's path as in the case file."""
     union_tags = ("reciprocating", "one-way")
     key = ".".join(str(step) for step in error["loc"] if step not in union_tags)
@@ -386,7 +410,7 @@ def _suggestion(location: tuple[str | int, ...]) -> str:
     model: Any = Case
     for step in location[:-1]:
         field = getattr(model, "model_fields", {}).get(step)
-        models = [m for m in _models_in(field.annotation if field else model)]
+        models = _models_in(field.annotation if field else model)
         model = next((m for m in models if getattr(m, "model_fields", {}).get("kind") is None), None) or (
             models[0] if models else None
         )

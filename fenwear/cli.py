@@ -27,7 +27,9 @@ app = typer.Typer(
 DEFAULT_CASE = "example1"
 
 CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (TOML) or the name of a built-in case.")]
-SetOption = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')]
+SetOption = Annotated[
+    list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
+]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -87,7 +89,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     state = steady(system)
     cycles = cycles_to_reach(system, state, 0.01)
     if as_json:
-        pressures = dict(zip(state.directions, state.pressure.tolist(), strict=True))
+        pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
         _print_json(
             {
                 "x": system.facing.x.tolist(),
@@ -97,7 +99,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
                 "temperature": None,
                 "contact_width": state.contact_width.tolist(),
                 "wear_per_cycle": state.wear_per_cycle.tolist(),
-                **{name: value for name, value in state.velocity.items()},
+                **state.velocity,
                 "cycles_to_1_percent": cycles,
                 "seconds": state.seconds,
             }
@@ -134,8 +136,9 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
         _print_json({n: {**o.velocity, "x": x, "pressure": o.pressure.tolist()} for n, o in found.items()})
         return
     for name, state in found.items():
-        at_ends = f"p = {state.pressure[0]:.4f} MPa at x = {system.facing.x[0]:g} mm to {state.pressure[-1]:.4f} at {system.facing.x[-1]:g}"
-        print(f"{name:9}  {_velocities(state.velocity, 's')}; {at_ends}")
+        print(f"{name:9}  {_velocities(state.velocity, 's')}")
+        for end in (0, -1):
+            print(f"           p = {state.pressure[end]:.4f} MPa at x = {system.facing.x[end]:g} mm")
 
 
 @app.command("check")

@@ -94,7 +94,7 @@ class FullContact:
         self.snes.setVariableBounds(lower, upper)
         self.snes.setFromOptions()
 
-    def _residual(self, snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+    def _residual(self, _snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
         self._operator.mult(x, f)
         f.axpy(1.0, self._offset)
 
@@ -109,7 +109,7 @@ class FullContact:
         """
         if layer is not None:
             raise NotImplementedError("the full inequality has no layer")
-        n, modes = self._size
+        n, _ = self._size
         contact = slice(self._free, self._free + n)
         self._offset.array[:] = self._constant
         if self.comm.rank == 0:

@@ -17,7 +17,6 @@ from petsc4py import PETSc
 from fenwear.case import Body, Load, Material, Model, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.mesh import BodyMesh
-from fenwear.parallel import agree
 
 AXES = {"x": 0, "z": 1}
 PREFIX = "fenwear_elasticity_"
@@ -107,7 +106,7 @@ class ElasticBody:
 
         load = self._assemble_load(description.loads, model.thickness)
         self.rigid_resultant = mesh.comm.allreduce(np.array([mode @ load.array_r for mode in modes]))
-        bcs = supports + self._regularise(supports)
+        bcs = supports + self._regularise()
         self.supported = self._owned_dofs(bcs)
         load.array[self.supported] = 0.0
         self.load = load
@@ -209,7 +208,7 @@ class ElasticBody:
         parts = [bc.dof_indices()[0][: bc.dof_indices()[1]] for bc in supports]
         return np.unique(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int32)
 
-    def _regularise(self, supports: list[fem.DirichletBC]) -> list[fem.DirichletBC]:
+    def _regularise(self) -> list[fem.DirichletBC]:
         """Return one further support for each rigid mode, away from the contact; collective."""
         if not self.rigid_modes:
             return []
@@ -255,17 +254,18 @@ class ElasticBody:
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
             one = fem.Constant(mesh, PETSc.ScalarType(1))
             area = thickness * mesh.comm.allreduce(fem.assemble_scalar(fem.form(one * ds(tag))))
-            if load.traction is not None:
-                traction = np.array(load.traction)
-            else:
-                traction = np.array(load.force) / area
+            resultant = load.force if load.traction is None else [area * component for component in load.traction]
+            traction = np.array(resultant) / area
             total.axpy(1.0, self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag))
         return total
 
 
 def _check_regions(body: BodyMesh, description: Body) -> None:
     problems = [
-        Problem(f"{body.name}.regions.{name}", f"no physical surface of that name; the geometry has {', '.join(body.regions)}")
+        Problem(
+            f"{body.name}.regions.{name}",
+            f"no physical surface of that name; the geometry has {', '.join(body.regions)}",
+        )
         for name in description.regions
         if name not in body.regions
     ] + [
@@ -300,7 +300,8 @@ def _pivot(body: BodyMesh, description: Body) -> tuple[float, float]:
 
 def _column_echelon(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
     """Return the reduced column echelon form of a matrix with few columns, and its pivot rows."""
-    m, pivots = matrix.copy(), []
+    m = matrix.copy()
+    pivots: list[int] = []
     for row in range(m.shape[0]):
         column = len(pivots)
         if column == m.shape[1]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -48,7 +48,8 @@ def pressure_figure(history: xarray.Dataset, half_cycles: list[int]) -> Figure:
     axes = figure.subplots(len(present), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for ax, d in zip(axes, present, strict=True):
         one_way = history.isel(half_cycle=np.flatnonzero(history.direction.values == d))
-        nearest = [int(one_way.half_cycle.values[np.abs(one_way.half_cycle.values - n).argmin()]) for n in half_cycles]
+        recorded = one_way.half_cycle.values
+        nearest = sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in half_cycles})
         for colour, n in _coloured(nearest):
             ax.plot(history.x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
         ax.set_title(f"strip moves {DIRECTIONS[d][0]}", loc="left")
@@ -122,7 +123,7 @@ def _figure(width: float, height: float) -> Figure:
         return Figure(figsize=(width, height), layout="constrained")
 
 
-def _coloured(half_cycles: list[int]) -> list[tuple[tuple[float, ...], int]]:
+def _coloured(half_cycles: list[int]) -> list[tuple[Any, int]]:
     """Return a colour for each half-cycle, dark to light: readable in print and to the colour-blind."""
     from matplotlib import colormaps
 

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from fenwear.errors import ConvergenceError
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 

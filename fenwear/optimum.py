@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from fenwear.errors import CaseError, ConvergenceError, Problem
-from fenwear.inequality import Array
+from fenwear.inequality import Array, Mask
 from fenwear.interface import Statics
 
 
@@ -60,7 +60,7 @@ def optimum(
     friction: float,
     wear_rate: float,
     pressure_exponent: float,
-    zone: Array | None = None,
+    zone: Mask | None = None,
 ) -> Optimum:
     """Return the optimal pressure and the wear velocity.
 

@@ -26,7 +26,7 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
     error = comm.bcast(error)
     if error is not None:
         raise error
-    return comm.bcast(result)  # type: ignore[return-value]
+    return comm.bcast(result)
 
 
 def agree(comm: MPI.Comm, error: Exception | None) -> None:

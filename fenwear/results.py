@@ -9,6 +9,7 @@ from typing import Any
 
 import h5netcdf
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.case import Case
 from fenwear.cycle import Block
@@ -71,8 +72,8 @@ class HistoryWriter:
         self.path = directory / HISTORY
         self._phases = len(system.motion.directions)
         self._every = system.case.output.every
-        self._pending: list[dict[str, np.ndarray]] = []
-        self._last: dict[str, np.ndarray] | None = None
+        self._pending: list[dict[str, NDArray[Any]]] = []
+        self._last: dict[str, NDArray[Any]] | None = None
         self._written = time.monotonic()
         self.rows = 0
         self._create(system)

@@ -85,9 +85,7 @@ def _half_cycles(system: System) -> Iterator[Block]:
     run = system.case.run
     if run.integration == "jump":
         return jump(system, run.half_cycles, tolerance=run.jump_tolerance, periodic_within=run.periodic_within)
-    return march(
-        system, run.half_cycles, implicit=run.integration == "implicit", periodic_within=run.periodic_within
-    )
+    return march(system, run.half_cycles, implicit=run.integration == "implicit", periodic_within=run.periodic_within)
 
 
 def _warnings(system: System) -> list[str]:

@@ -10,7 +10,7 @@ from fenwear.case import Body, Case
 from fenwear.contact import CondensedContact, ContactSolver
 from fenwear.contact_full import FullContact
 from fenwear.elasticity import ElasticBody
-from fenwear.inequality import Array
+from fenwear.inequality import Mask
 from fenwear.interface import Facing, Interface, Statics, face, join, statics
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
@@ -71,7 +71,7 @@ class System:
             return FullContact(self.punch, self.strip, self.interface, friction, directions[0])
         return CondensedContact(self.interface, friction, directions)
 
-    def optimum(self, direction: int, zone: Array | None = None) -> Optimum:
+    def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
 
         Args:

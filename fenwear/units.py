@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import pint
@@ -19,7 +19,7 @@ _HARMLESS_UNIT = re.compile(r"[A-Za-zµμ°²³\d\s*/().^-]{1,64}")
 
 
 @lru_cache(maxsize=1)
-def _registry() -> pint.UnitRegistry[Any]:
+def _registry() -> pint.UnitRegistry:
     import pint
 
     return pint.UnitRegistry(cache_folder=None)
@@ -38,10 +38,7 @@ def convert(value: object, unit: str) -> float:
     expected = f"expected a number or a string with a unit such as '1 {unit}'" if unit else "expected a number"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{expected}, got {value!r}")
-    if isinstance(value, str):
-        number = _convert_text(value, unit, expected)
-    else:
-        number = float(value)
+    number = _convert_text(value, unit, expected) if isinstance(value, str) else float(value)
     if not math.isfinite(number):
         raise ValueError(f"{expected} that is finite, got {value!r}")
     return number

@@ -63,7 +63,7 @@ class Block:
         lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
         scale = lengths * statics.mean_pressure * statics.facing.weights.sum()
         error = np.zeros(len(self))
-        for d in set(self.direction.tolist()):
+        for d in np.unique(self.direction):
             rows = self.direction == d
             balance = self.pressure[rows] @ statics.equilibrium(d, friction).T + statics.resultant
             error[rows] = np.abs(balance / scale).max(axis=1, initial=0.0)

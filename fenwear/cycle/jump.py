@@ -102,7 +102,9 @@ def _record(
     changes = []
     for phase, direction in enumerate(directions):
         remaining = len(directions) - 1 - phase
-        before = None if previous is None else state.pressure[phase] - (state.pressure - previous.pressure)[phase] / length
+        before = (
+            None if previous is None else state.pressure[phase] - (state.pressure - previous.pressure)[phase] / length
+        )
         depth = wear - worn[phase + 1 :].sum(axis=0)
         changes.append(recorder.add(half_cycle - remaining, direction, phase, state, depth, worn[phase], before))
     return max(changes)

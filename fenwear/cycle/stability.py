@@ -6,6 +6,7 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
+from fenwear.inequality import Array
 from fenwear.system import System
 
 
@@ -30,7 +31,7 @@ def stability_number(system: System) -> float:
         matrix[n:, :n] = statics.equilibrium(d, friction)
         factor = scipy.linalg.lu_factor(matrix)
 
-        def respond(shape: np.ndarray, factor: tuple[np.ndarray, np.ndarray] = factor) -> np.ndarray:
+        def respond(shape: Array, factor: tuple[Array, Array] = factor) -> Array:
             return scipy.linalg.lu_solve(factor, np.concatenate([shape.ravel(), np.zeros(r)]))[:n]
 
         operator = LinearOperator((n, n), matvec=respond, dtype=float)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.cycle.jump import jump
-from fenwear.inequality import Array, DenseInequality
+from fenwear.inequality import Array, DenseInequality, Mask
 from fenwear.system import System
 
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
@@ -152,7 +152,7 @@ def steady(system: System) -> Steady:
     )
 
 
-def _rigid_part(system: System, values: Array, where: Array) -> Array:
+def _rigid_part(system: System, values: Array, where: Mask) -> Array:
     """Return the rigid motion that fits `values` best in the weighted least-squares sense."""
     modes = system.statics.rigid_normal
     root = np.sqrt(system.facing.weights * where)

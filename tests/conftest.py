@@ -1,0 +1,76 @@
+"""What the tests share: assembled systems, each made once, and the command line in a process of its own."""
+
+from __future__ import annotations
+
+import gc
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
+
+import pytest
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenwear import Case, System, load_case, make_case
+
+Edit = Callable[[dict[str, Any]], object]
+
+
+@cache
+def _assembled(name: str, settings: tuple[str, ...]) -> System:
+    return System(load_case(name, settings))
+
+
+@pytest.fixture(scope="session")
+def assemble() -> Iterator[Callable[..., System]]:
+    """Return assemble(name, *settings): the system of a built-in case, made once a session."""
+    yield lambda name, *settings: _assembled(name, settings)
+    _assembled.cache_clear()
+
+
+@pytest.fixture(scope="session")
+def edited() -> Callable[..., Case]:
+    """Return edited(name, edit, *settings): a built-in case after `edit` has changed its tables."""
+
+    def edited(name: str, edit: Edit, *settings: str) -> Case:
+        tables = load_case(name, settings).resolved()
+        edit(tables)
+        return make_case(tables)
+
+    return edited
+
+
+@pytest.fixture(scope="session")
+def run_python() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Return run_python(*arguments, ranks=1, ...): python3 in a process of its own, under mpirun where ranks > 1."""
+    # The session's own MPI must not show through to the processes that it starts.
+    inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE", "OMPI_COMM", "OMPI_FILE"))}
+    environment = {**inherited, "OMP_NUM_THREADS": "1"}
+
+    def run_python(*arguments: object, ranks: int = 1, cwd: Path | None = None, **variables: str) -> Any:
+        start = [sys.executable] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable]
+        command = [*start, *map(str, arguments)]
+        env = {**environment, **variables}
+        return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=env, timeout=300, check=False)
+
+    return run_python
+
+
+@pytest.fixture(scope="session")
+def fenwear(run_python: Callable[..., Any]) -> Callable[..., Any]:
+    """Return fenwear(*arguments, ranks=1, ...): the command line in a process of its own."""
+    return lambda *arguments, **options: run_python("-m", "fenwear", *arguments, **options)
+
+
+def pytest_runtest_teardown() -> None:
+    """Destroy what is collective on all ranks together."""
+    if MPI.COMM_WORLD.size > 1:
+        gc.collect()
+        PETSc.garbage_cleanup()
+        MPI.COMM_WORLD.Barrier()

@@ -1,0 +1,66 @@
+"""Quantities with units."""
+
+import math
+
+import pytest
+
+from fenwear.units import convert, quantity_text
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "number"),
+    [
+        ("1.5 mm", "mm", 1.5),
+        ("0.06 m", "mm", 60.0),
+        ("10 kN", "N", 1e4),
+        ("-10 kN", "N", -1e4),
+        ("200 GPa", "MPa", 2e5),
+        ("1 N/mm^2", "MPa", 1.0),
+        ("55 W/(m K)", "N/(s*K)", 55.0),
+        ("80 W/(m^2 K)", "N/(mm*s*K)", 0.08),
+        ("1 J/(m^3 K)", "N/(mm^2*K)", 1e-6),
+        ("600 rpm", "rad/s", 20 * math.pi),
+        ("3.9e-8 1/MPa", "MPa^-1", 3.9e-8),
+        ("3.9e-14 1/Pa", "MPa^-1", 3.9e-8),
+        (" 7 ", "mm", 7.0),
+        (3, "mm", 3.0),
+    ],
+)
+def test_conversion(text: object, unit: str, number: float) -> None:
+    """Reference: the definitions of the units and shared/physics.md ("Units inside the code")."""
+    assert convert(text, unit) == pytest.approx(number, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("value", "unit"),
+    [
+        ("1 kg", "mm"),
+        ("1 mm", ""),
+        ("1 furlongs_per_snail", "mm"),
+        ("mm", "mm"),
+        ("", "mm"),
+        ("1 2 mm", "mm"),
+        ("1 mm; import os", "mm"),
+        ("1 mm**999999", "mm"),
+        ("10 Hz", "rad/s"),
+        ("nan", "mm"),
+        ("1e999", "mm"),
+        (math.inf, "mm"),
+        (math.nan, ""),
+        (True, "mm"),
+        (None, "mm"),
+        ([1.0], "mm"),
+    ],
+)
+def test_refusal_says_what_was_expected(value: object, unit: str) -> None:
+    """Nothing but a finite number of the right kind passes, and the message shows the unit."""
+    with pytest.raises(ValueError, match=r"expected a number") as refused:
+        convert(value, unit)
+    assert unit in str(refused.value)
+
+
+@pytest.mark.parametrize("value", [0.1, 1 / 3, 1e-300, -2.5e17, 3.926990816987242e-8])
+def test_text_reads_back_to_the_last_bit(value: float) -> None:
+    """What a resolved case shows is what it was."""
+    assert convert(quantity_text(value, "MPa"), "MPa") == value
+    assert convert(quantity_text(value, ""), "") == value

@@ -144,12 +144,29 @@ def _load(gmsh: Any, geometry: Geometry, path: Path) -> None:
         gmsh.parser.setNumber(name, [value])
     _check_parameters(geometry, path)
     try:
-        gmsh.merge(str(path))
+        _merge(gmsh, path)
         if path.suffix == ".geo":
             gmsh.model.mesh.generate(2)
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(Problem("geometry.file", f"gmsh on {path.name}: {error}")) from None
     _check_groups(gmsh, path)
+
+
+def _merge(gmsh: Any, path: Path) -> None:
+    """Read a file to its end: an error thrown inside gmsh's parser would spoil all that it reads later.
+
+    Raises:
+        Exception: the first error in the file.
+    """
+    gmsh.option.setNumber("General.AbortOnError", 0)
+    gmsh.logger.start()
+    gmsh.merge(str(path))
+    messages = gmsh.logger.get()
+    gmsh.logger.stop()
+    gmsh.option.setNumber("General.AbortOnError", 2)
+    errors = [m.removeprefix("Error: ") for m in messages if m.startswith("Error: ")]
+    if errors:
+        raise Exception(errors[0])  # noqa: TRY002  (as gmsh does)
 
 
 def _check_parameters(geometry: Geometry, path: Path) -> None:

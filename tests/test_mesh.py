@@ -77,7 +77,7 @@ def test_finest_at_the_edges() -> None:
     """edge_grading is the ratio of the element sizes in the middle of the contact and at its edges."""
     system = System(load_case("example1", ["geometry.degree=1", "geometry.parameters.edge_grading=7"]))
     sizes = np.diff(system.facing.x)
-    assert sizes.max() / sizes.min() == pytest.approx(7, rel=1e-9)
+    assert sizes.max() / sizes.min() == pytest.approx(7, rel=1e-6)
     assert sizes.argmin() in (0, len(sizes) - 1)
 
 
@@ -155,6 +155,9 @@ def test_bad_files(tmp_path: Path) -> None:
     (tmp_path / "binary.msh").write_bytes(bytes(range(256)))
     refuse(tmp_path / "binary.msh", "binary.msh")
     refuse(tmp_path / "nonsense.msh", "geometry.parameters: a .msh file has none", punch_width=60)
+    (tmp_path / "nonsense.geo").write_text("a b c d;\n e f;\n")
+    refuse(tmp_path / "nonsense.geo", "gmsh on nonsense.geo: .*syntax error")
+    build()  # a bad file leaves nothing behind in gmsh's parser
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,212 @@
+"""Contact: closed-form solutions, balance, complementarity; the condensed and the full inequality."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+
+from fenwear import ConvergenceError, System
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact_full import FullContact
+
+FINE = ("geometry.parameters.elements_along_contact=32", "geometry.parameters.edge_grading=64")
+A, P = 30.0, 1000.0  # half-width, mm; load per thickness, N/mm
+OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # c = 1.6: the rear edge lifts off
+
+
+def solve(system: System, direction: int = 1) -> ContactState:
+    return system.contact((direction,)).solve(system.facing.initial_gap)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+def test_flat_rigid_punch(rigid_punch: Callable[..., System], plane: Literal["stress", "strain"]) -> None:
+    """Verification 4: p = P / (pi sqrt(a² - x²)) on a half-plane, to 0.05 % for |x| < 0.8 a."""
+    system = rigid_punch(*FINE, f"model.plane='{plane}'")
+    x, p = system.facing.x, solve(system).pressure[0]
+    inside = np.abs(x) < 0.8 * A
+    np.testing.assert_allclose(p[inside], P / np.pi / np.sqrt(A**2 - x[inside] ** 2), rtol=5e-4)
+
+
+def test_a_deeper_strip_is_more_of_a_half_plane(rigid_punch: Callable[..., System]) -> None:
+    """The strip's depth H enters as (a / H)²: the centre's pressure converges so to the half-plane's."""
+    centre = [solve(rigid_punch(*FINE, depth=h)).pressure[0, 64] for h in (150, 300, 600, 1e4)]
+    errors = [abs(c - centre[-1]) for c in centre[:-1]]
+    assert [a / b for a, b in pairwise(errors)] == pytest.approx([4, 4], rel=0.15)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize(("plane", "nu"), [("strain", 0.0), ("strain", 0.3), ("stress", 0.3)])
+def test_friction_shifts_the_edge_exponents(
+    rigid_punch: Callable[..., System], plane: Literal["stress", "strain"], nu: float, direction: int
+) -> None:
+    """Verification 5, sliding rigid punch with friction (Johnson, Contact Mechanics, 2.8b):
+
+    p = P cos(pi g) / (pi sqrt(a² - x²)) ((a - x) / (a + x))^g, tan(pi g) = -d mu (1 - 2 nu) / (2 (1 - nu))
+    in plane strain; in plane stress with nu / (1 + nu) for nu. The strip is dragged to -d by the punch.
+    """
+    mu = 0.6
+    settings = (*FINE, f"model.plane='{plane}'", f"contact.friction={mu}", f"materials.steel.poisson={nu}")
+    system = rigid_punch(*settings, depth=1e4)
+    x, p = system.facing.x, solve(system, direction).pressure[0]
+    effective = nu if plane == "strain" else nu / (1 + nu)
+    g = -direction * np.arctan(mu * (1 - 2 * effective) / (2 * (1 - effective))) / np.pi
+    inside = np.abs(x) < 0.8 * A
+    x, p = x[inside], p[inside]
+    exact = P * np.cos(np.pi * g) / (np.pi * np.sqrt(A**2 - x**2)) * ((A - x) / (A + x)) ** g
+    np.testing.assert_allclose(p, exact, rtol=2e-3)
+    assert abs(g) > 0.05  # 2e-3 would see it
+
+
+@pytest.mark.parametrize("a", [10.0, 15.0, 20.0])
+def test_hertz(rigid_punch: Callable[..., System], a: float) -> None:
+    """Verification 3: the gap x² / 2 R of a cylinder, R so that a = 2 sqrt(P R / (pi E*)); p0 = 2 P / (pi a)."""
+    even = ("geometry.parameters.elements_along_contact=48", "geometry.parameters.edge_grading=1")
+    system = rigid_punch(*even, "model.plane='strain'")
+    x, weights = system.facing.x, system.facing.weights
+    radius = a**2 * np.pi * (2e5 / (1 - 0.3**2)) / (4 * P)
+    state = system.contact((1,)).solve(x**2 / (2 * radius))
+    p = state.pressure[0]
+    exact = 2 * P / (np.pi * a) * np.sqrt(np.maximum(1 - (x / a) ** 2, 0))
+    assert p.max() == pytest.approx(exact.max(), rel=1e-4)
+    assert (p > 0) @ weights / 2 == pytest.approx(a, abs=weights.max())
+    np.testing.assert_allclose(p[np.abs(x) < 0.8 * a], exact[np.abs(x) < 0.8 * a], rtol=2e-3)
+    outside = np.abs(x) > a + 1
+    assert (p[outside] == 0).all()
+    gap = a**2 / (2 * radius) * (s := np.abs(x[outside]) / a) * np.sqrt(s**2 - 1) - a**2 / (2 * radius) * np.arccosh(s)
+    np.testing.assert_allclose(state.gap[0, outside], gap, rtol=0.02, atol=1e-2 * gap.max())
+
+
+@pytest.fixture(params=["full contact", "opening", "unmatched", "no pin"])
+def system(request: pytest.FixtureRequest, assemble: Callable[..., System]) -> System:
+    match request.param:
+        case "full contact":
+            return assemble("example1")
+        case "opening":
+            return assemble("example1", *OPENING)
+        case "unmatched":
+            found: System = request.getfixturevalue("unmatched")
+            return found
+    return assemble("example2", "contact.friction=0.5")
+
+
+def worn(system: System) -> np.ndarray:
+    """A worn shape that opens part of any contact."""
+    return system.facing.initial_gap + 2e-2 * np.cos(system.facing.x / 7) ** 2
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_balance_and_complementarity(system: System, direction: int) -> None:
+    """Verification 5 and 7: force and moment to round-off; p >= 0, gap >= 0, p gap = 0 exactly."""
+    x, weights = system.facing.x, system.facing.weights
+    mu, tilts = system.case.contact.friction, "lambda_M" in system.statics.mode_names
+    height = system.punch.pivot[1] - 100
+    for gap in (system.facing.initial_gap, worn(system)):
+        state = system.contact((direction,)).solve(gap)
+        p, g = state.pressure[0], state.gap[0]
+        assert weights @ p * 10 == pytest.approx(1e4, rel=1e-12)
+        if tilts:  # about the pin at (30, 100 + l_z): the friction pulls the centre of pressure by d mu l_z
+            assert weights @ (p * x) == pytest.approx(-direction * mu * height * P, rel=1e-11)
+        assert (p >= 0).all()
+        assert (g > -1e-11).all()
+        np.testing.assert_allclose(g[p > 0], 0, atol=1e-11)
+    assert (p == 0).any()
+
+
+def test_gap_is_the_distance_of_the_displaced_surfaces(system: System) -> None:
+    """gap = g0 + w + (S_n + d mu S_t) p + H a + g_load, from the state alone."""
+    state = system.contact((-1,)).solve(gap := worn(system))
+    interface = system.interface
+    expected = interface.compliance(-1, system.case.contact.friction) @ state.pressure[0]
+    expected += system.statics.rigid_normal @ state.rigid[0] + interface.load_gap + gap
+    np.testing.assert_allclose(state.gap[0], expected, atol=1e-12)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["example1", "example2"])
+def test_condensed_equals_full(assemble: Callable[..., System], name: str) -> None:
+    """Two discretisations of the algebra, (p, a) and (u, p, a), give the same pressure to 1e-8 in worn half-cycles."""
+    system = assemble(name, *OPENING, "geometry.parameters.elements_along_contact=8")
+    friction = system.case.contact.friction
+    full = [FullContact(system.punch, system.strip, system.interface, friction, d) for d in (1, -1)]
+    condensed = [CondensedContact(system.interface, friction, (d,)) for d in (1, -1)]
+    wear, opened = np.zeros_like(system.facing.x), False
+    for half_cycle in range(4):
+        phase = half_cycle % 2
+        gap = system.facing.initial_gap + wear
+        one, other = condensed[phase].solve(gap), full[phase].solve(gap)
+        scale = one.pressure.max()
+        np.testing.assert_allclose(other.pressure, one.pressure, rtol=0, atol=1e-8 * scale)
+        np.testing.assert_allclose(other.gap, one.gap, rtol=0, atol=1e-8 * scale * system.interface.elastic_length)
+        opened |= bool((one.pressure == 0).any() and (one.gap > 1e-5).any())
+        wear = wear + 500 * system.wear.depth(one.pressure[0])
+    assert opened or name == "example2"
+
+
+def test_condensed_equals_full_on_unmatched_nodes(unmatched: System) -> None:
+    """The same where the nodes of the two surfaces do not coincide."""
+    friction = unmatched.case.contact.friction
+    full = FullContact(unmatched.punch, unmatched.strip, unmatched.interface, friction, -1).solve(worn(unmatched))
+    condensed = CondensedContact(unmatched.interface, friction, (-1,)).solve(worn(unmatched))
+    np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * condensed.pressure.max())
+
+
+def test_unmatched_nodes_change_little(unmatched: System, assemble: Callable[..., System]) -> None:
+    """Another mesh of the strip is the same problem: the force on each element agrees to 5 % of the mean.
+
+    (Node by node the pressure oscillates there: collocation wants matching nodes.)
+    """
+    matched = assemble("example1")
+    x, ends = matched.facing.x, matched.facing.x[::4]
+    element = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, 15)
+    forces = [np.bincount(element, s.facing.weights * solve(s).pressure[0]) for s in (matched, unmatched)]
+    np.testing.assert_allclose(*(f / np.diff(ends) for f in forces), rtol=0, atol=0.05 * P / 60)
+
+
+def test_several_phases_are_independent_without_a_layer(assemble: Callable[..., System]) -> None:
+    """Both phases in one inequality are the two phases each for itself."""
+    system = assemble("example1", *OPENING)
+    both = system.contact((1, -1)).solve(worn(system)).pressure
+    for p, d in zip(both, (1, -1), strict=True):
+        np.testing.assert_allclose(p, system.contact((d,)).solve(worn(system)).pressure[0], atol=1e-9 * p.max())
+
+
+def test_warm_start_changes_nothing_but_the_work(system: System) -> None:
+    """Newton ends at the same contact from its own solution, from another one, and from full contact."""
+    contact = system.contact((1,))
+    cold = contact.solve(worn(system))
+    again = contact.solve(worn(system), cold)
+    from_afar = contact.solve(worn(system), contact.solve(worn(system)[::-1]))
+    for state in (again, from_afar):
+        np.testing.assert_allclose(state.pressure, cold.pressure, rtol=0, atol=1e-10 * cold.pressure.max())
+    assert again.iterations == 0 < cold.iterations
+
+
+@pytest.fixture
+def one_iteration() -> Iterator[None]:
+    options = PETSc.Options()
+    names = [f"fenwear_{name}snes_max_it" for name in ("contact_", "full_contact_")]
+    for name in names:
+        options[name] = 1
+    yield
+    for name in names:
+        options.delValue(name)
+
+
+@pytest.mark.parametrize("solver", ["condensed", "full"])
+@pytest.mark.mpi
+def test_no_convergence_is_said(assemble: Callable[..., System], one_iteration: None, solver: str) -> None:
+    """Stopped by PETSc's options after one iteration: a typed error with the reason and the options' prefix."""
+    system = assemble("example1", *OPENING)
+    friction = system.case.contact.friction
+    contact = (
+        CondensedContact(system.interface, friction, (1,))
+        if solver == "condensed"
+        else FullContact(system.punch, system.strip, system.interface, friction, 1)
+    )
+    with pytest.raises(ConvergenceError, match=r"DIVERGED_MAX_IT after 1 .*-fenwear_.*contact_snes"):
+        contact.solve(worn(system))

@@ -1,0 +1,148 @@
+"""The optimal pressure: the paper's table, closed forms, equilibrium."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.optimize import fsolve
+
+from fenwear import CaseError, System, load_case
+
+A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
+
+
+@pytest.mark.parametrize(
+    ("name", "direction", "lambda_F", "lambda_M"),
+    [
+        ("monotonic-lz20", -1, 0.05, -5.55e-4),
+        ("monotonic-lz20", 1, 0.0166, 5.55e-4),
+        ("monotonic-lz40", -1, 0.06666, -0.001111),
+        ("monotonic-lz40", 1, 0.0, 0.001111),
+    ],
+)
+@pytest.mark.mpi
+def test_table_of_the_paper(
+    assemble: Callable[..., System], name: str, direction: int, lambda_F: float, lambda_M: float
+) -> None:
+    """Verification 6: the eight values, to the digits printed (the paper cuts them off)."""
+    velocity = assemble(name).optimum(direction).velocity
+    assert velocity["lambda_F"] == pytest.approx(lambda_F, abs=1e-4)
+    assert velocity["lambda_M"] == pytest.approx(lambda_M, abs=1e-6)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("height", [20, 40])
+def test_linear_for_b_1(assemble: Callable[..., System], height: int, direction: int) -> None:
+    """p = p_m (1 - d c x / a), c = 6 mu l_z / L; lambda_F and lambda_M from w = beta~ v p about O at x = 30."""
+    system = assemble(f"monotonic-lz{height}")
+    c, rate = 6 * 0.25 * height / 60, 1e-5 * 200
+    found = system.optimum(direction)
+    x = system.facing.x
+    np.testing.assert_allclose(found.pressure, MEAN * (1 - direction * c * x / A), atol=1e-10 * MEAN)
+    assert found.velocity["lambda_M"] == pytest.approx(rate * MEAN * direction * c / A, rel=1e-10)
+    assert found.velocity["lambda_F"] == pytest.approx(rate * MEAN * (1 - direction * c), abs=1e-12)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("name", ["example1", "example2"])
+@pytest.mark.parametrize("b", [0.5, 1.0, 2.0, 3.0])
+def test_equilibrium(assemble: Callable[..., System], name: str, b: float, direction: int) -> None:
+    """Verification 6: force and moment balance of the pressure to 1e-10, by hand; p^b is a rigid motion over K."""
+    system = assemble(name, f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
+    found = system.optimum(direction)
+    x, force = system.facing.x, system.facing.weights * found.pressure
+    assert found.residual < 1e-10
+    assert (found.pressure >= 0).all()
+    assert force.sum() == pytest.approx(1000, rel=1e-10)
+    rate = 1e-8 * 3.0 / (np.pi / 10)  # K, the mean of beta~ v
+    rigid = found.velocity["lambda_F"] - found.velocity.get("lambda_M", 0.0) * (x - 30)
+    np.testing.assert_allclose(rate * found.pressure**b, np.maximum(rigid, 0), rtol=1e-7, atol=1e-9 * rigid.max())
+    if name == "example1":
+        assert force @ x == pytest.approx(-direction * 0.25 * 20 * 1000, rel=1e-9)
+    else:
+        np.testing.assert_allclose(found.pressure, MEAN, rtol=1e-10)
+
+
+@pytest.mark.parametrize("b", [0.5, 2.0, 3.0])
+def test_power_law_against_adaptive_quadrature(assemble: Callable[..., System], b: float) -> None:
+    """The same equilibrium with p = (f + g x)^(1/b), integrated by QUADPACK and solved by MINPACK."""
+    system = assemble("example1", f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
+
+    def shape(x: float, f: float, g: float) -> float:
+        return max(f + g * x / A, 0.0) ** (1 / b)
+
+    def balance(unknown: np.ndarray) -> list[float]:
+        moments = [quad(lambda x, k=k: shape(x, *unknown) * x**k, -A, A, epsabs=1e-11)[0] for k in (0, 1)]  # type: ignore[misc]
+        return [moments[0] / 60 - 1, moments[1] / 60 + 0.25 * 20]
+
+    f, g = fsolve(balance, [1.0, -0.4], xtol=1e-12)
+    exact = np.array([shape(x, f, g) for x in system.facing.x]) * MEAN
+    inside = system.facing.x < 26  # b = 3: p meets zero near the right edge, with an infinite slope
+    np.testing.assert_allclose(system.optimum(1).pressure[inside], exact[inside], rtol=2e-5 if b < 3 else 2e-3)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_open_contact_is_a_triangle(assemble: Callable[..., System], direction: int) -> None:
+    """b = 1 with c > 1: a triangle whose centroid lies at x = -d mu l_z, so 3 (a - mu l_z) long, peak 2 P / length.
+
+    The kink lies inside an element; the error falls with the nodes' weights, second order.
+    """
+    mu, height = 0.4, 40
+    length = 3 * (A - mu * height)
+    errors = []
+    for count in (16, 64):
+        settings = (f"contact.friction={mu}", f"geometry.parameters.elements_along_contact={count}")
+        system = assemble("monotonic-lz40", "geometry.degree=1", *settings)
+        edge = -direction * A
+        exact = 2 * 1000 / length * np.maximum(1 - np.abs(system.facing.x - edge) / length, 0)
+        found = system.optimum(direction)
+        errors.append(np.abs(found.pressure - exact).max() / exact.max())
+        assert found.residual < 1e-10
+    assert errors[1] < min(1e-3, errors[0] / 8)
+
+
+def test_zone(assemble: Callable[..., System]) -> None:
+    """Only nodes of the contact zone carry: on the middle half of Example 2 the optimum is 2 p_m."""
+    system = assemble("example2", "geometry.parameters.edge_grading=1")
+    zone = np.abs(system.facing.x) < 15.1
+    pressure = system.optimum(1, zone).pressure
+    assert (pressure[~zone] == 0).all()
+    assert np.ptp(pressure[zone]) < 1e-10
+    assert system.facing.weights @ pressure == pytest.approx(1000, rel=1e-10)
+
+
+@pytest.mark.mpi
+def test_neither_speed_nor_wear_coefficient_changes_the_pressure(assemble: Callable[..., System]) -> None:
+    """shared/physics.md, part 5; lambda is proportional to both."""
+    one = assemble("monotonic-lz20").optimum(1)
+    other = assemble("monotonic-lz20", "motion.speed=50", "wear.punch.coefficient=3e-5").optimum(1)
+    np.testing.assert_allclose(other.pressure, one.pressure, rtol=1e-12)
+    for name, value in one.velocity.items():
+        assert other.velocity[name] == pytest.approx(value * 3 / 4, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        # 1 kN/mm down at x = 0 and 3 kN/mm to the right at 30 mm above the pin: the resultant acts at x = 90 > 30.
+        ("contact.friction=0", "punch.loads=[{on='punch_load', force=[11e3, -10e3]}]"),
+        ("contact.friction=0.8", "geometry.parameters.pin_height_1=40"),  # friction alone: mu l_z > a
+        ("punch.loads=[{on='punch_load', force=[0, 10e3]}]",),  # lifts off
+    ],
+)
+@pytest.mark.mpi
+def test_tipping_punch_is_refused(settings: tuple[str, ...]) -> None:
+    """No pressure balances a resultant beyond the contact's edges (issue 2, "Bad input")."""
+    with pytest.raises(CaseError, match=r"punch\.loads: no pressure on the contact balances .*(tips|lifts)"):
+        System(load_case("example1", settings))
+
+
+def test_almost_tipping_punch_is_accepted() -> None:
+    """mu l_z just below a still has an equilibrium, at the edge."""
+    system = System(load_case("example1", ["contact.friction=0.74", "geometry.parameters.pin_height_1=40"]))
+    for d in (1, -1):
+        p = system.contact((d,)).solve(system.facing.initial_gap).pressure[0]
+        assert system.facing.weights @ (p * system.facing.x) == pytest.approx(-d * 29.6 * 1000, rel=1e-9)

@@ -38,6 +38,8 @@ Speed = Annotated[float, *_quantity("mm/s")]
 Time = Annotated[float, *_quantity("s")]
 AngularFrequency = Annotated[float, *_quantity("rad/s")]
 Number = Annotated[float, *_quantity("")]
+Temperature = Annotated[float, *_quantity("K")]
+Conductance = Annotated[float, *_quantity("N/(mm*s*K)")]
 Axis = Literal["x", "z"]
 
 
@@ -71,10 +73,14 @@ class Model(_Part):
 
 
 class Material(_Part):
-    """An isotropic, linear-elastic material."""
+    """An isotropic, linear-elastic material; the thermal values are needed with heat only."""
 
     young: Annotated[Stress, Field(gt=0)]
     poisson: Annotated[Number, Field(gt=-1, le=0.5)]
+    conductivity: Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None = None
+    heat_capacity: Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = None
+    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = None
+    expansion: Annotated[float, *_quantity("1/K")] | None = None
 
 
 class Support(_Part):
@@ -105,12 +111,20 @@ class Load(_Part):
         return self
 
 
+class Prescribed(_Part):
+    """A temperature held on a named group of the boundary."""
+
+    on: str
+    temperature: Temperature = 0.0
+
+
 class Body(_Part):
-    """One body: the material of each of its regions, its supports and loads."""
+    """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
     regions: Annotated[dict[str, str], Field(min_length=1)]
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
+    temperatures: tuple[Prescribed, ...] = ()
     pivot: tuple[Length, Length] | None = Field(
         default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
     )
@@ -182,6 +196,42 @@ class OneWay(_Part):
     phases: ClassVar[int] = 1
 
 
+class Heat(_Part):
+    """Friction heat and its conduction; without this table a case knows no temperature."""
+
+    partition: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0.5, description="kappa, the punch's share of the friction heat"
+    )
+    debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
+    conductance: Annotated[Conductance, Field(ge=0)] | Literal["perfect"] = Field(
+        default=0.0, description="h_c between punch and strip where they touch"
+    )
+    conductance_per_pressure: tuple[Annotated[float, *_quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
+        default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
+    )
+    conducting: Literal["closed", "nominal"] = Field(
+        default="closed", description="the nodes that conduct: those in contact, or the whole nominal interface"
+    )
+    convection: Annotated[Conductance, Field(ge=0)] = Field(
+        default=0.0, description="h on all other boundaries and on the two faces of the plane model"
+    )
+    convecting_faces: bool = True
+    ambient: Temperature = 0.0
+    initial: Temperature = 0.0
+    steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
+    coupling: Literal["implicit", "split"] = "implicit"
+    split_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1e-4, description="change of the gap volume that ends the operator split, equation (30)"
+    )
+    relaxation: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.5, description="of the pressure in the operator split, equation (29)"
+    )
+    operator: Literal["reduced", "full"] = "reduced"
+    reduction_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1e-4, description="of the reduced operator's basis, relative"
+    )
+
+
 class Run(_Part):
     """How far a run goes and how it integrates the wear."""
 
@@ -218,6 +268,7 @@ class Case(_Part):
     contact: Contact = Contact()
     wear: Wear
     motion: Annotated[Reciprocating | OneWay, Field(discriminator="kind")]
+    heat: Heat | None = None
     run: Run
     output: Output = Output()
 
@@ -237,6 +288,8 @@ class Case(_Part):
                 for name, material in self.materials.items()
                 if material.poisson >= 0.5
             ]
+        if self.heat is not None:
+            problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
         if self.run.integration == "jump" and self.run.half_cycles < self.motion.phases:
@@ -246,6 +299,21 @@ class Case(_Part):
         if problems:
             raise ValueError("\n".join(problems))
         return self
+
+    def _thermal_problems(self, heat: Heat) -> list[str]:
+        needed = ("conductivity", "heat_capacity", "density", "expansion")
+        used = {*self.punch.regions.values(), *self.strip.regions.values()} & set(self.materials)
+        problems = [
+            f"materials.{name}.{key}: missing, but required with heat"
+            for name in sorted(used)
+            for key in needed
+            if getattr(self.materials[name], key) is None
+        ]
+        if self.contact.solver == "full":
+            problems.append("contact.solver: expected 'condensed' with heat")
+        if heat.conductance_per_pressure is not None and heat.conductance != 0:
+            problems.append("heat.conductance: give either conductance or conductance_per_pressure")
+        return problems
 
     @property
     def folder(self) -> Path | None:

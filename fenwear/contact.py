@@ -51,7 +51,13 @@ class Layer(Protocol):
 class ContactSolver(Protocol):
     """Contact in a fixed sequence of phases, kept for many solves."""
 
-    def solve(self, gap: Array, start: ContactState | None = None, layer: Layer | None = None) -> ContactState:
+    def solve(
+        self,
+        gap: Array,
+        start: ContactState | None = None,
+        layer: Layer | None = None,
+        coupling: Array | None = None,
+    ) -> ContactState:
         """Return the contact for the unloaded gap (n,) or (m, n), mm."""
 
 
@@ -74,14 +80,15 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * statics.facing.weights.sum()
         size = n + r
-        self._operator = np.zeros((m * size, m * size))
+        self._elastic = np.zeros((m * size, m * size))
         self._offset = np.zeros((m, size))
         self._offset[:, n:] = statics.resultant / self._resultant_scale
         for phase, d in enumerate(self.directions):
-            block = self._operator[phase * size : (phase + 1) * size, phase * size : (phase + 1) * size]
+            block = self._elastic[phase * size : (phase + 1) * size, phase * size : (phase + 1) * size]
             block[:n, :n] = interface.compliance(d, friction) * (self._pressure_scale / self._gap_scale)
             block[:n, n:] = statics.rigid_normal * (self._rigid_scale / self._gap_scale)
             block[n:, :n] = statics.equilibrium(d, friction) * (self._pressure_scale / self._resultant_scale[:, None])
+        self._operator, self._coupling = self._elastic, None  # type: Array, Array | None
         self._layer: Layer | None = None
         self._filled = False
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
@@ -114,13 +121,34 @@ class CondensedContact:
                 for column in range(m):
                     jacobian[row * size + nodes, column * size + nodes] += slope[column]
 
-    def solve(self, gap: Array, start: ContactState | None = None, layer: Layer | None = None) -> ContactState:
+    def _couple(self, coupling: Array | None) -> None:
+        """Add what pressures open besides elasticity to the operator, where it is not there yet."""
+        if coupling is self._coupling:
+            return
+        self._coupling, self._filled = coupling, False
+        if coupling is None:
+            self._operator = self._elastic
+            return
+        m, n = self.shape
+        self._operator = self._elastic.copy()
+        phases = self._operator.reshape(m, -1, m, self._offset.shape[1])
+        phases[:, :n, :, :n] += coupling * (self._pressure_scale / self._gap_scale)
+
+    def solve(
+        self,
+        gap: Array,
+        start: ContactState | None = None,
+        layer: Layer | None = None,
+        coupling: Array | None = None,
+    ) -> ContactState:
         """Return the contact of all phases.
 
         Args:
             gap: Gap of the undeformed bodies, initial gap and worn depth together, (n,) or (m, n), mm.
             start: Where Newton starts, such as the same phases one cycle ago; by default full contact.
             layer: Adds what the pressures themselves open.
+            coupling: Gap of each phase's nodes from each phase's pressures (m, n, m, n), mm/MPa, on
+                top of the elastic compliance: what the heat of these pressures opens.
 
         Raises:
             ConvergenceError: SNES did not converge.
@@ -135,6 +163,7 @@ class CondensedContact:
             guess[:, :n] = start.pressure / self._pressure_scale
             guess[:, n:] = start.rigid / self._rigid_scale
         self._layer = layer
+        self._couple(coupling)
         x = self._inequality.solve(guess.ravel()).reshape(offset.shape)
         pressure = x[:, :n] * self._pressure_scale
         residual = self._operator @ x.ravel() + offset.ravel()

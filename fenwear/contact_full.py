@@ -98,17 +98,23 @@ class FullContact:
         self._operator.mult(x, f)
         f.axpy(1.0, self._offset)
 
-    def solve(self, gap: Array, start: ContactState | None = None, layer: Layer | None = None) -> ContactState:
+    def solve(
+        self,
+        gap: Array,
+        start: ContactState | None = None,
+        layer: Layer | None = None,
+        coupling: Array | None = None,
+    ) -> ContactState:
         """Return the contact for the undeformed gap (n,), mm; collective.
 
         Newton starts from the last solution of this object, whatever `start` is.
 
         Raises:
             ConvergenceError: SNES did not converge.
-            NotImplementedError: a layer is given; only the condensed inequality takes one.
+            NotImplementedError: a layer or a coupling is given; only the condensed inequality takes them.
         """
-        if layer is not None:
-            raise NotImplementedError("the full inequality has no layer")
+        if layer is not None or coupling is not None:
+            raise NotImplementedError("the full inequality has no layer and no coupling")
         n, _ = self._size
         contact = slice(self._free, self._free + n)
         self._offset.array[:] = self._constant

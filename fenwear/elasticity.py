@@ -97,6 +97,7 @@ class ElasticBody:
         modes, self.mode_names = self._free_modes(supports)
         self.rigid_modes = modes
 
+        self._regions, self._plane = description.regions, model.plane
         of_region = {region: materials[name] for region, name in description.regions.items()}
         young = region_field(body, {r: m.young for r, m in of_region.items()})
         poisson = region_field(body, {r: m.poisson for r, m in of_region.items()})
@@ -230,6 +231,28 @@ class ElasticBody:
         mark.x.scatter_forward()
         held = np.flatnonzero(mark.x.array[: 2 * (index_map.size_local + index_map.num_ghosts)]).astype(np.int32)
         return [self._held(component, held[held % 2 == component]) for component in (0, 1)]
+
+    def thermal_coupling(self, temperature: fem.FunctionSpace, materials: dict[str, Material]) -> PETSc.Mat:
+        """Return G: the nodal forces G theta of free thermal expansion, N/mm per K; collective.
+
+        The integral of gamma theta div v with gamma = E alpha / (1 - nu) in plane stress and
+        E alpha / (1 - 2 nu) in plane strain. Supports take no force.
+        """
+        used = {region: materials[name] for region, name in self._regions.items()}
+        plane_stress = self._plane == "stress"
+        gamma = region_field(
+            self.body,
+            {
+                region: m.young * (m.expansion or 0.0) / (1 - (1 if plane_stress else 2) * m.poisson)
+                for region, m in used.items()
+            },
+        )
+        theta, v = ufl.TrialFunction(temperature), ufl.TestFunction(self.space)
+        coupling = fem.petsc.assemble_matrix(fem.form(gamma * theta * ufl.div(v) * ufl.dx))
+        coupling.assemble()
+        start = 2 * self.space.dofmap.index_map.local_range[0]
+        coupling.zeroRows((self.supported + start).astype(np.int32), diag=0.0)
+        return coupling
 
     def contact_nodes(self) -> NDArray[np.int32]:
         """Return this rank's own nodes (blocks of dofs) on the contact surface; collective."""

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
+ZERO_PIVOT = 71  # PETSC_ERR_MAT_LU_ZRPVT
 
 
 def configure(snes: PETSc.SNES, prefix: str) -> None:
@@ -96,6 +97,11 @@ class DenseInequality:
             ConvergenceError: SNES did not converge.
         """
         self.x[:] = start
-        self.snes.solve(None, self._x)
+        try:
+            self.snes.solve(None, self._x)
+        except PETSc.Error as error:
+            if error.ierr != ZERO_PIVOT:
+                raise
+            raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular") from None
         check(self.snes, self.name)
         return self.x

@@ -166,7 +166,7 @@ def _merge(gmsh: Any, path: Path) -> None:
     gmsh.option.setNumber("General.AbortOnError", 2)
     errors = [m.removeprefix("Error: ") for m in messages if m.startswith("Error: ")]
     if errors:
-        raise Exception(errors[0])  # noqa: TRY002  (as gmsh does)
+        raise RuntimeError(errors[0])
 
 
 def _check_parameters(geometry: Geometry, path: Path) -> None:

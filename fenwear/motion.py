@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.special import gamma
 
 from fenwear.case import OneWay, Reciprocating
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,15 @@ class Motion:
             return motion.speed**a * motion.duration
         beta = math.sqrt(math.pi) * gamma((a + 1) / 2) / gamma(a / 2 + 1)
         return float((motion.amplitude * motion.angular_frequency) ** a / motion.angular_frequency * beta)
+
+    def mean_speeds(self, steps: int) -> Array:
+        """Return the mean speed of each of equal steps of a half-cycle (steps,), mm/s; they add up exactly."""
+        motion = self._description
+        if isinstance(motion, OneWay):
+            return np.full(steps, motion.speed)
+        edges = np.cos(np.linspace(0.0, math.pi, steps + 1))
+        speeds = motion.amplitude * (edges[:-1] - edges[1:]) * steps / self.duration
+        return (speeds + speeds[::-1]) / 2  # equal pairs to the last digit: they share their operators
 
 
 def make_motion(description: OneWay | Reciprocating) -> Motion:

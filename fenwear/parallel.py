@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 T = TypeVar("T")
 
@@ -34,3 +36,11 @@ def agree(comm: MPI.Comm, error: Exception | None) -> None:
     for found in comm.allgather(error):
         if found is not None:
             raise found
+
+
+def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the sum over the ranks, equal to the last bit on all of them; collective."""
+    result = np.empty(partial.shape)
+    comm.Reduce(np.ascontiguousarray(partial), result, op=MPI.SUM, root=0)
+    comm.Bcast(result, root=0)
+    return result

@@ -54,12 +54,15 @@ class Surface:
         normal_by_normal: D_nn (n, n), mm per N/mm.
         normal_by_tangential: D_nt (n, n), mm per N/mm.
         normal_by_load: Normal displacement from the body's loads (n,), mm.
+        normal_by_temperature: Normal displacement from the temperature of this rank's own nodes
+            (n, owned), mm/K; None without heat. The one member that is not the same on every rank.
     """
 
     nodes: SurfaceNodes
     normal_by_normal: Array
     normal_by_tangential: Array
     normal_by_load: Array
+    normal_by_temperature: Array | None = None
 
 
 def surface_nodes(elastic: ElasticBody) -> SurfaceNodes:
@@ -93,13 +96,19 @@ def rigid_motion(elastic: ElasticBody, nodes: SurfaceNodes) -> tuple[Array, Arra
     return np.einsum("ic,icm->im", nodes.normal, rigid), np.einsum("ic,icm->im", nodes.tangent, rigid)
 
 
-def condense(elastic: ElasticBody, nodes: SurfaceNodes) -> Surface:
-    """Condense a body onto its contact nodes: n solves with one factorisation; collective."""
+def condense(elastic: ElasticBody, nodes: SurfaceNodes, thermal_coupling: PETSc.Mat | None = None) -> Surface:
+    """Condense a body onto its contact nodes: n solves with one factorisation; collective.
+
+    With the coupling G of thermal expansion the same solves give N K^-1 G, as K is symmetric.
+    """
     n = len(nodes.weights)
     normal_by_normal, tangential_by_normal = np.empty((n, n)), np.empty((n, n))
+    rows: list[Array] = []
     for start in range(0, n, BLOCK):
         columns = slice(start, min(start + BLOCK, n))
-        displacement = _respond(elastic, nodes, columns)
+        displacement, by_temperature = _respond(elastic, nodes, columns, thermal_coupling)
+        if by_temperature is not None:
+            rows.append(by_temperature)
         normal_by_normal[:, columns] = np.einsum("ic,icj->ij", nodes.normal, displacement)
         tangential_by_normal[:, columns] = np.einsum("ic,icj->ij", nodes.tangent, displacement)
     return Surface(
@@ -107,6 +116,7 @@ def condense(elastic: ElasticBody, nodes: SurfaceNodes) -> Surface:
         (normal_by_normal + normal_by_normal.T) / 2,
         tangential_by_normal.T.copy(),
         respond_to_load(elastic, nodes),
+        np.concatenate(rows) if rows else None,
     )
 
 
@@ -135,8 +145,10 @@ def at_nodes(elastic: ElasticBody, nodes: SurfaceNodes, values: Array) -> Array:
     return picked
 
 
-def _respond(elastic: ElasticBody, nodes: SurfaceNodes, columns: slice) -> Array:
-    """Return the nodes' displacements (n, 2, k) from unit normal forces at `columns`; collective."""
+def _respond(
+    elastic: ElasticBody, nodes: SurfaceNodes, columns: slice, thermal_coupling: PETSc.Mat | None
+) -> tuple[Array, Array | None]:
+    """Return the nodes' displacements (n, 2, k) from unit normal forces at `columns`, and G^T of them; collective."""
     comm = elastic.body.mesh.comm
     local, total = elastic.stiffness.getSizes()[0]
     chosen = range(*columns.indices(len(nodes.block)))
@@ -155,6 +167,11 @@ def _respond(elastic: ElasticBody, nodes: SurfaceNodes, columns: slice) -> Array
     displacement.setUp()
     elastic.factor.matSolve(forces, displacement)
     result = at_nodes(elastic, nodes, displacement.getDenseArray())
+    by_temperature = None
+    if thermal_coupling is not None:
+        nodal = thermal_coupling.transposeMatMult(displacement)
+        by_temperature = nodal.getDenseArray().T.copy()
+        nodal.destroy()
     forces.destroy()
     displacement.destroy()
-    return result
+    return result, by_temperature

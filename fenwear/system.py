@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from fenwear.case import Body, Case
 from fenwear.contact import CondensedContact, ContactSolver
 from fenwear.contact_full import FullContact
 from fenwear.elasticity import ElasticBody
-from fenwear.inequality import Mask
+from fenwear.errors import CaseError, Problem
+from fenwear.heat.conduction import HeatBody
+from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.prepare import prepare_exchange, prepare_steady
+from fenwear.inequality import Array, Mask
 from fenwear.interface import Facing, Interface, Statics, face, join, statics
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
 from fenwear.optimum import Optimum, check_equilibrium, optimum
-from fenwear.surface import condense, surface_nodes
+from fenwear.surface import Surface, condense, surface_nodes
 from fenwear.wear import Wear
 
 
@@ -36,6 +42,7 @@ class System:
         meshes = build_meshes(case.geometry, case.folder, comm)
         self.punch, self.strip = (self._body(m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
         self.statics: Statics = statics(self.facing, self.punch, self.strip)
+        self.heat_bodies  # noqa: B018  (finds missing groups before anything costly)
         for direction in self.motion.directions:
             check_equilibrium(self.statics, direction, case.contact.friction)
 
@@ -50,8 +57,59 @@ class System:
     @cached_property
     def interface(self) -> Interface:
         """The condensed interface: factors both bodies."""
-        surfaces = (condense(self.punch, self.facing.punch), condense(self.strip, self.facing.strip))
-        return join(self.statics, *surfaces)
+        return join(self.statics, *self._surfaces)
+
+    @cached_property
+    def _surfaces(self) -> tuple[Surface, Surface]:
+        couplings: list[PETSc.Mat | None] = [None, None]
+        if self.heat_bodies is not None:
+            couplings = [
+                elastic.thermal_coupling(heat.space, self.case.materials)
+                for elastic, heat in zip((self.punch, self.strip), self.heat_bodies, strict=True)
+            ]
+        return (
+            condense(self.punch, self.facing.punch, couplings[0]),
+            condense(self.strip, self.facing.strip, couplings[1]),
+        )
+
+    @cached_property
+    def heat_bodies(self) -> tuple[HeatBody, HeatBody] | None:
+        """Conduction in the two bodies; None where the case has no heat."""
+        case = self.case
+        if case.heat is None:
+            return None
+        punch, strip = (
+            HeatBody(elastic.body, description, case.materials, case.model, case.heat, case.geometry.degree)
+            for elastic, description in ((self.punch, case.punch), (self.strip, case.strip))
+        )
+        return punch, strip
+
+    def _gap_rows(self) -> tuple[Array, Array]:
+        """Return the gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K."""
+        punch, strip = (surface.normal_by_temperature for surface in self._surfaces)
+        if punch is None or strip is None:
+            raise CaseError(Problem("heat", "missing, but required here"))
+        return punch, -self.facing.transfer @ strip
+
+    @cached_property
+    def exchange(self) -> HeatExchange | None:
+        """The bodies' temperatures over half-cycles; None where the case has no heat."""
+        if self.heat_bodies is None or self.case.heat is None:
+            return None
+        reduced = self.case.heat.operator == "reduced"
+        return prepare_exchange(
+            self.case, self.heat_bodies, self.facing, self._gap_rows(), self.motion, reduced=reduced
+        )
+
+    def steady_exchange(self, velocities: Sequence[float]) -> HeatExchange:
+        """Return the exchange whose phases are steady states at these velocities of the strip; collective.
+
+        Raises:
+            CaseError: the case has no heat, or a body no heat sink.
+        """
+        if self.heat_bodies is None:
+            raise CaseError(Problem("heat", "missing, but required here"))
+        return prepare_steady(self.case, self.heat_bodies, self.facing, self._gap_rows(), velocities)
 
     @cached_property
     def motion(self) -> Motion:

@@ -14,6 +14,44 @@ from fenwear.system import System
 
 
 @dataclass(frozen=True)
+class BlockHeat:
+    """The heat of k half-cycles.
+
+    Attributes:
+        temperature_punch: Of the punch's contact surface at the end of each half-cycle (k, n), K.
+        temperature_strip: Of the strip's (k, n), K.
+        terms: Heat of each half-cycle by `fenwear.heat.exchange.TERMS` (k, 6), mJ.
+        coupling_iterations: Of heat and contact (k,).
+    """
+
+    temperature_punch: Array
+    temperature_strip: Array
+    terms: Array
+    coupling_iterations: NDArray[np.int64]
+
+    @property
+    def max_temperature(self) -> Array:
+        """Largest temperature of the contact surfaces (k,), K."""
+        return np.maximum(self.temperature_punch.max(axis=1), self.temperature_strip.max(axis=1))
+
+    @property
+    def balance_error(self) -> Array:
+        """Missing heat of each half-cycle relative to its largest term (k,)."""
+        missing = self.terms[:, 0] - self.terms[:, 1:].sum(axis=1)
+        return np.abs(missing) / np.maximum(np.abs(self.terms).max(axis=1), 1e-300)
+
+
+@dataclass(frozen=True)
+class HalfCycleHeat:
+    """The heat of one half-cycle: one row of `BlockHeat`."""
+
+    temperature_punch: Array
+    temperature_strip: Array
+    terms: Array
+    coupling_iterations: int
+
+
+@dataclass(frozen=True)
 class Block:
     """k consecutive records of half-cycles, of n contact nodes.
 
@@ -30,6 +68,7 @@ class Block:
             over the mean pressure (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
             mean pressure (k,); NaN in the first cycle.
+        heat: Temperatures and heat balance; None without heat.
     """
 
     system: System
@@ -42,6 +81,7 @@ class Block:
     worn_area: Array
     optimum_distance: Array
     periodicity: Array
+    heat: BlockHeat | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.half_cycle)
@@ -77,6 +117,7 @@ class Recorder:
     system: System
     size: int
     _rows: list[tuple[object, ...]] = field(default_factory=list)
+    _heat: list[HalfCycleHeat] = field(default_factory=list)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
 
     def add(
@@ -88,6 +129,7 @@ class Recorder:
         wear: Array,
         worn: Array,
         previous: Array | None,
+        heat: HalfCycleHeat | None = None,
     ) -> float:
         """Record one half-cycle and return its periodicity."""
         pressure = state.pressure[phase]
@@ -97,6 +139,8 @@ class Recorder:
         area = float(self.system.statics.facing.weights @ worn)
         row = (half_cycle, direction, pressure, state.gap[phase], wear, state.rigid[phase], area, distance, change)
         self._rows.append(row)
+        if heat is not None:
+            self._heat.append(heat)
         return change
 
     @property
@@ -107,8 +151,12 @@ class Recorder:
     def take(self) -> Block:
         """Return the block and begin the next one."""
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
-        self._rows = []
-        return Block(self.system, *columns)
+        heat = None
+        if self._heat:
+            names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
+            heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
+        self._rows, self._heat = [], []
+        return Block(self.system, *columns, heat=heat)
 
     def __bool__(self) -> bool:
         return bool(self._rows)

@@ -21,6 +21,7 @@ from fenwear.cycle.jump import jump
 from fenwear.inequality import Array, DenseInequality, Mask
 from fenwear.system import System
 
+DRIVE = 1e-6
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
 
@@ -107,6 +108,9 @@ class _SteadyInequality:
         rows = np.arange(n)
         for k in range(m):
             jacobian[m * n + rows, k * n + rows] -= slope[k] / self.wear_scale
+        # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
+        opened = m * n + np.flatnonzero(x[: m * n].reshape(m, n).max(axis=0) <= 0)
+        jacobian[opened, opened] += DRIVE
 
     def start(self) -> Array:
         """Return the uniform pressure with the shape that would carry it."""

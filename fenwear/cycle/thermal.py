@@ -1,0 +1,144 @@
+"""One half-cycle with heat: contact and conduction, coupled.
+
+The pressure heats, the heat opens or closes the gap, the gap makes the pressure. Implicitly: the
+thermal gap at the end of the half-cycle is linear in its pressure as long as the same nodes conduct,
+so its matrix joins the elastic compliance and one inequality solves for both. Or by the paper's
+operator split: conduct at fixed pressure, solve contact, relax the pressure (29), repeat until the
+volume of the gap rests (30).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.contact import ContactSolver, ContactState, Layer
+from fenwear.cycle.block import HalfCycleHeat
+from fenwear.errors import ConvergenceError
+from fenwear.heat.exchange import HeatExchange, State
+from fenwear.inequality import Array
+from fenwear.system import System
+
+MAX_ITERATIONS = 200
+CLOSE = 1e-10  # change of pressure over the mean pressure that ends the implicit iterations
+
+
+@dataclass
+class _Response:
+    """What unit pressures of a half-cycle do by its end, for given conductances."""
+
+    conductance: Array
+    state: State
+    terms: Array
+    gap: Array
+
+
+class ThermalContact:
+    """Contact in one phase of the motion together with the heat of its half-cycle.
+
+    Args:
+        system: The assembled problem, with heat.
+        exchange: The bodies' temperatures.
+        phase: Which phase.
+    """
+
+    def __init__(self, system: System, exchange: HeatExchange, phase: int) -> None:
+        self.system, self.exchange, self.phase = system, exchange, phase
+        self.direction = system.motion.directions[phase]
+        self._contact: ContactSolver = system.contact((self.direction,))
+        self._response: _Response | None = None
+
+    def solve(
+        self, temperature: State, gap: Array, start: ContactState | None, layer: Layer | None
+    ) -> tuple[ContactState, State, HalfCycleHeat]:
+        """Return contact, temperature at the end of the half-cycle, and its heat.
+
+        Args:
+            temperature: State at the start.
+            gap: Of the unloaded bodies at the initial temperature, worn depth included (n,), mm.
+            start: The same phase one cycle ago.
+            layer: Wear of this half-cycle where its step is implicit.
+
+        Raises:
+            ConvergenceError: contact and heat do not come together.
+        """
+        if start is None:
+            start = self._contact.solve(gap + self.exchange.gap(temperature), None, layer)
+        heat = self.system.case.heat
+        if heat is not None and heat.coupling == "split":
+            return self._split(temperature, gap, start, layer)
+        return self._implicit(temperature, gap, start, layer)
+
+    def _implicit(
+        self, temperature: State, gap: Array, start: ContactState, layer: Layer | None
+    ) -> tuple[ContactState, State, HalfCycleHeat]:
+        exchange, contact = self.exchange, start
+        mean = self.system.statics.mean_pressure
+        relaxed = 1.0
+        pressure = start.pressure[0]
+        for iteration in range(1, MAX_ITERATIONS + 1):
+            conductance = exchange.conductance(pressure)
+            after, terms = exchange.half_cycle(temperature, self.phase, pressure, conductance)
+            response = self._respond(conductance)
+            exact = np.array_equal(response.conductance, conductance, equal_nan=True)
+            free = gap + exchange.gap(after) - response.gap @ pressure
+            contact = self._contact.solve(free, contact, layer, response.gap[None, :, None, :])
+            change = contact.pressure[0] - pressure
+            if np.abs(change).max() < CLOSE * mean:
+                return contact, after, self._heat(after, terms, iteration)
+            if exact and np.array_equal(exchange.conductance(contact.pressure[0]), conductance, equal_nan=True):
+                ends = (s + r @ change for s, r in zip(after, response.state, strict=True))
+                after = (next(ends), next(ends))
+                return contact, after, self._heat(after, terms + response.terms @ change, iteration)
+            if iteration > 20:  # nodes that open and close in turn: go half way
+                relaxed = 0.5
+            pressure = pressure + relaxed * change
+        raise ConvergenceError(
+            f"contact and heat did not come together in {MAX_ITERATIONS} iterations: nodes open and close in turn; "
+            'set heat.conducting = "nominal" or take more heat.steps'
+        )
+
+    def _respond(self, conductance: Array) -> _Response:
+        """Return the response for these conductances, or a near one where it is costly to make."""
+        known = self._response
+        same = known is not None and np.array_equal(known.conductance, conductance, equal_nan=True)
+        heat = self.system.case.heat
+        costly = heat is not None and (heat.operator == "full" or heat.conductance_per_pressure is not None)
+        if known is None or (not same and not costly):
+            state, terms = self.exchange.response(self.phase, conductance)
+            known = self._response = _Response(conductance, state, terms, self.exchange.gap_change(state))
+        return known
+
+    def _split(
+        self, temperature: State, gap: Array, start: ContactState, layer: Layer | None
+    ) -> tuple[ContactState, State, HalfCycleHeat]:
+        exchange, heat = self.exchange, self.system.case.heat
+        relaxation, tolerance = (heat.relaxation, heat.split_tolerance) if heat else (1.0, 1e-4)
+        contact, pressure, volume = start, start.pressure[0], np.inf
+        for iteration in range(1, MAX_ITERATIONS + 1):
+            after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(pressure))
+            free = gap + exchange.gap(after)
+            contact = self._contact.solve(free, contact, layer)
+            before, volume = volume, self._volume(free)
+            pressure = pressure + relaxation * (contact.pressure[0] - pressure)
+            if abs(volume - before) < tolerance * volume:
+                relaxed = ContactState(pressure[None], contact.gap, contact.rigid, contact.iterations)
+                return relaxed, after, self._heat(after, terms, iteration)
+            if not np.isfinite(volume):
+                break
+        raise ConvergenceError(
+            f"the operator split of heat and contact did not converge in {iteration} iterations; lower "
+            'heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
+        )
+
+    def _volume(self, gap: Array) -> float:
+        """Return the cross-section between the unloaded surfaces where they touch first, mm²."""
+        modes, weights = self.system.statics.rigid_normal, self.system.facing.weights
+        root = np.sqrt(weights)
+        fitted = modes @ np.linalg.lstsq(modes * root[:, None], gap * root, rcond=None)[0]
+        return float(weights @ np.abs(gap - fitted))
+
+    def _heat(self, state: State, terms: Array, iterations: int) -> HalfCycleHeat:
+        punch, strip = self.exchange.contact_temperatures(state)
+        return HalfCycleHeat(punch, strip, terms, iterations)

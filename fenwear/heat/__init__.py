@@ -1,0 +1,1 @@
+"""Friction heat: conduction in the bodies, the heat between them, and its reduced form."""

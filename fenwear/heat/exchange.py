@@ -1,0 +1,244 @@
+"""Heat across the interface: friction heat shared, conduction between the bodies, half-cycle by half-cycle.
+
+At a node that conducts, with friction heat Q = mu p v (23), the debris' share gamma_d and the
+partition kappa,
+
+    q_1 + q_2 = (1 - gamma_d) Q,    kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2),
+
+h_c -> infinity giving theta_1 = theta_2 (24); elsewhere both surfaces lose h (theta - theta_a). As
+each body answers a flux linearly, theta_i = theta_i without flux + T_i q_i, every step is one small
+dense system for the 2 n fluxes, whatever nodes conduct: nothing is factored again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from fenwear.case import Heat
+from fenwear.heat.field import Field, Functional
+from fenwear.inequality import Array
+
+State = tuple[Array, Array]  # of the punch and of the strip
+
+
+@dataclass(frozen=True)
+class Side:
+    """One body as the exchange sees it: its field and functionals of its state.
+
+    Attributes:
+        field: The state and its steps.
+        contact: Temperature at the interface nodes (n,), K.
+        gap: Gap that its thermal expansion opens (n,), mm.
+        balance: Heat stored, heat convected per second, and for every prepared step what enters per
+            second at held temperatures by the end and by the start state, and what the moving
+            material carries out; per thickness.
+        contact_change, gap_change, balance_change: The same of changes of the state (dim, k).
+        held_source: Constant part of what enters at held temperatures, per prepared step, mW/mm.
+        ambient_loss: Constant part of the convected heat, mW/mm.
+    """
+
+    field: Field
+    contact: Functional
+    gap: Functional
+    balance: Functional
+    contact_change: Functional
+    gap_change: Functional
+    balance_change: Functional
+    held_source: list[float]
+    ambient_loss: float
+
+
+# The heat of a half-cycle: done by friction, carried off by debris, gained by both bodies, lost to the
+# surroundings, lost through boundaries of held temperature, carried out by the strip's material.
+TERMS = ("friction", "debris", "stored", "convected", "held", "carried")
+
+
+@dataclass(frozen=True)
+class StepPlan:
+    """One time step of a phase: which prepared step each body takes, and the mean sliding speed."""
+
+    punch: int
+    strip: int
+    speed: float
+
+
+class HeatExchange:
+    """Both bodies' temperatures over half-cycles, with the heat between them.
+
+    Args:
+        heat: Partition, conductance and convection.
+        sides: The punch and the strip.
+        plans: The steps of each phase.
+        duration: Of a step, s.
+        friction: mu.
+        weights: Quadrature weights of the interface (n,), mm.
+        thickness: Of the plane model, mm.
+    """
+
+    def __init__(
+        self,
+        heat: Heat,
+        sides: tuple[Side, Side],
+        plans: list[list[StepPlan]],
+        duration: float,
+        friction: float,
+        weights: Array,
+        thickness: float,
+    ) -> None:
+        self.heat, self.sides, self.plans = heat, sides, plans
+        self.duration, self.friction, self.weights, self.thickness = duration, friction, weights, thickness
+        # T_i: temperature at the contact from unit fluxes there, per prepared step.
+        self._contact_responses = [[side.contact_change(r) for r in side.field.responses] for side in sides]
+        self._inverses: dict[tuple[int, int, bytes], Array] = {}
+
+    def initial(self) -> State:
+        """Return the initial state."""
+        return self.sides[0].field.initial(), self.sides[1].field.initial()
+
+    def gap(self, state: State) -> Array:
+        """Return the gap that thermal expansion opens (n,), mm."""
+        return self.sides[0].gap(state[0]) + self.sides[1].gap(state[1])
+
+    def gap_change(self, states: State) -> Array:
+        """Return the thermal gap of changes of the state (n, k), mm."""
+        return self.sides[0].gap_change(states[0]) + self.sides[1].gap_change(states[1])
+
+    def contact_temperatures(self, state: State) -> tuple[Array, Array]:
+        """Return the temperatures of the two contact surfaces at the interface nodes (n,), K."""
+        return self.sides[0].contact(state[0]), self.sides[1].contact(state[1])
+
+    def conductance(self, pressure: Array) -> Array:
+        """Return h_c of each node (n,), N/(mm s K): infinite for perfect contact, NaN where none conducts."""
+        if self.heat.conductance_per_pressure is not None:
+            h1, h2 = self.heat.conductance_per_pressure
+            value: Array = np.maximum(pressure, 0.0) * h1 * h2 / (h1 + h2)
+        else:
+            constant = np.inf if self.heat.conductance == "perfect" else float(self.heat.conductance)
+            value = np.full(len(pressure), constant)
+        if self.heat.conducting == "closed":
+            value[pressure <= 0] = np.nan
+        return value
+
+    def half_cycle(self, state: State, phase: int, pressure: Array, conductance: Array) -> tuple[State, Array]:
+        """Conduct over a half-cycle at constant pressure; return the state at its end and its heat terms.
+
+        Args:
+            state: At its start.
+            phase: Which of the motion's phases.
+            pressure: During it (n,), MPa.
+            conductance: Of each node, from `conductance`.
+        """
+        terms = np.zeros(len(TERMS))
+        before = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
+        for plan in self.plans[phase]:
+            kinds = (plan.punch, plan.strip)
+            free = [side.field.advance(k, s) for side, k, s in zip(self.sides, kinds, state, strict=True)]
+            bare = [side.contact(f) for side, f in zip(self.sides, free, strict=True)]
+            heat = self.friction * plan.speed * pressure
+            fluxes = self._fluxes(kinds, bare, heat, conductance, self.heat.ambient)
+            state = self._with_fluxes(kinds, free, fluxes)
+            after = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
+            terms += self._account(kinds, heat, fluxes, before, after, sources=True)
+            before = after
+        return state, terms * self.thickness
+
+    def response(self, phase: int, conductance: Array) -> tuple[State, Array]:
+        """Return the changes at the end of a half-cycle from unit pressures (dim, n), and of the heat terms."""
+        n = len(conductance)
+        zero = tuple(np.zeros((side.field.responses[0].shape[0], n)) for side in self.sides)
+        return self._linear_half_cycle(phase, zero, np.eye(n), conductance)  # type: ignore[arg-type]
+
+    def propagate(self, phase: int, changes: State, conductance: Array) -> State:
+        """Return what changes of the state at the start (dim, k) become at the end of a half-cycle."""
+        none = np.zeros((len(conductance), changes[0].shape[1]))
+        return self._linear_half_cycle(phase, changes, none, conductance)[0]
+
+    def _linear_half_cycle(self, phase: int, states: State, pressure: Array, conductance: Array) -> tuple[State, Array]:
+        terms = np.zeros((len(TERMS), pressure.shape[1]))
+        before = [side.balance_change(s) for side, s in zip(self.sides, states, strict=True)]
+        for plan in self.plans[phase]:
+            kinds = (plan.punch, plan.strip)
+            free = [side.field.advance_linear(k, s) for side, k, s in zip(self.sides, kinds, states, strict=True)]
+            bare = [side.contact_change(f) for side, f in zip(self.sides, free, strict=True)]
+            heat = self.friction * plan.speed * pressure
+            fluxes = self._fluxes(kinds, bare, heat, conductance, 0.0)
+            states = self._with_fluxes(kinds, free, fluxes)
+            after = [side.balance_change(s) for side, s in zip(self.sides, states, strict=True)]
+            terms += self._account(kinds, heat, fluxes, before, after, sources=False)
+            before = after
+        return states, terms * self.thickness
+
+    def _with_fluxes(self, kinds: tuple[int, int], free: list[Array], fluxes: list[Array]) -> State:
+        first, second = (
+            f + side.field.responses[k] @ q for f, side, k, q in zip(free, self.sides, kinds, fluxes, strict=True)
+        )
+        return first, second
+
+    def _account(
+        self,
+        kinds: tuple[int, int],
+        heat: Array,
+        fluxes: list[Array],
+        before: list[Array],
+        after: list[Array],
+        *,
+        sources: bool,
+    ) -> Array:
+        """Return the terms of a step's heat, per thickness."""
+        friction = self.weights @ heat
+        debris = self.heat.debris * friction
+        # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
+        convected = friction - debris - self.weights @ (fluxes[0] + fluxes[1])
+        stored, held, carried = 0.0, 0.0, 0.0
+        for side, k, a, b in zip(self.sides, kinds, after, before, strict=True):
+            stored = stored + (a[0] - b[0]) / self.duration
+            convected = convected + a[1] - sources * side.ambient_loss
+            held = held - (a[2 + 3 * k] - b[3 + 3 * k] - sources * side.held_source[k])
+            carried = carried + a[4 + 3 * k]
+        return np.array([friction, debris, stored, convected, held, carried]) * self.duration
+
+    def _fluxes(
+        self, kinds: tuple[int, int], bare: list[Array], heat: Array, conductance: Array, ambient: float
+    ) -> list[Array]:
+        """Return q_1 and q_2 into the bodies (n,) or (n, k), mW/mm², from the temperatures without flux."""
+        conducts, own, jump = (_column(a, heat.ndim) for a in _row_factors(conductance))
+        kept, h = (1 - self.heat.debris) * heat, self.heat.convection
+        first = np.where(
+            conducts, own * self.heat.partition * kept - jump * (bare[0] - bare[1]), -h * (bare[0] - ambient)
+        )
+        second = np.where(conducts, kept, -h * (bare[1] - ambient))
+        return np.split(self._inverse(kinds, conductance) @ np.concatenate([first, second]), 2)
+
+    def _inverse(self, kinds: tuple[int, int], conductance: Array) -> Array:
+        """Return the inverse of the system for the fluxes; kept for conductances met before."""
+        key = (*kinds, conductance.tobytes())
+        if key not in self._inverses:
+            if len(self._inverses) > 200:
+                self._inverses.clear()
+            self._inverses[key] = scipy.linalg.inv(self._flux_matrix(kinds, conductance))
+        return self._inverses[key]
+
+    def _flux_matrix(self, kinds: tuple[int, int], conductance: Array) -> Array:
+        t1, t2 = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
+        conducts, own, jump = (a[:, None] for a in _row_factors(conductance))
+        eye, h = np.eye(len(conductance)), self.heat.convection
+        first = np.hstack([np.where(conducts, own * eye + jump * t1, eye + h * t1), np.where(conducts, -jump * t2, 0)])
+        second = np.hstack([np.where(conducts, eye, 0), np.where(conducts, eye, eye + h * t2)])
+        return np.vstack([first, second])
+
+
+def _row_factors(conductance: Array) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return where nodes conduct, and the factors of q_1 and of theta_1 - theta_2 in their first row."""
+    perfect = np.isinf(conductance)
+    jump = np.where(perfect, 1.0, np.nan_to_num(conductance, nan=0.0, posinf=0.0))
+    return ~np.isnan(conductance), np.where(perfect, 0.0, 1.0), jump
+
+
+def _column(values: NDArray[Any], dimensions: int) -> NDArray[Any]:
+    """Return values (n,) so that they multiply arrays (n,) or (n, k)."""
+    return values.reshape(-1, *(1 for _ in range(dimensions - 1)))

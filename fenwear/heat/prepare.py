@@ -1,0 +1,115 @@
+"""From two bodies to a heat exchange: the steps of the motion, prepared and perhaps reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fenwear.case import Case
+from fenwear.heat.conduction import HeatBody, HeatStep
+from fenwear.heat.exchange import HeatExchange, Side, StepPlan
+from fenwear.heat.field import FullField, ReducedField
+from fenwear.heat.reduction import reduced_basis
+from fenwear.inequality import Array
+from fenwear.interface import Facing
+from fenwear.motion import Motion
+from fenwear.parallel import total
+
+
+def prepare_exchange(
+    case: Case,
+    bodies: tuple[HeatBody, HeatBody],
+    facing: Facing,
+    gap_rows: tuple[Array, Array],
+    motion: Motion,
+    *,
+    reduced: bool,
+) -> HeatExchange:
+    """Return the exchange over the half-cycles of the motion; collective.
+
+    Args:
+        case: The case, with heat.
+        bodies: Conduction in the punch and in the strip.
+        facing: The interface.
+        gap_rows: Gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K.
+        motion: The sliding motion.
+        reduced: Whether the temperatures are projected onto a small basis.
+    """
+    heat = case.heat
+    assert heat is not None
+    duration = motion.duration / heat.steps
+    speeds = motion.mean_speeds(heat.steps)
+    velocities = sorted({d * v for d in motion.directions for v in speeds})
+    of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
+    plans = [[StepPlan(0, of_strip[d * v], float(v)) for v in speeds] for d in motion.directions]
+    every = [d * v for d in motion.directions for v in speeds]
+    sides = []
+    for body, inflow, rows, own in zip(bodies, inflows(bodies, facing), gap_rows, ([0.0], velocities), strict=True):
+        steps = [body.step(velocity, duration) for velocity in own]
+        if reduced:
+            moving = [0.0] if len(own) == 1 and own[0] == 0 else every
+            lift, basis = reduced_basis(body, inflow, moving, duration, heat.reduction_tolerance)
+            field: FullField | ReducedField = ReducedField(body, steps, inflow, lift, basis)
+        else:
+            field = FullField(body, steps, inflow)
+        sides.append(_side(field, steps, facing, rows))
+    return _exchange(case, (sides[0], sides[1]), plans, duration, facing)
+
+
+def prepare_steady(
+    case: Case,
+    bodies: tuple[HeatBody, HeatBody],
+    facing: Facing,
+    gap_rows: tuple[Array, Array],
+    velocities: Sequence[float],
+) -> HeatExchange:
+    """Return the exchange whose phase k is the steady state of the strip moving at velocity k; collective.
+
+    Raises:
+        CaseError: a body has no heat sink.
+    """
+    plans = [[StepPlan(0, k, abs(v))] for k, v in enumerate(velocities)]
+    sides = []
+    for body, inflow, rows, own in zip(bodies, inflows(bodies, facing), gap_rows, ([0.0], velocities), strict=True):
+        steps = [body.step(velocity, np.inf) for velocity in own]
+        sides.append(_side(FullField(body, steps, inflow), steps, facing, rows))
+    return _exchange(case, (sides[0], sides[1]), plans, np.inf, facing)
+
+
+def inflows(bodies: tuple[HeatBody, HeatBody], facing: Facing) -> tuple[Array, Array]:
+    """Return the loads of unit fluxes at the interface nodes on each body (owned, n), mm."""
+    weights = np.diag(facing.weights)
+    return bodies[0].place(weights), bodies[1].place(facing.transfer.T @ weights)
+
+
+def _exchange(
+    case: Case, sides: tuple[Side, Side], plans: list[list[StepPlan]], duration: float, facing: Facing
+) -> HeatExchange:
+    assert case.heat is not None
+    return HeatExchange(case.heat, sides, plans, duration, case.contact.friction, facing.weights, case.model.thickness)
+
+
+def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], facing: Facing, gap_rows: Array) -> Side:
+    body = field.body
+    to_interface = np.eye(len(facing.x)) if body.body.name == "punch" else facing.transfer
+    contact_rows = to_interface @ body.contact_rows
+    balance_rows = [body.storage, body.convected]
+    for step in steps:
+        balance_rows += [step.held_by_end, step.held_by_start, step.velocity * body.carried]
+    rows = np.array(balance_rows)
+    comm = body.body.mesh.comm
+    initial = total(comm, gap_rows @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
+    gap = field.observe(gap_rows)
+    ambient = body.heat.ambient * float(total(comm, np.array([body.convected.sum()]))[0])
+    return Side(
+        field,
+        field.observe(contact_rows),
+        lambda state: gap(state) - initial,
+        field.observe(rows),
+        field.observe_change(contact_rows),
+        field.observe_change(gap_rows),
+        field.observe_change(rows),
+        [step.held_source for step in steps],
+        ambient,
+    )

@@ -1,0 +1,78 @@
+"""A small basis for the temperatures that friction on the contact can make.
+
+Only n fluxes go into a body, so its temperatures stay near the responses to these fluxes over all
+time scales, from a step to the steady state: a rational Krylov space with the time steps as poles.
+Its parts that matter are picked by the singular values in the norm of the heat capacity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fenwear.heat.conduction import HeatBody
+from fenwear.inequality import Array
+from fenwear.parallel import total
+
+RATIO = 4.0  # of one time scale to the next
+SCALES = 9  # of them, from a step on; then come the last ones, to the steady state
+FAST = 4  # scales over which a motion to and fro does not average out
+
+
+def reduced_basis(
+    body: HeatBody, inflow: Array, speeds: Sequence[float], duration: float, tolerance: float
+) -> tuple[Array, Array]:
+    """Return a lift (owned,) with the held temperatures, and the basis (owned, dim); collective.
+
+    Args:
+        body: The body.
+        inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
+        speeds: Velocities of its material; over a cycle they average out where they have both signs.
+        duration: Of one step, s: the shortest time scale.
+        tolerance: Singular values below this fraction of the largest are dropped.
+    """
+    mean = float(np.mean(speeds))
+    moving = sorted({min(speeds), max(speeds)} - {mean})
+    lift = body.initial()
+    # Fluxes of the same power: the singular values then weigh temperatures as friction makes them.
+    even = inflow / np.sqrt(total(body.body.mesh.comm, np.abs(inflow).sum(axis=0)))
+    scales = [duration * RATIO**k for k in range(SCALES)]
+    scales += [np.inf] if body.loses_heat() else [scales[-1] * 100]
+    snapshots: list[Array] = []
+    largest = 0.0
+    for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
+        for velocity in [mean, *(moving if k < FAST else [])]:
+            step = body.step(velocity, scale)
+            fields, values = _principal(body, step.respond(even), tolerance, largest)
+            largest = max(largest, values[-1])
+            snapshots.append(fields)
+            if np.isinf(scale):
+                lift = step.advance(np.zeros(body.owned))
+    uniform = np.ones((body.owned, 1))  # carries the balance of energy
+    start = (body.initial() - lift)[:, None]
+    exact = np.hstack([uniform, start]) if np.abs(start).max(initial=0.0) > 0 else uniform
+    exact[body.held] = 0.0
+    exact = _orthonormal(body, exact, 1e-12)
+    rest = np.hstack(snapshots)
+    rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
+    return lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 1e-12)
+
+
+def _gram(body: HeatBody, fields: Array) -> Array:
+    return total(body.body.mesh.comm, fields.T @ body.store(fields))
+
+
+def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) -> tuple[Array, Array]:
+    """Return the principal fields (owned, kept) with their size, and their singular values; collective."""
+    values, vectors = np.linalg.eigh(_gram(body, fields))
+    values = np.sqrt(np.maximum(values, 0.0))
+    kept = values > tolerance * max(largest, values[-1])
+    return fields @ vectors[:, kept], values[kept] if kept.any() else np.zeros(1)
+
+
+def _orthonormal(body: HeatBody, fields: Array, tolerance: float) -> Array:
+    """Return an orthonormal basis of the fields' principal parts (owned, dim); collective."""
+    fields, values = _principal(body, fields, tolerance, 0.0)
+    fields = fields / values
+    return fields @ np.linalg.inv(np.linalg.cholesky(_gram(body, fields))).T  # once more: rounding

@@ -6,6 +6,7 @@ import gc
 import os
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -74,7 +75,7 @@ def edited() -> Callable[..., Case]:
     """Return edited(name, edit, *settings): a built-in case after `edit` has changed its tables."""
 
     def edited(name: str, edit: Edit, *settings: str) -> Case:
-        tables = load_case(name, settings).resolved()
+        tables = tomllib.loads(load_case(name, settings).to_toml())
         edit(tables)
         return make_case(tables)
 

@@ -1,0 +1,187 @@
+"""The cyclic steady state in one solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import Case, ConvergenceError, System, jump, march, steady
+from fenwear.cycle import cycles_to_reach
+
+A, MEAN = 30.0, 1e4 / 600
+COEFFICIENT = 1.25e-8 * np.pi
+
+
+OPENS_FOR_GOOD = pytest.mark.xfail(
+    raises=ConvergenceError, strict=True, reason="the direct solve is singular where a node is open in every phase"
+)
+
+
+@pytest.mark.parametrize("plane", ["stress", "strain"])
+@pytest.mark.parametrize("name", ["example1", "example1-lz40", "example2"])
+@pytest.mark.mpi
+def test_sum_of_the_two_pressures_is_uniform(assemble: Callable[..., System], name: str, plane: str) -> None:
+    """Verification 11 and the paper: p+ + p- = 2 p_m over the worn contact; where one vanishes the other is 33.33 MPa."""
+    system = assemble(name, f"model.plane='{plane}'")
+    state = steady(system)
+    np.testing.assert_allclose(state.pressure.sum(axis=0), 2 * MEAN, rtol=1e-9)
+    assert state.pressure.max() == pytest.approx(2 * MEAN, rel=1e-9)
+    assert (state.pressure.min(axis=1) == 0).all()
+    assert (state.gap > -1e-11).all()
+    np.testing.assert_allclose(state.pressure * state.gap, 0, atol=1e-9)
+    # The wear of a cycle is a rigid motion: beta~ 2 u0 times 2 p_m everywhere.
+    np.testing.assert_allclose(state.wear_per_cycle, COEFFICIENT * 3 * 2 * MEAN, rtol=1e-9)
+    assert state.velocity["lambda_F"] == pytest.approx(COEFFICIENT * 3 * 2 * MEAN, rel=1e-9)
+    assert state.velocity.get("lambda_M", 0) == pytest.approx(0, abs=1e-16)
+    force = state.pressure * system.facing.weights
+    np.testing.assert_allclose(force.sum(axis=1), 1000, rtol=1e-10)
+    if "lambda_M" in state.velocity:
+        height = system.punch.pivot[1] - 100
+        np.testing.assert_allclose(force @ system.facing.x, [-250 * height, 250 * height], rtol=1e-9)
+
+
+@pytest.mark.mpi
+def test_example_2_is_symmetric(assemble: Callable[..., System]) -> None:
+    """p+(x) = p-(-x), and the shape is even."""
+    state = steady(assemble("example2"))
+    np.testing.assert_allclose(state.pressure[0], state.pressure[1, ::-1], atol=1e-8 * MEAN)
+    np.testing.assert_allclose(state.shape, state.shape[::-1], atol=1e-7 * np.ptp(state.shape))
+
+
+def test_off_centre_load(edited: Callable[..., Case]) -> None:
+    """A tilting punch with its load x_c off the centre: p+ + p- = 2 p_m (1 + 3 x_c x / a²), linear.
+
+    100 N/mm to the right on the sides, 30 mm above the pin, shift the load by x_c = 100 * 30 / 1000 = 3 mm.
+    """
+
+    def push(case: dict[str, Any]) -> None:
+        case["punch"]["loads"].append({"on": "punch_free", "force": [1000, 0]})
+
+    system = System(edited("example1", push))
+    state = steady(system)
+    slope = 3 * 3 / A**2
+    x = system.facing.x
+    np.testing.assert_allclose(state.pressure.sum(axis=0), 2 * MEAN * (1 + slope * x), rtol=1e-8)
+    assert state.velocity["lambda_M"] == pytest.approx(-COEFFICIENT * 3 * 2 * MEAN * slope, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["example1", "example2"])
+@pytest.mark.parametrize("b", [0.5, 1.5, 2.0])
+def test_power_law(assemble: Callable[..., System], name: str, b: float) -> None:
+    """b != 1: p+^b + p-^b is a rigid motion over beta~ S; where one vanishes the other is its b-th root."""
+    coefficient = f"wear.punch.coefficient={COEFFICIENT * MEAN ** (1 - b)!r}"
+    system = assemble(name, f"wear.punch.pressure_exponent={b}", coefficient)
+    state = steady(system)
+    power = (state.pressure**b).sum(axis=0)
+    x = system.facing.x
+    if name == "example2":
+        np.testing.assert_allclose(power, power.mean(), rtol=1e-8)
+    line = np.polyval(np.polyfit(x, power, 1), x)
+    np.testing.assert_allclose(power, line, rtol=1e-7)
+    worn = COEFFICIENT * MEAN ** (1 - b) * 3 * power
+    rigid = state.velocity["lambda_F"] - state.velocity.get("lambda_M", 0) * (x - A)
+    np.testing.assert_allclose(worn, rigid, rtol=1e-7)
+    np.testing.assert_allclose(state.pressure @ system.facing.weights, 1000, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        (),
+        ("wear.punch.pressure_exponent=2", "wear.punch.coefficient=2e-9"),
+        ("wear.punch.pressure_exponent=0.5", "wear.punch.coefficient=2e-7"),
+        pytest.param(("contact.friction=0.4", "geometry.parameters.pin_height_1=40"), marks=OPENS_FOR_GOOD),
+    ],
+)
+def test_jumps_end_there(assemble: Callable[..., System], settings: tuple[str, ...]) -> None:
+    """Verification 11: a run of cycle jumps and the direct solve agree to 1e-3 p_m, in pressure and in shape."""
+    system = assemble("example1", *settings)
+    state = steady(system)
+    *_, last = jump(system, 2_000_000, tolerance=1e-2)
+    np.testing.assert_allclose(last.pressure[-2:], state.pressure, rtol=0, atol=1e-3 * MEAN)
+    rigid = np.stack([np.ones_like(system.facing.x), system.facing.x], axis=1)
+    difference = last.wear[-1] - state.shape
+    difference -= rigid @ np.linalg.lstsq(rigid, difference, rcond=None)[0]
+    np.testing.assert_allclose(difference, 0, atol=5e-3 * np.ptp(state.shape))
+
+
+@pytest.mark.slow
+def test_forty_thousand_marched_half_cycles_end_there(assemble: Callable[..., System]) -> None:
+    """Verification 11 and issue 3: marched and directly solved pressures within 0.1 MPa."""
+    system = assemble("example1", "geometry.degree=2")
+    *_, last = march(system, 40_000)
+    order = [1, 0] if last.direction[-1] == 1 else [0, 1]
+    np.testing.assert_allclose(last.pressure[-2:][order], steady(system).pressure, rtol=0, atol=0.1)
+
+
+def test_march_ends_there(assemble: Callable[..., System]) -> None:
+    """The same with faster wear: the half-cycle between + and - shifts the shape by its wear, halved with it."""
+    errors = []
+    for factor in (40, 20):
+        system = assemble("example1", "geometry.degree=2", f"wear.punch.coefficient={factor * COEFFICIENT!r}")
+        *_, last = march(system, 160_000 // factor, implicit=True)
+        errors.append(np.abs(last.pressure[-2:] - steady(system).pressure)[:, 3:-3].max())
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[1] < 0.1 * MEAN
+
+
+def test_neither_speed_nor_coefficient_changes_it(assemble: Callable[..., System]) -> None:
+    """For any a, beta~, u0 and omega the pressures and the shape are the same; only the wear per cycle scales."""
+    one = steady(assemble("example1"))
+    system = assemble(
+        "example1", "wear.punch.speed_exponent=2", "wear.punch.coefficient=1e-6", "motion.angular_frequency=3"
+    )
+    two = steady(system)
+    np.testing.assert_allclose(two.pressure, one.pressure, atol=1e-8 * MEAN)
+    np.testing.assert_allclose(two.shape, one.shape, atol=1e-8 * np.ptp(one.shape))
+    # a = 2: the integral of (u0 omega sin)² over half a period is u0² omega pi / 2.
+    np.testing.assert_allclose(two.wear_per_cycle, 1e-6 * 1.5**2 * 3 * np.pi / 2 * 2 * MEAN, rtol=1e-9)
+
+
+@pytest.mark.parametrize("direction", ["leftward", "rightward"])
+@pytest.mark.parametrize(
+    ("name", "b"),
+    [
+        *(("monotonic-lz20", b) for b in (0.5, 1.0, 2.0)),
+        *(("monotonic-lz40", b) for b in (0.5, 1.0)),
+        pytest.param("monotonic-lz40", 2.0, marks=OPENS_FOR_GOOD),
+    ],
+)
+@pytest.mark.mpi
+def test_one_way_is_the_optimum(assemble: Callable[..., System], name: str, b: float, direction: str) -> None:
+    """The steady state of one-way sliding is the optimum, with its wear velocity (duration 0.1 s)."""
+    system = assemble(name, f"motion.direction='{direction}'", f"wear.punch.pressure_exponent={b}",
+                      "wear.punch.coefficient=1e-6")  # fmt: skip
+    state, optimum = steady(system), system.optimum(system.motion.directions[0])
+    np.testing.assert_allclose(state.pressure[0], optimum.pressure, atol=1e-6 * MEAN)
+    for mode, velocity in optimum.velocity.items():
+        assert state.velocity[mode] == pytest.approx(velocity * 0.1, rel=1e-6, abs=1e-9)
+
+
+@OPENS_FOR_GOOD
+def test_surfaces_that_never_meet_again(assemble: Callable[..., System]) -> None:
+    """One-way with c > 1: the worn contact is the optimum's triangle, and the rest of the punch stays open."""
+    system = assemble("monotonic-lz40", "contact.friction=0.4", "motion.direction='rightward'")
+    state = steady(system)
+    np.testing.assert_allclose(state.pressure[0], system.optimum(1).pressure, atol=1e-6 * MEAN)
+    opened = state.pressure[0] == 0
+    assert opened.any()
+    assert np.isnan(state.shape[opened]).all()
+    assert state.contact_width[0] == pytest.approx(3 * (30 - 0.4 * 40), abs=4)
+
+
+def test_cycles_to_reach(assemble: Callable[..., System]) -> None:
+    """A march that long is as near as asked for, one half as long is not; None beyond the limit."""
+    system = assemble("example1", "geometry.degree=2", "wear.punch.coefficient=4e-7")
+    state = steady(system)
+    cycles = cycles_to_reach(system, state, 0.05)
+    assert cycles is not None
+    distance = []
+    for half_cycles in (cycles, 4 * cycles):
+        *_, last = jump(system, half_cycles - half_cycles % 2, tolerance=1e-3)
+        distance.append(np.abs(last.pressure[-2:] - state.pressure).max() / MEAN)
+    assert distance[1] < 0.05 < distance[0]
+    assert cycles_to_reach(system, state, 0.05, limit=10) is None

@@ -58,7 +58,9 @@ def integral(body: BodyMesh, region: str | None = None, curve: str | None = None
 @pytest.mark.mpi
 def test_facing_nodes_coincide(degree: int) -> None:
     """The two contact surfaces have the same nodes, to the last digits, whatever the partition."""
-    system = System(load_case("example1", [f"geometry.degree={degree}", "geometry.parameters.elements_along_contact=6"]))
+    system = System(
+        load_case("example1", [f"geometry.degree={degree}", "geometry.parameters.elements_along_contact=6"])
+    )
     facing = system.facing
     assert len(facing.x) == 6 * degree + 1
     np.testing.assert_allclose(facing.punch.x, facing.strip.x, rtol=0, atol=1e-12)

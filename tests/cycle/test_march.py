@@ -209,7 +209,9 @@ def test_implicit_tends_to_explicit(assemble: Callable[..., System]) -> None:
     """At the same worn depth the two differ by first order in the step: half the step, half the difference."""
     differences = []
     for steps in (40, 80, 160):
-        system = assemble("example1", "geometry.degree=2", one_way("rightward", 120 / steps), "wear.punch.coefficient=1e-7")
+        system = assemble(
+            "example1", "geometry.degree=2", one_way("rightward", 120 / steps), "wear.punch.coefficient=1e-7"
+        )
         ends = [run(system, steps, implicit=implicit).pressure[-1] for implicit in (True, False)]
         differences.append(np.abs(ends[0] - ends[1]).max())
     assert np.divide(differences[:-1], differences[1:]) == pytest.approx([2, 2], rel=0.15)

@@ -1,0 +1,212 @@
+"""The command line in a process of its own: exit statuses, messages, JSON, files."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+import pytest
+
+import fenwear as package
+from fenwear import System, steady
+from fenwear.case import builtin_cases
+
+Run = Callable[..., Any]
+MEAN = 1e4 / 600
+
+
+def options(*settings: str) -> list[str]:
+    small = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", *settings)
+    return [word for setting in small for word in ("--set", setting)]
+
+
+def test_optimum_json(fenwear: Run) -> None:
+    """shared/design.md: one JSON object on standard output and nothing else; the paper's values."""
+    done = fenwear("optimum", "monotonic-lz20", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert set(found) == {"leftward", "rightward"}
+    assert found["leftward"]["lambda_F"] == pytest.approx(0.05, rel=1e-9)
+    assert found["rightward"]["lambda_M"] == pytest.approx(MEAN * 1e-5 * 200 * 0.5 / 30, rel=1e-9)
+    assert len(found["leftward"]["x"]) == len(found["leftward"]["pressure"]) == 65
+
+
+def test_steady_json(fenwear: Run, assemble: Callable[..., System]) -> None:
+    """The keys of shared/design.md; p+ + p- = 2 p_m; the same numbers as from Python."""
+    done = fenwear("steady", "example1", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert {"x", "pressure_plus", "pressure_minus", "shape", "temperature"} <= set(found)
+    assert found["temperature"] is None
+    total = np.add(found["pressure_plus"], found["pressure_minus"])
+    np.testing.assert_allclose(total, 2 * MEAN, rtol=1e-9)
+    state = steady(assemble("example1"))
+    np.testing.assert_allclose(found["pressure_plus"], state.pressure[0], atol=1e-9 * MEAN)
+    np.testing.assert_allclose(found["shape"], state.shape, atol=1e-9 * np.ptp(state.shape))
+
+
+def test_texts(fenwear: Run) -> None:
+    """Without --json: the numbers with their units, in words."""
+    steady_text = fenwear("steady", "example2", *options()).stdout
+    assert "33.333 MPa" in steady_text
+    optimum_text = fenwear("optimum", "monotonic-lz20").stdout
+    assert "lambda_F = 0.05 mm/s" in optimum_text
+    assert "lambda_M = -0.00055556 rad/s" in optimum_text
+
+
+def test_run(fenwear: Run, tmp_path: Path) -> None:
+    """A run writes the files of shared/design.md; --json prints summary.json; progress bars are for terminals only."""
+    out = tmp_path / "deep" / "run"
+    done = fenwear("run", "example1", "-o", out, "--json", *options("run.half_cycles=6"))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == json.loads((out / "summary.json").read_text())
+    assert {p.name for p in out.iterdir()} >= {"case.toml", "history.nc", "summary.json", "figures"}
+    assert "half-cycles/s" not in done.stderr
+    assert "warning" not in done.stderr.lower()
+
+
+def test_runs_from_anywhere(fenwear: Run, tmp_path: Path) -> None:
+    """Without -o results go to results/NAME, then results/NAME-2; a case file may lie elsewhere."""
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "mine.toml").write_text('base = "example1"\n[run]\nhalf_cycles = 2\n')
+    for _ in range(2):
+        done = fenwear("run", "cases/mine.toml", *options(), cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "results" / "mine" / "history.nc").is_file()
+    assert (tmp_path / "results" / "mine-2" / "history.nc").is_file()
+
+
+def test_check_prints_a_case_that_runs(fenwear: Run, tmp_path: Path) -> None:
+    """Standard output is the resolved case: checked again it prints the same."""
+    first = fenwear("check", "example2", *options("motion.amplitude='0.2 cm'"))
+    assert first.returncode == 0, first.stderr
+    assert 'amplitude = "2.0 mm"' in first.stdout
+    (tmp_path / "again.toml").write_text(first.stdout)
+    assert fenwear("check", tmp_path / "again.toml").stdout == first.stdout
+
+
+def test_mesh(fenwear: Run, tmp_path: Path) -> None:
+    """The mesh file holds the named groups; another ending is refused."""
+    done = fenwear("mesh", "example1", "-o", tmp_path / "own.msh", *options())
+    assert done.returncode == 0, done.stderr
+    assert '"punch_contact"' in (tmp_path / "own.msh").read_text()
+    wrong = fenwear("mesh", "example1", "-o", tmp_path / "own.vtk")
+    assert (wrong.returncode, list(tmp_path.glob("*.vtk"))) == (2, [])
+
+
+def test_info_and_version(fenwear: Run) -> None:
+    """The stack and the built-in cases."""
+    found = json.loads(fenwear("info", "--json").stdout)
+    assert found["cases"] == builtin_cases()
+    assert {"fenwear", "dolfinx", "petsc"} <= {name.lower() for name in found["versions"]}
+    assert fenwear("--version").stdout.strip() == f"fenwear {package.__version__}"
+    assert fenwear("--help").returncode == 0
+
+
+def refused(done: Any, status: int, *expected: str) -> None:
+    """Check the exit status, the message's parts, that it is said once, and that there is no traceback."""
+    assert done.returncode == status, done.stderr
+    for part in expected:
+        assert done.stderr.count(part) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+BAD = [
+    (["--set", "contact.frction=1"], "contact.frction: unknown key"),
+    (["--set", "run.half_cycles=0"], "run.half_cycles: "),
+    (["--set", "punch.loads.0.on='lid'"], "punch.loads.0.on: no physical curve 'lid'"),
+    (["--set", "geometry.parameters.pin_height_1=300"], "a pin is off the punch"),
+    (["--set", "geometry.parameters.x=3"], "geometry.parameters.x: "),
+    (["--set", "contact.friction=0.9", "--set", "geometry.parameters.pin_height_1=40"], "punch.loads: no pressure"),
+    (["--set", "model.plane='strain'", "--set", "materials.steel.poisson=0.5"], "materials.steel.poisson: "),
+]
+
+
+@pytest.mark.parametrize(("arguments", "expected"), BAD)
+def test_wrong_case(fenwear: Run, tmp_path: Path, arguments: list[str], expected: str) -> None:
+    """Issue 2, "Bad input": exit status 2, the key named, no traceback, nothing written."""
+    refused(fenwear("run", "example1", "-o", tmp_path / "run", *arguments), 2, expected)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [["fly"], ["run", "--colour"], ["steady"], ["run", "a", "b"], ["mesh", "example1"]]
+)
+def test_wrong_usage(fenwear: Run, arguments: list[str]) -> None:
+    """A wrong command line is as wrong as a wrong case."""
+    refused(fenwear(*arguments), 2)
+
+
+def test_wrong_files(fenwear: Run, tmp_path: Path) -> None:
+    """No file, no UTF-8, no TOML."""
+    (tmp_path / "latin.toml").write_bytes("title = 'é'".encode("latin-1"))
+    (tmp_path / "broken.toml").write_text("title =")
+    for name, expected in (
+        ("none.toml", "cannot be read"),
+        ("latin.toml", "not a UTF-8 text"),
+        ("broken.toml", "TOML"),
+    ):
+        refused(fenwear("check", tmp_path / name), 2, expected)
+
+
+def test_output_folder_in_the_way(fenwear: Run, tmp_path: Path) -> None:
+    """A folder with something in it, a file, a place that cannot be written: refused, and left as they were."""
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.txt").write_text("mine")
+    (tmp_path / "file").write_text("mine")
+    for out, expected in (("full", "exists already"), ("file", "exists already"), ("file/below", "cannot be written")):
+        refused(fenwear("run", "example1", "-o", tmp_path / out, *options("run.half_cycles=2")), 2, expected)
+    refused(fenwear("run", "example1", "-o", "/proc/fenwear", *options("run.half_cycles=2")), 2, "cannot be written")
+    assert os.listdir(tmp_path / "full") == ["thesis.txt"]
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+@pytest.mark.parametrize("command", ["run", "steady"])
+def test_no_convergence(fenwear: Run, tmp_path: Path, command: str) -> None:
+    """Exit status 3 with PETSc's reason; what follows -- goes to PETSc."""
+    prefix = {"run": "fenwear_contact", "steady": "fenwear_steady"}[command]
+    output = ["-o", tmp_path / "run"] if command == "run" else []
+    done = fenwear(command, "example1", *output, *options(), "--", f"-{prefix}_snes_max_it", "1")
+    refused(done, 3, "DIVERGED_MAX_IT")
+
+
+def test_two_ranks_give_the_same_scalars(fenwear: Run, tmp_path: Path) -> None:
+    """Verification 18: history and summary of 1 and 2 ranks agree to 1e-9; standard output holds one JSON object."""
+    histories, summaries = [], []
+    for ranks in (1, 2):
+        out = tmp_path / str(ranks)
+        done = fenwear("run", "example1", "-o", out, "--json", *options("run.half_cycles=40"), ranks=ranks)
+        assert done.returncode == 0, done.stderr
+        summaries.append(json.loads(done.stdout))
+        with h5netcdf.File(out / "history.nc") as file:
+            histories.append({name: file[name][:] for name in ("pressure", "wear", "max_pressure", "optimum_distance")})
+    assert [s["ranks"] for s in summaries] == [1, 2]
+    for name, values in histories[0].items():
+        np.testing.assert_allclose(histories[1][name], values, rtol=0, atol=1e-9 * np.abs(values).max())
+    assert summaries[1]["wear_mm"] == pytest.approx(summaries[0]["wear_mm"], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [BAD[0], BAD[2], BAD[3], BAD[5], (["--colour"], "No such option"), (["-o", "/proc/fenwear"], "cannot be written")],
+)
+def test_two_ranks_say_it_once(fenwear: Run, tmp_path: Path, arguments: list[str], expected: str) -> None:
+    """The same refusal on two ranks: said once, exit status 2, nothing hangs, nothing is written."""
+    done = fenwear("run", "example1", *options(), *arguments, ranks=2, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.count(expected) == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert os.listdir(tmp_path) == []
+
+
+def test_two_ranks_without_convergence(fenwear: Run, tmp_path: Path) -> None:
+    """Exit status 3 from all ranks."""
+    done = fenwear("steady", "example1", *options(), "--", "-fenwear_steady_snes_max_it", "1", ranks=2, cwd=tmp_path)
+    assert done.returncode == 3, done.stderr
+    assert done.stderr.count("DIVERGED_MAX_IT") == 1

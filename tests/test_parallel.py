@@ -1,0 +1,72 @@
+"""Ranks: the same numbers, and errors on all of them alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenwear import CaseError, System, jump, load_case, march, steady
+from fenwear.errors import Problem
+from fenwear.parallel import agree, on_root
+
+COMM = MPI.COMM_WORLD
+several = pytest.mark.skipif(COMM.size == 1, reason="needs several ranks: mpirun -n 2 python3 -m pytest -m mpi")
+
+
+@several
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", ["example1", "example2"])
+def test_a_distributed_system_is_the_same_system(assemble: Callable[..., System], name: str) -> None:
+    """Verification 18: this communicator against each rank on its own, to 1e-9 relative."""
+    alone = System(load_case(name), MPI.COMM_SELF)
+    together = assemble(name)
+    assert (
+        together.punch.body.mesh.topology.index_map(2).size_local
+        < alone.punch.body.mesh.topology.index_map(2).size_local
+    )
+    np.testing.assert_allclose(together.facing.x, alone.facing.x, atol=1e-12)
+    np.testing.assert_allclose(together.statics.resultant, alone.statics.resultant, rtol=1e-12)
+    for solve in (
+        lambda s: s.contact((1,)).solve(s.facing.initial_gap).pressure,
+        lambda s: s.contact((-1,)).solve(s.facing.initial_gap).pressure,
+        lambda s: next(march(s, 30)).pressure,
+        lambda s: list(jump(s, 2000, tolerance=3e-3))[-1].pressure,
+        lambda s: steady(s).pressure,
+    ):
+        one, other = solve(alone), solve(together)
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-9 * one.max())
+
+
+@several
+@pytest.mark.mpi
+def test_all_ranks_hold_the_same_bits(assemble: Callable[..., System]) -> None:
+    """The replicated interface is equal to the last bit, so that no rank takes another Newton step."""
+    system = assemble("example1")
+    mine = (system.interface.normal_compliance, system.interface.tangential_compliance, steady(system).pressure)
+    for array in mine:
+        for other in COMM.allgather(array):
+            np.testing.assert_array_equal(array, other)
+
+
+@pytest.mark.mpi
+def test_on_root() -> None:
+    """Rank 0 computes; all return its result or raise its error."""
+    assert on_root(COMM, lambda: COMM.rank) == 0
+
+    def fail() -> None:
+        raise CaseError(Problem("key", f"on rank {COMM.rank}"))
+
+    with pytest.raises(CaseError, match="key: on rank 0"):
+        on_root(COMM, fail)
+
+
+@pytest.mark.mpi
+def test_agree() -> None:
+    """An error on the last rank alone is raised on every one."""
+    agree(COMM, None)
+    mine = CaseError(Problem("key", "only here")) if COMM.rank == COMM.size - 1 else None
+    with pytest.raises(CaseError, match="key: only here"):
+        agree(COMM, mine)

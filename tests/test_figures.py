@@ -72,8 +72,8 @@ def test_chosen_half_cycles(history: xarray.Dataset) -> None:
 
 def test_no_history(tmp_path: Path) -> None:
     """A folder without results, or with a broken file, is refused by its path."""
-    with pytest.raises(CaseError, match="history.nc: no readable history"):
+    with pytest.raises(CaseError, match=r"history.nc: no readable history"):
         open_history(tmp_path)
     (tmp_path / "history.nc").write_text("no NetCDF")
-    with pytest.raises(CaseError, match="history.nc: no readable history"):
+    with pytest.raises(CaseError, match=r"history.nc: no readable history"):
         open_history(tmp_path)

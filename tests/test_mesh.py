@@ -215,5 +215,5 @@ def test_own_msh_gives_the_same_answer(assemble: Callable[..., System], tmp_path
 
 def test_msh_that_cannot_be_written(tmp_path: Path) -> None:
     """The path is named."""
-    with pytest.raises(CaseError, match="nowhere.*cannot be written"):
+    with pytest.raises(CaseError, match=r"nowhere.*cannot be written"):
         write_msh(Geometry(parameters=SMALL), None, tmp_path / "nowhere" / "mesh.msh")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -89,7 +90,7 @@ def test_interpolation_reproduces_polynomials(degree: int) -> None:
     """Piecewise Lagrange of degree k is exact for x^k on any graded nodes, and is the identity at the nodes."""
     ends = np.array([-2.0, -1.9, -1.0, 0.5, 3.0])
     reference = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
-    nodes = np.unique(np.concatenate([a + (b - a) * reference for a, b in zip(ends, ends[1:], strict=False)]).round(14))
+    nodes = np.unique(np.concatenate([a + (b - a) * reference for a, b in itertools.pairwise(ends)]).round(14))
     x = np.linspace(-2, 3, 101)
     matrix = interpolation(nodes, degree, x)
     for power in range(degree + 1):

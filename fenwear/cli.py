@@ -24,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-DEFAULT_CASE = "example1"
+DEFAULT_CASE = "example1-heat"
 
 CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (TOML) or the name of a built-in case.")]
 SetOption = Annotated[
@@ -79,15 +79,16 @@ def run(
 @app.command("steady")
 def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
     """Solve for the cyclic steady state directly."""
-    from fenwear.cycle import cycles_to_reach, steady
+    from fenwear.cycle import cycles_to_reach, growth_rate, steady
     from fenwear.system import System
 
     system = System(_load(case, settings))
     begin = time.perf_counter()
-    system.interface  # noqa: B018  (made here, so that the two times are told apart)
+    system.prepare()  # here, so that the two times are told apart
     setup = time.perf_counter() - begin
     state = steady(system)
-    cycles = cycles_to_reach(system, state, 0.01)
+    rate = growth_rate(system, state.pressure)
+    cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
     if as_json:
         pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
         _print_json(
@@ -96,7 +97,9 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
                 "pressure_plus": pressures.get(1),
                 "pressure_minus": pressures.get(-1),
                 "shape": state.shape.tolist(),
-                "temperature": None,
+                "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
+                "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
+                "growth_rate": rate,
                 "contact_width": state.contact_width.tolist(),
                 "wear_per_cycle": state.wear_per_cycle.tolist(),
                 **state.velocity,
@@ -112,7 +115,13 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
               f"contact width {width:7.3f} mm")  # fmt: skip
     print(f"  mean pressure {system.statics.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
-    if cycles is None:
+    if state.heat is not None:
+        print(
+            f"  largest temperature of the punch {state.heat.punch.max():.3f} K, of the strip {state.heat.strip.max():.3f} K"
+        )
+    if rate > 0:
+        print(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
+    elif cycles is None:
         print("  pressure within 1 % of the mean pressure: not within ten million cycles from the initial shape")
     else:
         print(f"  pressure within 1 % of the mean pressure after {cycles:,} cycles from the initial shape")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, Problem
+from fenwear.heat.exchange import TERMS
 from fenwear.system import System
 from fenwear.versions import versions
 
@@ -34,6 +35,41 @@ VARIABLES = {
     "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the mean pressure"),
     "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
 }
+
+# the same with heat; the names of a BlockHeat, terms of the balance by their position
+HEAT_VARIABLES = {
+    "temperature_punch": (("half_cycle", "x"), "K", "temperature of the punch's contact surface at the end"),
+    "temperature_strip": (("half_cycle", "x"), "K", "temperature of the strip's contact surface at the end"),
+    "max_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces"),
+    "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
+    "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
+}
+HEAT_TERMS = {
+    "friction": "heat made by friction in the half-cycle",
+    "debris": "heat carried off by debris",
+    "stored": "heat gained by both bodies",
+    "convected": "heat lost to the surroundings",
+    "held": "heat lost through boundaries of held temperature",
+    "carried": "heat that the strip's material carries out of the model",
+}
+
+
+def _variables(*, heat: bool) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    if not heat:
+        return VARIABLES
+    terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
+    return {**VARIABLES, **HEAT_VARIABLES, **terms}
+
+
+def _values(block: Block, name: str) -> NDArray[Any]:
+    """Return the values of a variable over a block's half-cycles."""
+    if name in VARIABLES or block.heat is None:
+        return getattr(block, name)
+    if name == "heat_balance_error":
+        return block.heat.balance_error
+    if name in HEAT_VARIABLES:
+        return getattr(block.heat, name)
+    return block.heat.terms[:, TERMS.index(name.removeprefix("heat_"))]
 
 
 def make_directory(path: Path) -> None:
@@ -70,6 +106,7 @@ class HistoryWriter:
 
     def __init__(self, directory: Path, system: System) -> None:
         self.path = directory / HISTORY
+        self._variables = _variables(heat=system.case.heat is not None)
         self._phases = len(system.motion.directions)
         self._every = system.case.output.every
         self._pending: list[dict[str, NDArray[Any]]] = []
@@ -93,15 +130,15 @@ class HistoryWriter:
                 variable = file.create_variable(name, ("x",), float)
                 variable[:] = values
                 variable.attrs.update(units="mm", long_name=long_name)
-            for name, (dimensions, units, long_name) in VARIABLES.items():
-                kind = int if name in ("half_cycle", "direction") else float
+            for name, (dimensions, units, long_name) in self._variables.items():
+                kind = int if name in ("half_cycle", "direction", "coupling_iterations") else float
                 chunks = (256, *(len(facing.x) for _ in dimensions[1:]))
                 variable = file.create_variable(name, dimensions, kind, chunks=chunks)
                 variable.attrs.update(units=units, long_name=long_name)
 
     def add(self, block: Block) -> None:
         """Take a block; write what has gathered if the last write is some seconds ago."""
-        rows = {name: getattr(block, name) for name in VARIABLES}
+        rows = {name: _values(block, name) for name in self._variables}
         cycle = (block.half_cycle - 1) // self._phases
         # A jump run has gaps in its numbers: it keeps all it has.
         regular = bool((np.diff(block.half_cycle) == 1).all())
@@ -125,7 +162,7 @@ class HistoryWriter:
 
     def _write(self) -> None:
         if self._pending:
-            joined = {name: np.concatenate([rows[name] for rows in self._pending]) for name in VARIABLES}
+            joined = {name: np.concatenate([rows[name] for rows in self._pending]) for name in self._variables}
             count = len(joined["half_cycle"])
             if count:
                 with h5netcdf.File(self.path, "a") as file:
@@ -167,12 +204,24 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
             }
             for i, d in enumerate(last.direction[-phases:])
         },
+        **({} if last.heat is None else _heat_summary(system, last, places)),
         "periodicity": float(last.periodicity[-1]),
         **extremes,
         "contact_nodes": len(facing.x),
         "degrees_of_freedom": system.punch.stiffness.size[0] + system.strip.stiffness.size[0],
         "ranks": system.comm.size,
         "versions": versions(),
+    }
+
+
+def _heat_summary(system: System, last: Block, places: NDArray[Any]) -> dict[str, Any]:
+    assert last.heat is not None
+    interpolate = system.facing.interpolate
+    return {
+        "max_temperature_K": float(last.heat.max_temperature[-1]),
+        "temperature_punch_K": interpolate(last.heat.temperature_punch[-1], places).tolist(),
+        "temperature_strip_K": interpolate(last.heat.temperature_strip[-1], places).tolist(),
+        "heat_mJ": dict(zip(TERMS, last.heat.terms[-1].tolist(), strict=True)),
     }
 
 

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
 from fenwear.case import Case
-from fenwear.cycle import Block, jump, march, stability_number
+from fenwear.cycle import Block, growth_rate, jump, march, stability_number
 from fenwear.errors import ConvergenceError
 from fenwear.figures import draw_figures
 from fenwear.parallel import on_root
@@ -40,7 +41,7 @@ def run_case(
     """
     begin = time.perf_counter()
     system = System(case, comm)
-    system.interface  # noqa: B018  (the condensation is part of the set-up)
+    system.prepare()
     setup = time.perf_counter() - begin
     directory = on_root(comm, lambda: output if output is not None else free_directory(Path("results") / name))
     on_root(comm, lambda: make_directory(directory))
@@ -59,11 +60,14 @@ def run_case(
             extremes["largest_equilibrium_error"] = max(
                 extremes["largest_equilibrium_error"], float(last.equilibrium_error.max())
             )
+            if last.heat is not None:
+                error = float(last.heat.balance_error.max())
+                extremes["largest_heat_balance_error"] = max(extremes.get("largest_heat_balance_error", 0.0), error)
             if writer is not None:
                 writer.add(last)
     except ConvergenceError as error:
         done = 0 if last is None else int(last.half_cycle[-1])
-        stop = f"half-cycle {done + 1} or one soon after it failed: {error}"
+        stop = str(error)
         failure = ConvergenceError(f"{stop}\nthe results up to half-cycle {done} are in {directory}")
     seconds = time.perf_counter() - begin
     if writer is not None:
@@ -73,6 +77,10 @@ def run_case(
     if failure is None and int(last.half_cycle[-1]) < case.run.half_cycles:
         stop = "periodic" if last.periodicity[-1] < (case.run.periodic_within or 0) else stop
     times = {"setup_seconds": setup, "half_cycles_seconds": seconds}
+    if last.heat is not None and len(last) >= len(system.motion.directions):
+        state = last.pressure[-len(system.motion.directions) :]
+        order = [int(np.flatnonzero(last.direction[-len(state) :] == d)[0]) for d in system.motion.directions]
+        extremes["growth_rate_per_s"] = growth_rate(system, state[order])
     summary = summarise(system, last, extremes, {"stop": stop, **times, "warnings": warnings})
     on_root(comm, lambda: write_summary(directory, summary))
     on_root(comm, lambda: draw_figures(directory, case.output.figures_at) and None)
@@ -106,5 +114,6 @@ def _with_progress(blocks: Iterator[Block], half_cycles: int, comm: MPI.Comm) ->
     with tqdm(total=half_cycles, unit=" half-cycles", disable=quiet) as bar:
         for block in blocks:
             bar.update(int(block.half_cycle[-1]) - bar.n)
-            bar.set_postfix_str(f"p max {block.max_pressure[-1]:.2f} MPa, change {block.periodicity[-1]:.1e}")
+            hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"
+            bar.set_postfix_str(f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}")
             yield block

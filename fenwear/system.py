@@ -96,10 +96,20 @@ class System:
         """The bodies' temperatures over half-cycles; None where the case has no heat."""
         if self.heat_bodies is None or self.case.heat is None:
             return None
-        reduced = self.case.heat.operator == "reduced"
-        return prepare_exchange(
-            self.case, self.heat_bodies, self.facing, self._gap_rows(), self.motion, reduced=reduced
-        )
+        return self._prepare_exchange(reduced=self.case.heat.operator == "reduced")
+
+    @cached_property
+    def reduced_exchange(self) -> HeatExchange | None:
+        """The same on a small basis, whatever the case says: what whole cycles need."""
+        if self.case.heat is None or self.case.heat.operator == "reduced":
+            return self.exchange
+        return self._prepare_exchange(reduced=True)
+
+    def _prepare_exchange(self, *, reduced: bool) -> HeatExchange:
+        if self.heat_bodies is None:
+            raise CaseError(Problem("heat", "missing, but required here"))
+        rows = self._gap_rows()
+        return prepare_exchange(self.case, self.heat_bodies, self.facing, rows, self.motion, reduced=reduced)
 
     def steady_exchange(self, velocities: Sequence[float]) -> HeatExchange:
         """Return the exchange whose phases are steady states at these velocities of the strip; collective.
@@ -110,6 +120,11 @@ class System:
         if self.heat_bodies is None:
             raise CaseError(Problem("heat", "missing, but required here"))
         return prepare_steady(self.case, self.heat_bodies, self.facing, self._gap_rows(), velocities)
+
+    def prepare(self) -> None:
+        """Make all that is costly now: the condensation and, with heat, the steps of the motion; collective."""
+        self.interface  # noqa: B018
+        self.exchange  # noqa: B018
 
     @cached_property
     def motion(self) -> Motion:

@@ -6,7 +6,17 @@
 from fenwear.cycle.block import Block
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
-from fenwear.cycle.stability import stability_number
+from fenwear.cycle.stability import critical_speed, growth_rate, stability_number
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
 
-__all__ = ["Block", "Steady", "cycles_to_reach", "jump", "march", "stability_number", "steady"]
+__all__ = [
+    "Block",
+    "Steady",
+    "critical_speed",
+    "cycles_to_reach",
+    "growth_rate",
+    "jump",
+    "march",
+    "stability_number",
+    "steady",
+]

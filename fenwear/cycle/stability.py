@@ -1,4 +1,4 @@
-"""The limit of explicit wear steps: how far a run is from it."""
+"""Stability: the limit of explicit wear steps, and the thermo-elastic stability of a state."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
-from fenwear.inequality import Array
+from fenwear.cycle.jump import cycle_heat
+from fenwear.inequality import Array, Mask
 from fenwear.system import System
+from fenwear.wear import WornLayer
+
+NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 
 
 def stability_number(system: System) -> float:
@@ -39,3 +43,93 @@ def stability_number(system: System) -> float:
         values = eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)
         largest = max(largest, float(np.abs(values).max()) / scale)
     return stiffness * largest / 2
+
+
+def growth_rate(system: System, pressure: Array) -> float:
+    """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
+
+    Negative: every disturbance dies out. The cycle's map of temperature and worn depth is linearised
+    around the given pressures with the same nodes in contact, and its eigenvalue largest in size
+    taken: ln |lambda| over the duration of a cycle. A rigid motion of the worn shape changes
+    nothing, nor does the shape where nothing touches; these disturbances (lambda = 1) do not count.
+
+    Args:
+        system: The assembled problem.
+        pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
+    """
+    heat = cycle_heat(system)
+    n = pressure.shape[1]
+    dim = 0 if heat is None else heat.gap_rows.shape[1]
+    maps = None if heat is None else heat.maps(heat.conductances(pressure))
+    slopes = WornLayer(system.wear).slope(pressure)
+    cycle = np.eye(dim + n)
+    for phase, d in enumerate(system.motion.directions):
+        change = np.zeros((dim + n, dim + n))  # of temperature and depth over the phase
+        compliance = system.interface.compliance(d, system.case.contact.friction)
+        disturbance = np.zeros((n, dim + n))
+        disturbance[:, dim:] = np.eye(n)
+        if heat is not None and maps is not None:
+            one = maps[phase]
+            disturbance[:, :dim] = heat.gap_rows @ one.propagator
+            compliance = compliance + heat.gap_rows @ one.response
+            change[:dim, :dim] = one.propagator
+        answer = -_restricted_stiffness(system, d, compliance, pressure[phase] > 0) @ disturbance
+        if maps is not None:
+            change[:dim] += maps[phase].response @ answer
+        change[dim:, dim:] = np.eye(n)
+        change[dim:] += slopes[phase][:, None] * answer
+        cycle = change @ cycle
+    values = np.linalg.eigvals(cycle)
+    counted = np.abs(values - 1.0) > NEUTRAL
+    duration = system.motion.duration * len(system.motion.directions)
+    return float(np.log(np.abs(values[counted]).max()) / duration)
+
+
+def _restricted_stiffness(system: System, direction: int, compliance: Array, closed: Mask) -> Array:
+    """Return minus the pressure (n, n) that each unit of gap makes where `closed` nodes stay closed."""
+    statics, friction = system.statics, system.case.contact.friction
+    nodes = np.flatnonzero(closed)
+    k, r = len(nodes), statics.rigid_normal.shape[1]
+    scale = system.interface.elastic_length
+    matrix = np.zeros((k + r, k + r))
+    matrix[:k, :k] = compliance[np.ix_(nodes, nodes)] / scale
+    matrix[:k, k:] = statics.rigid_normal[nodes]
+    matrix[k:, :k] = statics.equilibrium(direction, friction)[:, nodes]
+    stiffness = np.zeros((len(closed), len(closed)))
+    stiffness[np.ix_(nodes, nodes)] = np.linalg.inv(matrix)[:k, :k] / scale
+    return stiffness
+
+
+def critical_speed(system: System, direction: int) -> float:
+    """Return the sliding speed above which full contact is thermo-elastically unstable, mm/s; collective.
+
+    Of disturbances that grow without moving along the contact, and without wear: there the steady
+    temperature of a pressure makes just this pressure, p = -V X Theta p, with X the elastic stiffness
+    of the contact and Theta the thermal gap of the friction heat at unit speed (for a half-plane on
+    an insulator: Burton, V = 2 (1 - nu) k m / (mu E alpha)). Infinite where no speed is critical.
+
+    Args:
+        system: The assembled problem, with heat.
+        direction: Sliding direction d.
+
+    Raises:
+        CaseError: the case has no heat, or a body no heat sink.
+    """
+    n = len(system.facing.weights)
+    everywhere = np.ones(n, dtype=bool)
+    compliance = system.interface.compliance(direction, system.case.contact.friction)
+    stiffness = _restricted_stiffness(system, direction, compliance, everywhere)
+    speed = float(system.motion.mean_speeds(1)[0])
+    for _ in range(50):  # the strip's temperature depends on its speed
+        exchange = system.steady_exchange([direction * speed])
+        uniform = np.full(n, system.statics.mean_pressure)
+        states, _terms = exchange.response(0, exchange.conductance(uniform))
+        thermal = exchange.gap_change(states) / speed
+        values = np.linalg.eigvals(-stiffness @ thermal)
+        growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
+        if not len(growing):
+            return float("inf")
+        before, speed = speed, float(1 / growing.max())
+        if abs(speed - before) < 1e-6 * speed:
+            break
+    return speed

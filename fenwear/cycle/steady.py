@@ -17,12 +17,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenwear.cycle.jump import jump
+from fenwear.contact import ContactState
+from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
+from fenwear.heat.periodic import CycleHeat
 from fenwear.inequality import Array, DenseInequality, Mask
 from fenwear.system import System
+from fenwear.wear import WornLayer
 
-DRIVE = 1e-6
+DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
+
+
+@dataclass(frozen=True)
+class SteadyHeat:
+    """The temperatures of the cyclic steady state.
+
+    Attributes:
+        punch: Of the punch's contact surface at the end of each phase (phases, n), K.
+        strip: Of the strip's (phases, n), K.
+        mean_fields: Mean of the ends of the phases, of this rank's own nodes of both bodies, K.
+    """
+
+    punch: Array
+    strip: Array
+    mean_fields: tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -39,6 +57,7 @@ class Steady:
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
         iterations: Newton iterations.
         seconds: Wall time of the solve.
+        heat: Temperatures; None without heat.
     """
 
     directions: tuple[int, ...]
@@ -50,6 +69,7 @@ class Steady:
     velocity: dict[str, float]
     iterations: int
     seconds: float
+    heat: SteadyHeat | None = None
 
 
 class _SteadyInequality:
@@ -89,6 +109,8 @@ class _SteadyInequality:
         lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
         lower[: m * n] = 0.0
         upper[omega] = OPEN
+        self._without_heat = (self.matrix.copy(), self.offset.copy())
+        self.x = self._uniform()
         self.inequality = DenseInequality(
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
@@ -100,8 +122,6 @@ class _SteadyInequality:
         f[self.omega] -= self.system.wear.depth(pressure).sum(axis=0) / self.wear_scale
 
     def _jacobian(self, x: Array, jacobian: Array) -> None:
-        from fenwear.wear import WornLayer
-
         m, n = self.m, self.n
         jacobian[:] = self.matrix
         slope = WornLayer(self.system.wear).slope(x[: m * n].reshape(m, n) * self.p_scale) * self.p_scale
@@ -112,7 +132,25 @@ class _SteadyInequality:
         opened = m * n + np.flatnonzero(x[: m * n].reshape(m, n).max(axis=0) <= 0)
         jacobian[opened, opened] += DRIVE
 
-    def start(self) -> Array:
+    def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
+        """Return the contact of all phases, starting from the last solution.
+
+        Args:
+            thermal: Thermal gap without pressure (m, n), mm.
+            coupling: Thermal gap from the pressures of the phases (m, n, m, n), mm/MPa.
+        """
+        m, n = self.m, self.n
+        self.matrix[:], self.offset[:] = self._without_heat
+        if thermal is not None and coupling is not None:
+            self.offset[: m * n] += thermal.ravel() / self.gap_scale
+            self.matrix[: m * n, : m * n] += coupling.reshape(m * n, m * n) * (self.p_scale / self.gap_scale)
+        self.x = self.inequality.solve(self.x).copy()
+        f = np.empty_like(self.x)
+        self._residual(self.x, f)
+        pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
+        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.snes.getIterationNumber())
+
+    def _uniform(self) -> Array:
         """Return the uniform pressure with the shape that would carry it."""
         m, n, r = self.m, self.n, self.r
         x = np.zeros(len(self.offset))
@@ -127,33 +165,60 @@ class _SteadyInequality:
 def steady(system: System) -> Steady:
     """Solve for the cyclic steady state; collective.
 
+    With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is.
+
     Raises:
-        ConvergenceError: the inequality did not converge.
+        CaseError: with heat, a body that loses heat nowhere.
+        ConvergenceError: the inequality did not converge, or not with the nodes that conduct.
     """
     interface = system.interface
+    heat = cycle_heat(system)
     begin = time.perf_counter()
     problem = _SteadyInequality(system)
-    x = problem.inequality.solve(problem.start())
-    m, n, r = problem.m, problem.n, problem.r
-    pressure = x[: m * n].reshape(m, n) * problem.p_scale
-    f = np.empty_like(x)
-    problem._residual(x, f)
-    omega = x[problem.omega] * problem.gap_scale
-    touched = x[problem.omega] < OPEN
+    contact = problem.solve()
+    temperature: Array | None = None
+    if heat is not None:
+        for body in system.heat_bodies or ():
+            body.check_heat_sink()
+        contact, temperature = solve_with_heat(
+            heat,
+            heat.initial(),
+            np.inf,
+            contact,
+            lambda thermal, coupling, _: problem.solve(thermal, coupling),
+            system.statics.mean_pressure,
+        )
     weights = system.facing.weights
+    omega = problem.x[problem.omega] * problem.gap_scale
+    touched = problem.x[problem.omega] < OPEN
     shape = np.where(touched, omega - _rigid_part(system, omega - system.facing.initial_gap, touched), np.nan)
-    velocity = x[len(x) - r :] * problem.wear_scale / problem.lengths
+    velocity = problem.x[len(problem.x) - problem.r :] * problem.wear_scale / problem.lengths
     return Steady(
         problem.directions,
-        pressure,
-        f[: m * n].reshape(m, n) * problem.gap_scale,
+        contact.pressure,
+        contact.gap,
         shape - system.facing.initial_gap,
-        (pressure > 0) @ weights,
-        system.wear.depth(pressure).sum(axis=0),
+        (contact.pressure > 0) @ weights,
+        system.wear.depth(contact.pressure).sum(axis=0),
         dict(zip(interface.statics.mode_names, velocity.tolist(), strict=True)),
-        problem.inequality.snes.getIterationNumber(),
+        contact.iterations,
         time.perf_counter() - begin,
+        None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure),
     )
+
+
+def _steady_heat(heat: CycleHeat, state: Array, pressure: Array) -> SteadyHeat:
+    """Follow the temperatures through one cycle of the steady state."""
+    exchange, parts = heat.exchange, heat.parts(state)
+    punch, strip, means = [], [], np.zeros_like(state)
+    for phase in range(len(pressure)):
+        parts, _ = exchange.half_cycle(parts, phase, pressure[phase], exchange.conductance(pressure[phase]))
+        temperatures = exchange.contact_temperatures(parts)
+        punch.append(temperatures[0])
+        strip.append(temperatures[1])
+        means += np.concatenate(parts) / len(pressure)
+    fields = [side.field.temperature(s) for side, s in zip(exchange.sides, heat.parts(means), strict=True)]
+    return SteadyHeat(np.array(punch), np.array(strip), (fields[0], fields[1]))
 
 
 def _rigid_part(system: System, values: Array, where: Mask) -> Array:

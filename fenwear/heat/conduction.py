@@ -157,12 +157,8 @@ class HeatBody:
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
         """
-        if math.isinf(duration) and not self.loses_heat():
-            key = "heat.convection"
-            message = (
-                f"the {self.body.name} loses heat nowhere: no steady temperature; expected convection or a held one"
-            )
-            raise CaseError(Problem(key, message))
+        if math.isinf(duration):
+            self.check_heat_sink()
         a, b, f, rate, speed = self._step_forms
         rate.value = 0.0 if math.isinf(duration) else 1 / duration
         speed.value = velocity
@@ -171,6 +167,16 @@ class HeatBody:
     def loses_heat(self) -> bool:
         """Return whether a heat sink exists: convection or a held temperature; collective."""
         return self.heat.convection > 0 or self.body.mesh.comm.allreduce(len(self.held)) > 0
+
+    def check_heat_sink(self) -> None:
+        """Make sure that a steady temperature exists; collective.
+
+        Raises:
+            CaseError: the body loses heat nowhere.
+        """
+        if not self.loses_heat():
+            message = f"the {self.body.name} loses heat nowhere: expected convection or a held temperature"
+            raise CaseError(Problem("heat.convection", message))
 
     def initial(self) -> Array:
         """Return the initial temperature of the owned degrees of freedom."""

@@ -114,9 +114,10 @@ class HeatExchange:
 
     def conductance(self, pressure: Array) -> Array:
         """Return h_c of each node (n,), N/(mm s K): infinite for perfect contact, NaN where none conducts."""
+        value: NDArray[Any]
         if self.heat.conductance_per_pressure is not None:
             h1, h2 = self.heat.conductance_per_pressure
-            value: Array = np.maximum(pressure, 0.0) * h1 * h2 / (h1 + h2)
+            value = np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2))
         else:
             constant = np.inf if self.heat.conductance == "perfect" else float(self.heat.conductance)
             value = np.full(len(pressure), constant)

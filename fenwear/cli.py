@@ -116,9 +116,8 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     print(f"  mean pressure {system.statics.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
     if state.heat is not None:
-        print(
-            f"  largest temperature of the punch {state.heat.punch.max():.3f} K, of the strip {state.heat.strip.max():.3f} K"
-        )
+        punch, strip = state.heat.punch.max(), state.heat.strip.max()
+        print(f"  largest temperature at the contact: punch {punch:.3f} K, strip {strip:.3f} K")
     if rate > 0:
         print(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
     elif cycles is None:

@@ -10,6 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import fsolve
 
 from fenwear import CaseError, System, load_case
+from fenwear.inequality import Array
 
 A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
 
@@ -74,7 +75,7 @@ def test_power_law_against_adaptive_quadrature(assemble: Callable[..., System], 
     def shape(x: float, f: float, g: float) -> float:
         return max(f + g * x / A, 0.0) ** (1 / b)
 
-    def balance(unknown: np.ndarray) -> list[float]:
+    def balance(unknown: Array) -> list[float]:
         moments = [quad(lambda x, k=k: shape(x, *unknown) * x**k, -A, A, epsabs=1e-11)[0] for k in (0, 1)]  # type: ignore[misc]
         return [moments[0] / 60 - 1, moments[1] / 60 + 0.25 * 20]
 

@@ -116,9 +116,9 @@ def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypa
             yield block
 
     monkeypatch.setattr(run, "march", failing)
-    with pytest.raises(ConvergenceError, match=r"half-cycle 401 .*DIVERGED_ON_PURPOSE") as failed:
+    with pytest.raises(ConvergenceError, match="DIVERGED_ON_PURPOSE") as failed:
         run_case(case, "test", tmp_path / "run", lambda message: None)
-    assert str(tmp_path / "run") in str(failed.value)
+    assert f"half-cycle 400 are in {tmp_path / 'run'}" in str(failed.value)
     with open_history(tmp_path / "run") as history:
         assert history.half_cycle[-1] == 400
     assert "DIVERGED_ON_PURPOSE" in json.loads((tmp_path / "run" / "summary.json").read_text())["stop"]

@@ -68,7 +68,7 @@ def test_wear_is_what_the_pressure_wears(assemble: Callable[..., System]) -> Non
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 def test_galin_goryacheva(rigid_punch: Callable[..., System], plane: Literal["stress", "strain"]) -> None:
-    """Verification 9: a non-tilting punch on a half-plane; the slowest even modes decay at 1.7267 and 3.3143 E* k V / a.
+    """Verification 9: a non-tilting punch on a half-plane; its even modes decay at 1.7267, 3.3143, ... E* k V / a.
 
     An implicit step divides each mode by exactly 1 + rate k 2 u0. The two factors are the roots of the
     recurrence that three late shapes of the pressure satisfy.

@@ -24,7 +24,7 @@ OPENS_FOR_GOOD = pytest.mark.xfail(
 @pytest.mark.parametrize("name", ["example1", "example1-lz40", "example2"])
 @pytest.mark.mpi
 def test_sum_of_the_two_pressures_is_uniform(assemble: Callable[..., System], name: str, plane: str) -> None:
-    """Verification 11 and the paper: p+ + p- = 2 p_m over the worn contact; where one vanishes the other is 33.33 MPa."""
+    """Verification 11 and the paper: p+ + p- = 2 p_m; where one vanishes the other is 33.33 MPa."""
     system = assemble(name, f"model.plane='{plane}'")
     state = steady(system)
     np.testing.assert_allclose(state.pressure.sum(axis=0), 2 * MEAN, rtol=1e-9)

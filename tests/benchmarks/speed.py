@@ -44,7 +44,7 @@ def full_against_condensed(system: System, half_cycles: int = 100) -> None:
         phase = number % 2
         for kind in (0, 1):
             seconds, states[phase][kind] = timed(
-                lambda phase=phase, kind=kind: solvers[phase][kind].solve(wear, states[phase][kind])
+                lambda phase=phase, kind=kind, gap=wear: solvers[phase][kind].solve(gap, states[phase][kind])
             )
             if number >= 2:
                 times[kind].append(seconds)

@@ -227,6 +227,14 @@ class Heat(_Part):
         default=0.5, description="of the pressure in the operator split, equation (29)"
     )
     operator: Literal["reduced", "full"] = "reduced"
+    # The keys that the operators of the bodies do not depend on.
+    exchange_keys: ClassVar[frozenset[str]] = frozenset(
+        (
+            *("partition", "debris", "conductance", "conductance_per_pressure", "conducting"),
+            *("coupling", "split_tolerance", "relaxation"),
+        )
+    )
+
     reduction_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=1e-4, description="of the reduced operator's basis, relative"
     )
@@ -320,6 +328,17 @@ class Case(_Part):
         """The folder of the case file, None for a built-in case or one made in Python."""
         return self._folder
 
+    def changed(self, *settings: str) -> Case:
+        """Return the case with overrides `key.path=value`, as of `load_case`.
+
+        Raises:
+            CaseError: an override does not fit.
+        """
+        data = self.resolved()
+        for setting in settings:
+            _apply(data, setting)
+        return make_case(data, self._folder)
+
     def at(self, folder: Path | None) -> Case:
         """Return this case with the folder that its geometry's path starts from."""
         placed = self.model_copy()
@@ -328,7 +347,7 @@ class Case(_Part):
 
     def resolved(self) -> dict[str, Any]:
         """Return every key with its value and unit: what case.toml holds."""
-        data = self.model_dump(exclude_none=True)
+        data = self.model_dump(mode="json", exclude_none=True)
         if self._folder is not None and (self._folder / self.geometry.file).is_file():
             data["geometry"]["file"] = str((self._folder / self.geometry.file).resolve())  # wherever it is read next
         law = self.wear.punch

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -17,6 +18,7 @@ from petsc4py import PETSc
 from fenwear.case import Body, Load, Material, Model, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.mesh import BodyMesh
+from fenwear.parallel import total
 
 AXES = {"x": 0, "z": 1}
 PREFIX = "fenwear_elasticity_"
@@ -105,16 +107,26 @@ class ElasticBody:
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         a = ufl.inner(stress(u, *self.lame), strain(v)) * ufl.dx
 
-        load = self._assemble_load(description.loads, model.thickness)
-        self.rigid_resultant = mesh.comm.allreduce(np.array([mode @ load.array_r for mode in modes]))
         bcs = supports + self._regularise()
         self.supported = self._owned_dofs(bcs)
-        load.array[self.supported] = 0.0
-        self.load = load
+        self._set_loads(description.loads, model.thickness)
         self.stiffness = fem.petsc.assemble_matrix(fem.form(a), bcs=bcs)
         self.stiffness.assemble()
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
         self._ksp: PETSc.KSP | None = None
+
+    def _set_loads(self, loads: Sequence[Load], thickness: float) -> None:
+        load = self._assemble_load(loads, thickness)
+        resultant = np.array([mode @ load.array_r for mode in self.rigid_modes])
+        self.rigid_resultant = total(self.body.mesh.comm, resultant)
+        load.array[self.supported] = 0.0
+        self.load = load
+
+    def with_loads(self, loads: Sequence[Load], thickness: float) -> ElasticBody:
+        """Return the same body under other loads, with the same stiffness and factor; collective."""
+        body = copy.copy(self)
+        body._set_loads(loads, thickness)
+        return body
 
     @property
     def factor(self) -> PETSc.Mat:

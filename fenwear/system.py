@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
+import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenwear.case import Body, Case
+from fenwear.case import Body, Case, Heat
 from fenwear.contact import CondensedContact, ContactSolver
 from fenwear.contact_full import FullContact
 from fenwear.elasticity import ElasticBody
@@ -21,7 +24,7 @@ from fenwear.interface import Facing, Interface, Statics, face, join, statics
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
 from fenwear.optimum import Optimum, check_equilibrium, optimum
-from fenwear.surface import Surface, condense, surface_nodes
+from fenwear.surface import Surface, condense, respond_to_load, surface_nodes
 from fenwear.wear import Wear
 
 
@@ -45,6 +48,65 @@ class System:
         self.heat_bodies  # noqa: B018  (finds missing groups before anything costly)
         for direction in self.motion.directions:
             check_equilibrium(self.statics, direction, case.contact.friction)
+
+    def vary(self, *settings: str) -> System:
+        """Return the system of a changed case that shares all operators which the change leaves; collective.
+
+        Loads, friction, wear, motion and the exchange of heat factor no stiffness again; the motion
+        prepares the steps of heat again. Anything else makes a new system.
+
+        Args:
+            settings: Overrides `key.path=value`, as on the command line.
+
+        Raises:
+            CaseError: an override does not fit, or the punch would tip over.
+        """
+        return self.with_case(self.case.changed(*settings))
+
+    def with_case(self, case: Case) -> System:
+        """Return the system of another case, as `vary`; collective."""
+        if not _same_bodies(self.case, case):
+            return System(case, self.comm)
+        other = copy.copy(self)
+        for name in ("motion", "wear", "interface", "exchange", "reduced_exchange", "heat_bodies", "_surfaces"):
+            other.__dict__.pop(name, None)
+        other.case = case
+        other._share_elasticity(self)
+        other._share_heat(self)
+        for direction in other.motion.directions:
+            check_equilibrium(other.statics, direction, case.contact.friction)
+        return other
+
+    def _share_elasticity(self, base: System) -> None:
+        thickness, surfaces = self.case.model.thickness, base.__dict__.get("_surfaces")
+        if self.case.punch.loads != base.case.punch.loads or self.case.strip.loads != base.case.strip.loads:
+            self.punch = base.punch.with_loads(self.case.punch.loads, thickness)
+            self.strip = base.strip.with_loads(self.case.strip.loads, thickness)
+            resultant = np.concatenate([self.punch.rigid_resultant, self.strip.rigid_resultant])
+            self.statics = replace(base.statics, resultant=resultant)
+            if surfaces is not None:
+                surfaces = tuple(
+                    replace(surface, normal_by_load=respond_to_load(elastic, surface.nodes))
+                    for surface, elastic in zip(surfaces, (self.punch, self.strip), strict=True)
+                )
+        if surfaces is not None:
+            self.__dict__["_surfaces"] = surfaces
+
+    def _share_heat(self, base: System) -> None:
+        heat, before = self.case.heat, base.case.heat
+        if heat is None or before is None:
+            return
+        keys = Heat.exchange_keys
+        same = heat.model_dump(exclude=set(keys)) == before.model_dump(exclude=set(keys))
+        held = [(c.punch.temperatures, c.strip.temperatures) for c in (self.case, base.case)]
+        if not same or held[0] != held[1]:
+            return
+        self.__dict__["heat_bodies"] = base.heat_bodies
+        if self.case.motion == base.case.motion:
+            for name in ("exchange", "reduced_exchange"):
+                exchange = base.__dict__.get(name)
+                if exchange is not None:
+                    self.__dict__[name] = exchange.varied(heat, self.case.contact.friction)
 
     def _body(self, mesh: BodyMesh, description: Body) -> ElasticBody:
         return ElasticBody(mesh, description, self.case.materials, self.case.model, self.case.geometry.degree)
@@ -154,3 +216,19 @@ class System:
         law = self.case.wear.punch
         rate = self.wear.per_power / self.motion.duration
         return optimum(self.statics, direction, self.case.contact.friction, rate, law.pressure_exponent, zone)
+
+
+def _same_bodies(one: Case, other: Case) -> bool:
+    """Return whether two cases have the same meshes, stiffnesses and thermal expansion."""
+    parts = [
+        (
+            case.geometry,
+            case.folder,
+            case.model,
+            case.materials,
+            case.heat is None,
+            *((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip)),
+        )
+        for case in (one, other)
+    ]
+    return parts[0] == parts[1]

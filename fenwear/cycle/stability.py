@@ -49,8 +49,8 @@ def growth_rate(system: System, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. The cycle's map of temperature and worn depth is linearised
-    around the given pressures with the same nodes in contact, and its eigenvalue largest in size
-    taken: ln |lambda| over the duration of a cycle. A rigid motion of the worn shape changes
+    around the given pressures with the same nodes in contact and implicit wear, and its eigenvalue
+    largest in size taken: ln |lambda| over the duration of a cycle. A rigid motion of the worn shape changes
     nothing, nor does the shape where nothing touches; these disturbances (lambda = 1) do not count.
 
     Args:
@@ -73,6 +73,7 @@ def growth_rate(system: System, pressure: Array) -> float:
             disturbance[:, :dim] = heat.gap_rows @ one.propagator
             compliance = compliance + heat.gap_rows @ one.response
             change[:dim, :dim] = one.propagator
+        compliance = compliance + np.diag(slopes[phase])  # wear at the end of the phase: no step is too long
         answer = -_restricted_stiffness(system, d, compliance, pressure[phase] > 0) @ disturbance
         if maps is not None:
             change[:dim] += maps[phase].response @ answer

@@ -16,9 +16,11 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linprog
 
 from fenwear.contact import ContactState
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
+from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
 from fenwear.inequality import Array, DenseInequality, Mask
 from fenwear.system import System
@@ -110,7 +112,8 @@ class _SteadyInequality:
         lower[: m * n] = 0.0
         upper[omega] = OPEN
         self._without_heat = (self.matrix.copy(), self.offset.copy())
-        self.x = self._uniform()
+        self.x = self._start()
+        self._solved = False
         self.inequality = DenseInequality(
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
@@ -144,21 +147,38 @@ class _SteadyInequality:
         if thermal is not None and coupling is not None:
             self.offset[: m * n] += thermal.ravel() / self.gap_scale
             self.matrix[: m * n, : m * n] += coupling.reshape(m * n, m * n) * (self.p_scale / self.gap_scale)
+        if self.m == 1 or not self._solved:
+            self.x = self._touching(self.x)
         self.x = self.inequality.solve(self.x).copy()
+        self._solved = True
         f = np.empty_like(self.x)
         self._residual(self.x, f)
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
         return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.snes.getIterationNumber())
 
-    def _uniform(self) -> Array:
-        """Return the uniform pressure with the shape that would carry it."""
+    def _start(self) -> Array:
+        """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""
         m, n, r = self.m, self.n, self.r
         x = np.zeros(len(self.offset))
-        x[: m * n] = 1.0
-        x[self.omega] = -(self.matrix[:n, :n].sum(axis=1) + self.offset[:n])
-        shape = self.system.statics.rigid_normal / self.lengths
-        if r:
-            x[-r:] = np.linalg.lstsq(shape, np.full(n, float(m)), rcond=None)[0]
+        if m == 1:
+            optimum = self.system.optimum(self.directions[0])
+            x[:n] = optimum.pressure / self.p_scale
+            velocity = np.array([optimum.velocity[name] for name in self.system.statics.mode_names])
+            x[n + n :] = velocity * self.system.motion.duration * self.lengths / self.wear_scale
+        else:
+            x[: m * n] = 1.0
+            if r:
+                shape = self.system.statics.rigid_normal / self.lengths
+                x[-r:] = np.linalg.lstsq(shape, np.full(n, float(m)), rcond=None)[0]
+        return x
+
+    def _touching(self, x: Array) -> Array:
+        """Return x with the shape that carries its first pressure, open where the motion leaves the wear behind."""
+        n = self.n
+        x = x.copy()
+        x[self.omega] = -(self.matrix[:n, : self.m * n] @ x[: self.m * n] + self.offset[:n])
+        outrun = (x[:n] == 0) & (self.matrix[self.omega, len(x) - self.r :] @ x[len(x) - self.r :] < 0)
+        x[self.omega] = np.where(outrun & (self.m == 1), OPEN, x[self.omega])
         return x
 
 
@@ -175,7 +195,15 @@ def steady(system: System) -> Steady:
     heat = cycle_heat(system)
     begin = time.perf_counter()
     problem = _SteadyInequality(system)
-    contact = problem.solve()
+    try:
+        contact = problem.solve()
+    except ConvergenceError as error:
+        if _uniform_wear_exists(system):
+            raise
+        raise ConvergenceError(
+            f"{error}; friction tips the punch so far that no pressures wear the whole contact by a rigid motion: "
+            "it goes on changing its shape. Expected less friction, a lower pin or a wider contact"
+        ) from error
     temperature: Array | None = None
     if heat is not None:
         for body in system.heat_bodies or ():
@@ -219,6 +247,24 @@ def _steady_heat(heat: CycleHeat, state: Array, pressure: Array) -> SteadyHeat:
         means += np.concatenate(parts) / len(pressure)
     fields = [side.field.temperature(s) for side, s in zip(exchange.sides, heat.parts(means), strict=True)]
     return SteadyHeat(np.array(punch), np.array(strip), (fields[0], fields[1]))
+
+
+def _uniform_wear_exists(system: System) -> bool:
+    """Return whether any pressures of the phases wear the whole contact by a rigid motion (b = 1)."""
+    statics, friction = system.statics, system.case.contact.friction
+    directions, (n, r) = system.motion.directions, statics.rigid_normal.shape
+    m = len(directions)
+    lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
+    equality = np.zeros((n + m * r, m * n + r))
+    target = np.zeros(n + m * r)
+    equality[:n, m * n :] = -statics.rigid_normal / lengths
+    for k, d in enumerate(directions):
+        equality[:n, k * n : (k + 1) * n] = np.eye(n)
+        rows = slice(n + k * r, n + (k + 1) * r)
+        equality[rows, k * n : (k + 1) * n] = statics.equilibrium(d, friction) / lengths[:, None]
+        target[rows] = -statics.resultant / lengths
+    bounds = [(0, None)] * (m * n) + [(None, None)] * r
+    return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=target, bounds=bounds).status != 2)
 
 
 def _rigid_part(system: System, values: Array, where: Mask) -> Array:

@@ -12,6 +12,7 @@ dense system for the 2 n fluxes, whatever nodes conduct: nothing is factored aga
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -95,6 +96,12 @@ class HeatExchange:
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
         self._contact_responses = [[side.contact_change(r) for r in side.field.responses] for side in sides]
         self._inverses: dict[tuple[int, int, bytes], Array] = {}
+
+    def varied(self, heat: Heat, friction: float) -> HeatExchange:
+        """Return the exchange of another friction, partition or conductance with the same prepared bodies."""
+        other = copy.copy(self)
+        other.heat, other.friction = heat, friction
+        return other
 
     def initial(self) -> State:
         """Return the initial state."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.contact import ContactState
+from fenwear.cycle.moment import Moment
 from fenwear.inequality import Array
 from fenwear.system import System
 
@@ -69,6 +70,7 @@ class Block:
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
             mean pressure (k,); NaN in the first cycle.
         heat: Temperatures and heat balance; None without heat.
+        end: From where the run goes on.
     """
 
     system: System
@@ -82,6 +84,7 @@ class Block:
     optimum_distance: Array
     periodicity: Array
     heat: BlockHeat | None = field(default=None, kw_only=True)
+    end: Moment = field(kw_only=True)
 
     def __len__(self) -> int:
         return len(self.half_cycle)
@@ -148,15 +151,15 @@ class Recorder:
         """Whether the block is as large as asked for."""
         return len(self._rows) >= self.size
 
-    def take(self) -> Block:
-        """Return the block and begin the next one."""
+    def take(self, end: Moment) -> Block:
+        """Return the block that ends with `end`, and begin the next one."""
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
         heat = None
         if self._heat:
             names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
             heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
         self._rows, self._heat = [], []
-        return Block(self.system, *columns, heat=heat)
+        return Block(self.system, *columns, heat=heat, end=end)
 
     def __bool__(self) -> bool:
         return bool(self._rows)

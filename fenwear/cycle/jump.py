@@ -12,12 +12,13 @@ estimate, and the halves are kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
 from fenwear.contact import ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
+from fenwear.cycle.moment import Moment, beginning, joined, parted
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
 from fenwear.inequality import Array
@@ -31,15 +32,6 @@ CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
 SolveContact = Callable[[Array, Array, ContactState], ContactState]
 
 
-@dataclass(frozen=True)
-class _Moment:
-    """The end of a jump: contact of its last cycle, worn depth, reduced temperature."""
-
-    contact: ContactState | None
-    wear: Array
-    temperature: Array | None
-
-
 def jump(
     system: System,
     half_cycles: int,
@@ -47,6 +39,8 @@ def jump(
     tolerance: float,
     periodic_within: float | None = None,
     block: int = 200,
+    start: Moment | None = None,
+    stops: frozenset[int] = frozenset(),
 ) -> Iterator[Block]:
     """Yield the last cycle of every jump, in blocks; collective.
 
@@ -57,6 +51,8 @@ def jump(
         periodic_within: Stop when the pressure changes per cycle by less than this fraction of the
             mean pressure.
         block: Half-cycles in a block.
+        start: Where to go on from, such as the end of a block; by default the beginning.
+        stops: Half-cycles at which a jump and a block end in any case.
 
     Raises:
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
@@ -64,35 +60,38 @@ def jump(
     phases = len(system.motion.directions)
     stepper = _Stepper(system)
     cycles = half_cycles // phases
-    moment = stepper.start()
+    ends = sorted({-(-stop // phases) for stop in stops} | {cycles})
+    moment = start or stepper.beginning()
     recorder = Recorder(system, block)
-    done, length = 0, 1
+    done, length = moment.half_cycle // phases, moment.jump_length
     while done < cycles:
-        length = min(length, cycles - done)
+        tried = min(length, next(end for end in ends if end > done) - done)
         try:
-            whole = stepper.step(moment, length)
-            middle = stepper.step(moment, length / 2)
-            end = stepper.step(middle, length / 2)
+            whole = stepper.step(moment, tried)
+            end = stepper.step(stepper.step(moment, tried / 2), tried / 2)
         except ConvergenceError as error:
-            if length > 1:
-                length = max(1, length // 4)
+            if tried > 1:
+                length = max(1, tried // 4)
                 continue
             if recorder:
-                yield recorder.take()
+                yield recorder.take(moment)
             raise ConvergenceError(f"half-cycle {done * phases + 1}: {error}") from error
         error_estimate = _largest_change(whole, end) / system.statics.mean_pressure
-        if error_estimate > tolerance and length > 1:
-            length = max(1, int(length * max(0.2, 0.9 * np.sqrt(tolerance / error_estimate))))
+        factor = 0.9 * np.sqrt(tolerance / max(error_estimate, 1e-300))
+        if error_estimate > tolerance and tried > 1:
+            length = max(1, int(tried * max(0.2, factor)))
             continue
-        done += length
-        change = stepper.record(recorder, done * phases, moment, end, length)
+        done += tried
+        if tried == length or factor < 1:  # a step cut short by an end says little of the next length
+            length = max(1, int(tried * min(5.0, factor)))
+        end = replace(end, half_cycle=done * phases, jump_length=length)
+        change = stepper.record(recorder, moment, end, tried)
         moment = end
         finished = periodic_within is not None and change < periodic_within
-        if recorder.full or finished or done == cycles:
-            yield recorder.take()
+        if recorder.full or finished or done in ends:
+            yield recorder.take(moment)
         if finished:
             return
-        length = max(1, int(length * min(5.0, 0.9 * np.sqrt(tolerance / max(error_estimate, 1e-300)))))
 
 
 class _Stepper:
@@ -103,57 +102,56 @@ class _Stepper:
         self.contact = system.contact(system.motion.directions)
         self.heat = cycle_heat(system)
 
-    def start(self) -> _Moment:
+    def beginning(self) -> Moment:
         """Return the unworn bodies at their initial temperature."""
-        temperature = None if self.heat is None else self.heat.initial()
-        return _Moment(None, np.zeros_like(self.system.facing.initial_gap), temperature)
+        return beginning(self.system, None if self.heat is None else self.heat.exchange.initial())
 
-    def step(self, moment: _Moment, cycles: float) -> _Moment:
+    def step(self, moment: Moment, cycles: float) -> Moment:
         """Return the moment `cycles` cycles later."""
         layer = WornLayer(self.system.wear, cycles)
         gap = self.system.facing.initial_gap + moment.wear
-        temperature = moment.temperature
-        if self.heat is None or temperature is None or moment.contact is None:
+        contact, temperature = joined(moment.contacts), moment.temperature
+        if self.heat is None or temperature is None or contact is None:
             # With heat this is the first step: which nodes conduct is seen from the contact without it.
-            contact = self.contact.solve(gap, moment.contact, layer)
-        else:
-            contact = moment.contact
+            contact = self.contact.solve(gap, contact, layer)
         if self.heat is not None and temperature is not None:
-            contact, temperature = solve_with_heat(
+            contact, end = solve_with_heat(
                 self.heat,
-                temperature,
+                np.concatenate(temperature),
                 cycles,
                 contact,
                 lambda thermal, coupling, start: self.contact.solve(gap + thermal, start, layer, coupling),
                 self.system.statics.mean_pressure,
             )
-        return _Moment(contact, moment.wear + layer.opening(contact.pressure), temperature)
+            temperature = self.heat.parts(end)
+        return Moment(moment.half_cycle, moment.wear + layer.opening(contact.pressure), parted(contact), temperature)
 
-    def record(self, recorder: Recorder, half_cycle: int, before: _Moment, after: _Moment, length: int) -> float:
+    def record(self, recorder: Recorder, before: Moment, after: Moment, cycles: int) -> float:
         """Record the phases of the last cycle; return the largest change of pressure per cycle."""
-        directions, state = self.system.motion.directions, after.contact
-        assert state is not None
-        worn = self.system.wear.depth(state.pressure)
-        changes = []
+        directions = self.system.motion.directions
         heats = self._last_cycle_heat(after)
-        for phase, direction in enumerate(directions):
-            remaining = len(directions) - 1 - phase
-            previous = None
-            if before.contact is not None:
-                previous = state.pressure[phase] - (state.pressure - before.contact.pressure)[phase] / length
-            depth = after.wear - worn[phase + 1 :].sum(axis=0)
-            number = half_cycle - remaining
-            changes.append(recorder.add(number, direction, phase, state, depth, worn[phase], previous, heats[phase]))
+        contacts = [_present(contact) for contact in after.contacts]
+        worn = [self.system.wear.depth(contact.pressure[0]) for contact in contacts]
+        changes = []
+        for phase, contact in enumerate(contacts):
+            old, previous = before.contacts[phase], None
+            if old is not None:
+                previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
+            number = after.half_cycle - (len(directions) - 1 - phase)
+            depth = after.wear - np.sum(worn[phase + 1 :], axis=0)  # the phases after this one have worn the rest
+            changes.append(
+                recorder.add(number, directions[phase], 0, contact, depth, worn[phase], previous, heats[phase])
+            )
         return max(changes)
 
-    def _last_cycle_heat(self, moment: _Moment) -> list[HalfCycleHeat | None]:
+    def _last_cycle_heat(self, moment: Moment) -> list[HalfCycleHeat | None]:
         """Return the heat of one more cycle at the pressures of the moment."""
-        if self.heat is None or moment.temperature is None or moment.contact is None:
+        if self.heat is None or moment.temperature is None:
             return [None] * len(self.system.motion.directions)
         heats: list[HalfCycleHeat | None] = []
-        exchange, state = self.heat.exchange, self.heat.parts(moment.temperature)
-        for phase in range(len(moment.contact.pressure)):
-            pressure = moment.contact.pressure[phase]
+        exchange, state = self.heat.exchange, moment.temperature
+        for phase, contact in enumerate(moment.contacts):
+            pressure = _present(contact).pressure[0]
             state, terms = exchange.half_cycle(state, phase, pressure, exchange.conductance(pressure))
             heats.append(HalfCycleHeat(*exchange.contact_temperatures(state), terms, 1))
         return heats
@@ -196,7 +194,13 @@ def solve_with_heat(
     )
 
 
-def _largest_change(one: _Moment, other: _Moment) -> float:
-    assert one.contact is not None
-    assert other.contact is not None
-    return float(np.abs(one.contact.pressure - other.contact.pressure).max())
+def _largest_change(one: Moment, other: Moment) -> float:
+    pairs = zip(one.contacts, other.contacts, strict=True)
+    return max(float(np.abs(_present(a).pressure - _present(b).pressure).max()) for a, b in pairs)
+
+
+def _present(contact: ContactState | None) -> ContactState:
+    """Return the contact of a phase that a step has solved."""
+    if contact is None:
+        raise ConvergenceError("a phase of the motion has no contact yet")
+    return contact

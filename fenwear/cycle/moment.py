@@ -1,0 +1,56 @@
+"""A moment of a run: all that its continuation needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.contact import ContactState
+from fenwear.heat.exchange import State
+from fenwear.inequality import Array
+from fenwear.system import System
+
+
+@dataclass(frozen=True)
+class Moment:
+    """The end of a half-cycle.
+
+    Attributes:
+        half_cycle: Its number; 0 before the first.
+        wear: Worn depth (n,), mm.
+        contacts: The last contact of each phase; None where there was none yet.
+        temperature: State of the heat exchange; None without heat.
+        jump_length: Cycles that the next jump tries.
+        periodic_phases: Half-cycles in a row that repeated.
+    """
+
+    half_cycle: int
+    wear: Array
+    contacts: tuple[ContactState | None, ...]
+    temperature: State | None
+    jump_length: int = 1
+    periodic_phases: int = 0
+
+
+def beginning(system: System, temperature: State | None) -> Moment:
+    """Return the unworn bodies at their initial temperature."""
+    phases = len(system.motion.directions)
+    return Moment(0, np.zeros_like(system.facing.initial_gap), (None,) * phases, temperature)
+
+
+def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:
+    """Return the contacts of all phases as one state; None unless all are there."""
+    present = [c for c in contacts if c is not None]
+    if len(present) < len(contacts):
+        return None
+    pressure, gap, rigid = (np.concatenate([getattr(c, n) for c in present]) for n in ("pressure", "gap", "rigid"))
+    return ContactState(pressure, gap, rigid, max(c.iterations for c in present))
+
+
+def parted(contact: ContactState) -> tuple[ContactState, ...]:
+    """Return the contact of each phase of a state."""
+    return tuple(
+        ContactState(contact.pressure[k : k + 1], contact.gap[k : k + 1], contact.rigid[k : k + 1], contact.iterations)
+        for k in range(len(contact.pressure))
+    )

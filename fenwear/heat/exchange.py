@@ -197,7 +197,7 @@ class HeatExchange:
         *,
         sources: bool,
     ) -> Array:
-        """Return the terms of a step's heat, per thickness."""
+        """Return the terms of a step's heat, per thickness; of a steady state per second."""
         friction = self.weights @ heat
         debris = self.heat.debris * friction
         # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
@@ -208,7 +208,8 @@ class HeatExchange:
             convected = convected + a[1] - sources * side.ambient_loss
             held = held - (a[2 + 3 * k] - b[3 + 3 * k] - sources * side.held_source[k])
             carried = carried + a[4 + 3 * k]
-        return np.array([friction, debris, stored, convected, held, carried]) * self.duration
+        seconds = 1.0 if np.isinf(self.duration) else self.duration
+        return np.array([friction, debris, stored, convected, held, carried]) * seconds
 
     def _fluxes(
         self, kinds: tuple[int, int], bare: list[Array], heat: Array, conductance: Array, ambient: float

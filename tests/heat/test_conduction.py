@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -166,7 +167,7 @@ def jaeger(x: float, half_width: float, speed: float, diffusivity: float) -> flo
 
     low, high = scale * (x - half_width), scale * (x + half_width)
     ends = [low, *(p for p in (-1.0, 0.0, 1.0) if low < p < high), high]
-    parts = zip(ends[:-1], ends[1:], strict=True)
+    parts = pairwise(ends)
     return sum(quad(kernel, a, b, limit=200)[0] for a, b in parts) / (math.pi * scale)
 
 
@@ -190,18 +191,10 @@ def test_moving_band_source(assemble: Make, peclet: float, direction: int) -> No
     rise = (body.contact_rows @ step.respond(body.place(body.weights)[:, None]))[:, 0] * 55
     exact = np.array([jaeger(direction * x, half_width, speed, diffusivity) for x in system.facing.x])
     inner = np.abs(system.facing.x) < 29.9
-    print(
-        "jaeger",
-        peclet,
-        direction,
-        np.abs(rise - exact)[inner].max() / exact.max(),
-        rise.max() / exact.max(),
-        rise.max() / (2 * math.sqrt(2 * half_width * diffusivity / (math.pi * speed))),
-    )
-    np.testing.assert_allclose(rise[inner], exact[inner], rtol=0, atol=0.01 * exact.max())
+    np.testing.assert_allclose(rise[inner], exact[inner], rtol=0, atol=0.005 * exact.max())
     if peclet >= 10:
         published = 2 * math.sqrt(2 * half_width * diffusivity / (math.pi * speed))
-        assert rise.max() == pytest.approx(published, rel=0.02 if peclet > 100 else 0.05)
+        assert rise.max() == pytest.approx(published, rel=0.01 if peclet > 100 else 0.03)
 
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])
@@ -307,4 +300,4 @@ def test_bimetal_strip(rectangle: Make, elastic: Make, conducting: Make, m: floa
     bending = 3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))
     timoshenko = 6 * (expansions[0] - expansions[1]) * warming * (1 + m) ** 2 / (height * bending)
     # The lower layer expands more, the ends rise: e_n points up.
-    assert curvature == pytest.approx(timoshenko, rel=1e-7)
+    assert curvature == pytest.approx(timoshenko, rel=1e-5)

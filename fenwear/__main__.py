@@ -41,11 +41,11 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
     return arguments[:at], arguments[at + 1 :]
 
 
-def _call(arguments: list[str], comm: MPI.Comm) -> int:
+def _call(arguments: list[str], comm: MPI.Comm) -> int:  # noqa: PLR0911
     import click
 
     from fenwear.cli import app
-    from fenwear.errors import CaseError, ConvergenceError
+    from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError
 
     try:
         result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
@@ -60,6 +60,9 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
     except ConvergenceError as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 3
+    except InterruptedRunError as error:
+        print(f"fenwear: {error}", file=sys.stderr)
+        return 1
     except (click.Abort, KeyboardInterrupt):
         print("fenwear: interrupted", file=sys.stderr)
         return 1

@@ -259,6 +259,10 @@ class Output(_Part):
     every: Annotated[int, Field(ge=1, strict=True)] = Field(
         default=1, description="keep every k-th cycle in history.nc, and always the last one"
     )
+    fields_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = Field(
+        default=None, description="half-cycles whose fields are written; by default the last one, () for none"
+    )
+    checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
     figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = Field(
         default=(), description="half-cycles that the figures show; by default six spread over the run"
     )

@@ -64,12 +64,16 @@ def run(
     case: CaseArgument = DEFAULT_CASE,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
     settings: SetOption = [],  # noqa: B006  (typer wants a list)
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
     from fenwear.run import run_case
 
-    summary, directory = run_case(_load(case, settings), Path(case).stem, output, log)
+    loaded = _load(case, settings)
+    if resume and output is None:
+        raise CaseError(Problem("--resume", "expected the folder of the run to go on with, as -o DIR"))
+    summary, directory = run_case(loaded, Path(case).stem, output, log, resume=resume)
     if as_json:
         _print_json(summary)
     else:

@@ -17,3 +17,9 @@ def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags
     gmsh_io = getattr(dolfinx.io, "gmsh", None) or __import__("dolfinx.io.gmshio", fromlist=["gmshio"])
     mesh, cell_tags, facet_tags = gmsh_io.model_to_mesh(model, comm, 0, gdim=gdim)[:3]
     return mesh, cell_tags, facet_tags
+
+
+def interpolation_points(space: Any) -> Any:
+    """Return the points that functions are interpolated at; a method up to dolfinx 0.9, then a property."""
+    points = space.element.interpolation_points
+    return points() if callable(points) else points

@@ -244,21 +244,22 @@ class ElasticBody:
         held = np.flatnonzero(mark.x.array[: 2 * (index_map.size_local + index_map.num_ghosts)]).astype(np.int32)
         return [self._held(component, held[held % 2 == component]) for component in (0, 1)]
 
+    def thermal_modulus(self, materials: dict[str, Material]) -> fem.Function:
+        """Return gamma, the in-plane stress that holds back each kelvin of expansion, MPa/K.
+
+        E alpha / (1 - nu) in plane stress, E alpha / (1 - 2 nu) in plane strain.
+        """
+        held = 1 if self._plane == "stress" else 2
+        used = {region: materials[name] for region, name in self._regions.items()}
+        values = {r: m.young * (m.expansion or 0.0) / (1 - held * m.poisson) for r, m in used.items()}
+        return region_field(self.body, values)
+
     def thermal_coupling(self, temperature: fem.FunctionSpace, materials: dict[str, Material]) -> PETSc.Mat:
         """Return G: the nodal forces G theta of free thermal expansion, N/mm per K; collective.
 
-        The integral of gamma theta div v with gamma = E alpha / (1 - nu) in plane stress and
-        E alpha / (1 - 2 nu) in plane strain. Supports take no force.
+        The integral of gamma theta div v, gamma the `thermal_modulus`. Supports take no force.
         """
-        used = {region: materials[name] for region, name in self._regions.items()}
-        plane_stress = self._plane == "stress"
-        gamma = region_field(
-            self.body,
-            {
-                region: m.young * (m.expansion or 0.0) / (1 - (1 if plane_stress else 2) * m.poisson)
-                for region, m in used.items()
-            },
-        )
+        gamma = self.thermal_modulus(materials)
         theta, v = ufl.TrialFunction(temperature), ufl.TestFunction(self.space)
         coupling = fem.petsc.assemble_matrix(fem.form(gamma * theta * ufl.div(v) * ufl.dx))
         coupling.assemble()

@@ -30,3 +30,7 @@ class CaseError(FenwearError):
 
 class ConvergenceError(FenwearError):
     """A solver did not converge; names the solver, the reason and what may help."""
+
+
+class InterruptedRunError(FenwearError):
+    """A signal ended a run; its checkpoint allows to go on."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from pathlib import Path
 from typing import Any
@@ -99,21 +100,32 @@ def free_directory(stem: Path) -> Path:
 
 
 class HistoryWriter:
-    """Writes blocks of half-cycles to history.nc, at most every few seconds; for one rank.
+    """Writes blocks of half-cycles to history.nc, every few seconds; for one rank.
 
-    Between two writes the file is closed, and so complete and readable.
+    Each write goes to a copy that then takes the file's place: it is whole and readable at any moment.
     """
 
-    def __init__(self, directory: Path, system: System) -> None:
+    def __init__(self, directory: Path, system: System, resumed_after: int | None = None) -> None:
+        """Begin a history, or go on with the one of a run that is resumed after a half-cycle."""
         self.path = directory / HISTORY
         self._variables = _variables(heat=system.case.heat is not None)
         self._phases = len(system.motion.directions)
-        self._every = system.case.output.every
+        # Cycle jumps have few records: all are kept.
+        self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
         self._pending: list[dict[str, NDArray[Any]]] = []
         self._last: dict[str, NDArray[Any]] | None = None
-        self._written = time.monotonic()
+        self._due = time.monotonic() + SECONDS_BETWEEN_WRITES
         self.rows = 0
-        self._create(system)
+        if resumed_after is None:
+            self._create(system)
+        else:
+            self._cut(resumed_after)
+
+    def _cut(self, half_cycle: int) -> None:
+        """Drop what a killed run wrote after its last checkpoint."""
+        with h5netcdf.File(self.path, "a") as file:
+            self.rows = int(np.searchsorted(file["half_cycle"][:], half_cycle, side="right"))
+            file.resize_dimension("half_cycle", self.rows)
 
     def _create(self, system: System) -> None:
         facing = system.facing
@@ -139,14 +151,12 @@ class HistoryWriter:
     def add(self, block: Block) -> None:
         """Take a block; write what has gathered if the last write is some seconds ago."""
         rows = {name: _values(block, name) for name in self._variables}
-        cycle = (block.half_cycle - 1) // self._phases
-        # A jump run has gaps in its numbers: it keeps all it has.
-        regular = bool((np.diff(block.half_cycle) == 1).all())
-        keep = (cycle % self._every == 0) | (not regular)
+        keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
-        self._last = {name: values[-self._phases :] for name, values in rows.items()}
-        if time.monotonic() - self._written > SECONDS_BETWEEN_WRITES:
-            self._write()
+        before = self._last or {name: values[:0] for name, values in rows.items()}
+        self._last = {n: np.concatenate([before[n], values])[-self._phases :] for n, values in rows.items()}
+        if time.monotonic() > self._due:
+            self.flush()
 
     def close(self) -> None:
         """Write the rest, with the last cycle whatever `output.every` is."""
@@ -154,24 +164,30 @@ class HistoryWriter:
             seen = {int(n) for rows in self._pending for n in rows["half_cycle"]} | self._stored_tail()
             new = np.array([int(n) not in seen for n in self._last["half_cycle"]])
             self._pending.append({name: values[new] for name, values in self._last.items()})
-        self._write()
+        self.flush()
 
     def _stored_tail(self) -> set[int]:
         with h5netcdf.File(self.path, "r") as file:
             return {int(n) for n in file["half_cycle"][max(0, self.rows - self._phases) :]}
 
-    def _write(self) -> None:
-        if self._pending:
-            joined = {name: np.concatenate([rows[name] for rows in self._pending]) for name in self._variables}
-            count = len(joined["half_cycle"])
-            if count:
-                with h5netcdf.File(self.path, "a") as file:
-                    file.resize_dimension("half_cycle", self.rows + count)
-                    for name, values in joined.items():
-                        file[name][self.rows : self.rows + count] = values
-                self.rows += count
-            self._pending = []
-        self._written = time.monotonic()
+    def flush(self) -> None:
+        """Write what has gathered."""
+        begin = time.monotonic()
+        joined = {n: np.concatenate([rows[n] for rows in self._pending]) for n in self._variables if self._pending}
+        count = len(joined.get("half_cycle", ()))
+        if count:
+            part = self.path.with_suffix(".part")
+            shutil.copyfile(self.path, part)
+            with h5netcdf.File(part, "a") as file:
+                file.resize_dimension("half_cycle", self.rows + count)
+                for name, values in joined.items():
+                    file[name][self.rows : self.rows + count] = values
+            part.replace(self.path)
+            self.rows += count
+        self._pending = []
+        # The copy grows with the file: let it cost a small share of the time only.
+        now = time.monotonic()
+        self._due = now + max(SECONDS_BETWEEN_WRITES, 20 * (now - begin))
 
 
 def summarise(system: System, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:

@@ -1,99 +1,212 @@
-"""A whole run: from a case to the folder of its results."""
+"""A whole run: from a case to the folder of its results, and on from its checkpoint."""
 
 from __future__ import annotations
 
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType, TracebackType
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
+from fenwear import checkpoint
 from fenwear.case import Case
 from fenwear.cycle import Block, growth_rate, jump, march, stability_number
-from fenwear.errors import ConvergenceError
+from fenwear.cycle.moment import Moment
+from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, Problem
+from fenwear.fields import body_fields, write_fields
 from fenwear.figures import draw_figures
 from fenwear.parallel import on_root
 from fenwear.results import HistoryWriter, free_directory, make_directory, summarise, write_case, write_summary
 from fenwear.system import System
 
+Log = Callable[[str], None]
+
 
 def run_case(
-    case: Case, name: str, output: Path | None, log: Callable[[str], None], comm: MPI.Comm = MPI.COMM_WORLD
+    case: Case,
+    name: str,
+    output: Path | None,
+    log: Log,
+    *,
+    resume: bool = False,
+    comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
 
     Args:
         case: The problem.
         name: Names the folder results/NAME where `output` is None.
-        output: New folder of the results.
+        output: New folder of the results, or with `resume` the folder of the run to go on with.
         log: Called with each message.
+        resume: Go on from the checkpoint in `output`.
+        comm: The ranks.
 
     Returns:
         The summary and the folder.
 
     Raises:
-        CaseError: the case or its geometry is wrong, or the folder cannot be made; nothing is written.
+        CaseError: the case, its geometry or its checkpoint is wrong, or the folder cannot be made;
+            nothing is written.
         ConvergenceError: a half-cycle failed; the results up to it are in the folder.
+        InterruptedRunError: a signal ended the run; it can be resumed.
     """
     begin = time.perf_counter()
     system = System(case, comm)
     system.prepare()
     setup = time.perf_counter() - begin
-    directory = on_root(comm, lambda: output if output is not None else free_directory(Path("results") / name))
-    on_root(comm, lambda: make_directory(directory))
-    on_root(comm, lambda: write_case(directory, case))
-    warnings = _warnings(system)
-    for warning in warnings:
-        log(f"warning: {warning}")
-    writer = HistoryWriter(directory, system) if comm.rank == 0 else None
-
+    run = _Run(system, output or on_root(comm, lambda: free_directory(Path("results") / name)), log, resume=resume)
     begin = time.perf_counter()
-    last: Block | None = None
-    stop, failure = "all half-cycles done", None
-    extremes = {"largest_equilibrium_error": 0.0}
+    failure: Exception | None = None
+    stop = "all half-cycles done"
     try:
-        for last in _with_progress(_half_cycles(system), case.run.half_cycles, comm):
-            extremes["largest_equilibrium_error"] = max(
-                extremes["largest_equilibrium_error"], float(last.equilibrium_error.max())
-            )
-            if last.heat is not None:
-                error = float(last.heat.balance_error.max())
-                extremes["largest_heat_balance_error"] = max(extremes.get("largest_heat_balance_error", 0.0), error)
-            if writer is not None:
-                writer.add(last)
-    except ConvergenceError as error:
-        done = 0 if last is None else int(last.half_cycle[-1])
-        stop = str(error)
-        failure = ConvergenceError(f"{stop}\nthe results up to half-cycle {done} are in {directory}")
-    seconds = time.perf_counter() - begin
-    if writer is not None:
-        writer.close()
-    if last is None:
-        raise failure or ConvergenceError("no half-cycle was computed")
-    if failure is None and int(last.half_cycle[-1]) < case.run.half_cycles:
-        stop = "periodic" if last.periodicity[-1] < (case.run.periodic_within or 0) else stop
-    times = {"setup_seconds": setup, "half_cycles_seconds": seconds}
-    if last.heat is not None and len(last) >= len(system.motion.directions):
-        state = last.pressure[-len(system.motion.directions) :]
-        order = [int(np.flatnonzero(last.direction[-len(state) :] == d)[0]) for d in system.motion.directions]
-        extremes["growth_rate_per_s"] = growth_rate(system, state[order])
-    summary = summarise(system, last, extremes, {"stop": stop, **times, "warnings": warnings})
-    on_root(comm, lambda: write_summary(directory, summary))
-    on_root(comm, lambda: draw_figures(directory, case.output.figures_at) and None)
+        run.march()
+    except (ConvergenceError, InterruptedRunError) as error:
+        stop, failure = str(error), error
+    times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
+    done = run.moment.half_cycle
+    if failure is None and done < case.run.half_cycles:
+        stop = "periodic"
+    summary = run.finish({"stop": stop, **times, "warnings": run.warnings})
     if failure is not None:
-        raise failure
-    return summary, directory
+        again = ", to go on: --resume" if isinstance(failure, InterruptedRunError) else ""
+        message = f"{failure}\nthe results up to half-cycle {done} are in {run.directory}{again}"
+        raise type(failure)(message) from failure
+    return summary, run.directory
 
 
-def _half_cycles(system: System) -> Iterator[Block]:
-    run = system.case.run
-    if run.integration == "jump":
-        return jump(system, run.half_cycles, tolerance=run.jump_tolerance, periodic_within=run.periodic_within)
-    return march(system, run.half_cycles, implicit=run.integration == "implicit", periodic_within=run.periodic_within)
+class _Run:
+    """A run in its folder: takes the blocks, keeps history and checkpoints."""
+
+    def __init__(self, system: System, directory: Path, log: Log, *, resume: bool) -> None:
+        self.system, self.directory, self.log = system, directory, log
+        self.comm, self.case = system.comm, system.case
+        jumps = self.case.run.integration == "jump"
+        self.exchange = system.reduced_exchange if jumps else system.exchange
+        start: Moment | None = None
+        if resume:
+            start = checkpoint.load(directory, system, self.exchange)
+            if start.half_cycle >= self.case.run.half_cycles:
+                message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
+                raise CaseError(Problem("run.half_cycles", message))
+        else:
+            on_root(self.comm, lambda: make_directory(directory))
+        on_root(self.comm, lambda: write_case(directory, self.case))
+        self.start = start
+        self.moment = start or Moment(0, system.facing.initial_gap, (), None)
+        self.last: Block | None = None
+        self.extremes = {"largest_equilibrium_error": 0.0}
+        self.warnings = _warnings(system)
+        for warning in self.warnings:
+            log(f"warning: {warning}")
+        after = None if start is None else start.half_cycle
+        self.writer = HistoryWriter(directory, system, after) if self.comm.rank == 0 else None
+        self._fields_at = frozenset(self.case.output.fields_at or ())
+        self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
+
+    def march(self) -> None:
+        """Compute all half-cycles; collective."""
+        with _Signals() as signals:
+            for block in _with_progress(self._blocks(), self.case.run.half_cycles, self.moment.half_cycle, self.comm):
+                self._take(block)
+                wishes = signals.received or (time.monotonic() > self._checkpoint_due)
+                interrupted, due = self.comm.allreduce(np.array([bool(signals.received), bool(wishes)], dtype=int)) > 0
+                if due:
+                    self._save()
+                if interrupted:
+                    raise InterruptedRunError(f"interrupted after half-cycle {self.moment.half_cycle}")
+
+    def _blocks(self) -> Iterator[Block]:
+        run = self.case.run
+        if run.integration == "jump":
+            return jump(
+                self.system,
+                run.half_cycles,
+                tolerance=run.jump_tolerance,
+                periodic_within=run.periodic_within,
+                start=self.start,
+                stops=self._fields_at,
+            )
+        return march(
+            self.system,
+            run.half_cycles,
+            implicit=run.integration == "implicit",
+            periodic_within=run.periodic_within,
+            start=self.start,
+            stops=self._fields_at,
+        )
+
+    def _take(self, block: Block) -> None:
+        self.last, self.moment = block, block.end
+        self._note("largest_equilibrium_error", block.equilibrium_error)
+        if block.heat is not None:
+            self._note("largest_heat_balance_error", block.heat.balance_error)
+        if self.writer is not None:
+            self.writer.add(block)
+        if int(block.half_cycle[-1]) in self._fields_at:
+            self._write_fields(block)
+
+    def _note(self, name: str, values: Any) -> None:
+        self.extremes[name] = max(self.extremes.get(name, 0.0), float(values.max()))
+
+    def _write_fields(self, block: Block) -> None:
+        temperature = block.end.temperature
+        temperatures = None
+        if self.exchange is not None and temperature is not None:
+            temperatures = self.exchange.temperatures(temperature)
+        direction = int(block.direction[-1])
+        fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], direction, temperatures)
+        write_fields(self.directory, self.system, int(block.half_cycle[-1]), fields, direction)
+
+    def _save(self) -> None:
+        """Write history and checkpoint, in this order: the history reaches as far or farther."""
+        if self.writer is not None:
+            self.writer.flush()
+        checkpoint.save(self.directory, self.system, self.exchange, self.moment)
+        self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
+
+    def finish(self, how: dict[str, Any]) -> dict[str, Any]:
+        """Write what a run ends with, and return the summary; collective."""
+        if self.writer is not None:
+            self.writer.close()
+        if self.last is None:
+            return {}
+        if self.moment.half_cycle not in self._fields_at and self.case.output.fields_at is None:
+            self._write_fields(self.last)
+        if self.moment.half_cycle > 0:
+            self._save()
+        phases = len(self.system.motion.directions)
+        if self.last.heat is not None and all(contact is not None for contact in self.moment.contacts):
+            pressure = np.concatenate([c.pressure for c in self.moment.contacts if c is not None])
+            if len(pressure) == phases:
+                self.extremes["growth_rate_per_s"] = growth_rate(self.system, pressure)
+        summary = summarise(self.system, self.last, self.extremes, how)
+        on_root(self.comm, lambda: write_summary(self.directory, summary))
+        on_root(self.comm, lambda: draw_figures(self.directory, self.case.output.figures_at) and None)
+        return summary
+
+
+class _Signals:
+    """Notes SIGINT and SIGTERM instead of dying at once."""
+
+    def __enter__(self) -> _Signals:
+        self.received = 0
+        self._before = {s: signal.signal(s, self._note) for s in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def _note(self, number: int, _frame: FrameType | None) -> None:
+        if self.received:  # asked twice: now
+            raise KeyboardInterrupt
+        self.received = number
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
 
 def _warnings(system: System) -> list[str]:
@@ -108,10 +221,10 @@ def _warnings(system: System) -> list[str]:
     ]
 
 
-def _with_progress(blocks: Iterator[Block], half_cycles: int, comm: MPI.Comm) -> Iterator[Block]:
+def _with_progress(blocks: Iterator[Block], half_cycles: int, done: int, comm: MPI.Comm) -> Iterator[Block]:
     """Pass the blocks on, with a progress bar on rank 0 where standard error is a terminal."""
     quiet = comm.rank != 0 or not sys.stderr.isatty()
-    with tqdm(total=half_cycles, unit=" half-cycles", disable=quiet) as bar:
+    with tqdm(total=half_cycles, initial=done, unit=" half-cycles", disable=quiet) as bar:
         for block in blocks:
             bar.update(int(block.half_cycle[-1]) - bar.n)
             hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"

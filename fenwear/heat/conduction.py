@@ -178,6 +178,13 @@ class HeatBody:
             message = f"the {self.body.name} loses heat nowhere: expected convection or a held temperature"
             raise CaseError(Problem("heat.convection", message))
 
+    def function(self, theta: Array) -> fem.Function:
+        """Return the temperature of the owned degrees of freedom as a function; collective."""
+        function = fem.Function(self.space, name="temperature")
+        function.x.array[: self.owned] = theta
+        function.x.scatter_forward()
+        return function
+
     def initial(self) -> Array:
         """Return the initial temperature of the owned degrees of freedom."""
         theta = np.full(self.owned, self.heat.initial)

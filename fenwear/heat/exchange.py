@@ -107,6 +107,14 @@ class HeatExchange:
         """Return the initial state."""
         return self.sides[0].field.initial(), self.sides[1].field.initial()
 
+    def temperatures(self, state: State) -> State:
+        """Return the temperature of the owned nodes of both bodies, K."""
+        return self.sides[0].field.temperature(state[0]), self.sides[1].field.temperature(state[1])
+
+    def state(self, temperatures: State) -> State:
+        """Return the state of these temperatures; collective."""
+        return self.sides[0].field.state(temperatures[0]), self.sides[1].field.state(temperatures[1])
+
     def gap(self, state: State) -> Array:
         """Return the gap that thermal expansion opens (n,), mm."""
         return self.sides[0].gap(state[0]) + self.sides[1].gap(state[1])

@@ -47,6 +47,9 @@ class Field(Protocol):
     def temperature(self, state: Array) -> Array:
         """Return the temperature of the owned degrees of freedom (owned,), K."""
 
+    def state(self, temperature: Array) -> Array:
+        """Return the state of a temperature (owned,), or the nearest there is."""
+
 
 class FullField:
     """The temperature of all nodes, distributed over the ranks; all calls are collective."""
@@ -86,6 +89,10 @@ class FullField:
         """Return the state itself."""
         return state
 
+    def state(self, temperature: Array) -> Array:
+        """Return the temperature itself."""
+        return temperature
+
 
 class ReducedField:
     """Galerkin projection theta = lift + V a onto a basis V, the same state a on every rank."""
@@ -118,7 +125,7 @@ class ReducedField:
 
     def initial(self) -> Array:
         """Return the projection of the initial temperature; collective."""
-        return self._sum(self.basis.T @ self.body.store(self.body.initial() - self.lift))
+        return self.state(self.body.initial())
 
     def advance(self, step: int, state: Array) -> Array:
         """Apply the dense step."""
@@ -141,3 +148,7 @@ class ReducedField:
     def temperature(self, state: Array) -> Array:
         """Return lift + V a."""
         return self.lift + self.basis @ state
+
+    def state(self, temperature: Array) -> Array:
+        """Return the projection in the norm of the heat capacity; collective."""
+        return self._sum(self.basis.T @ self.body.store(temperature - self.lift))

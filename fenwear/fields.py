@@ -1,0 +1,247 @@
+"""Fields in both bodies at chosen half-cycles: displacement, stress, temperature, heat flux.
+
+The condensed interface knows the contact alone; here the whole bodies are solved once more,
+K u = f + C p + G (theta - theta_0), and written for ParaView (VTX, in parallel) and, as plain
+NetCDF on the nodes, for fenwear's own pictures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import basix.ufl
+import dolfinx
+import numpy as np
+import scipy.spatial
+import ufl
+import xarray
+from dolfinx import fem
+
+from fenwear.compat import interpolation_points
+from fenwear.elasticity import ElasticBody, strain, stress
+from fenwear.heat.conduction import HeatBody
+from fenwear.inequality import Array
+from fenwear.surface import SurfaceNodes
+from fenwear.system import System
+
+FOLDER = "fields"
+AXES = ("x", "z")
+
+
+@dataclass(frozen=True)
+class BodyFields:
+    """The fields of one body: functions on its nodes.
+
+    Attributes:
+        displacement: mm.
+        von_mises: Equivalent stress, MPa.
+        temperature: K; None without heat.
+        heat_flux: -k grad theta, mW/mm²; None without heat.
+    """
+
+    displacement: fem.Function
+    von_mises: fem.Function
+    temperature: fem.Function | None
+    heat_flux: fem.Function | None
+
+
+def body_fields(
+    system: System, pressure: Array, rigid: Array, direction: int, temperatures: tuple[Array, Array] | None
+) -> tuple[BodyFields, BodyFields]:
+    """Return the fields of the punch and the strip; collective.
+
+    Args:
+        system: The assembled problem.
+        pressure: Contact pressure (n,), MPa.
+        rigid: Amplitudes of the rigid modes (modes,).
+        direction: Sliding direction d.
+        temperatures: Of each body's owned nodes, K.
+    """
+    facing, slip = system.facing, direction * system.case.contact.friction
+    on_punch = facing.weights * pressure
+    loads = (on_punch, -(facing.transfer.T @ on_punch))
+    count = len(system.punch.rigid_modes)
+    amplitudes = (rigid[:count], rigid[count:])
+    heat_bodies = system.heat_bodies or (None, None)
+    punch, strip = (
+        _solve(system, elastic, nodes, load, slip, modes, heat, None if temperatures is None else temperatures[k])
+        for k, (elastic, nodes, load, modes, heat) in enumerate(
+            zip(
+                (system.punch, system.strip),
+                (facing.punch, facing.strip),
+                loads,
+                amplitudes,
+                heat_bodies,
+                strict=True,
+            )
+        )
+    )
+    return punch, strip
+
+
+def _solve(
+    system: System,
+    elastic: ElasticBody,
+    nodes: SurfaceNodes,
+    load: Array,
+    slip: float,
+    rigid: Array,
+    heat: HeatBody | None,
+    temperature: Array | None,
+) -> BodyFields:
+    """Return one body's fields under nodal contact loads (n,), N/mm along e_n; collective."""
+    force = elastic.load.copy()
+    vectors = load[:, None] * (nodes.normal + slip * nodes.tangent)
+    start, stop = elastic.space.dofmap.index_map.local_range
+    own = (nodes.block >= start) & (nodes.block < stop)
+    rows = 2 * (nodes.block[own, None] - start) + np.arange(2)
+    force.array[rows.ravel()] += vectors[own].ravel()
+    force.array[elastic.supported] = 0.0
+    theta = None
+    if heat is not None and temperature is not None:
+        theta = heat.function(temperature)
+        change = heat.function(temperature - heat.heat.initial)
+        elastic.thermal_coupling(heat.space, system.case.materials).multAdd(change.x.petsc_vec, force, force)
+    solution = force.duplicate()
+    elastic.factor.solve(force, solution)
+    displacement = fem.Function(elastic.space, name="displacement")
+    owned = 2 * elastic.space.dofmap.index_map.size_local
+    displacement.x.array[:owned] = solution.array_r
+    for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
+        displacement.x.array[:owned] += amplitude * mode
+    displacement.x.scatter_forward()
+    von_mises = _interpolated(_von_mises(system, elastic, displacement, theta), elastic, "von_mises", ())
+    flux = None
+    if heat is not None and theta is not None:
+        flux = _interpolated(-heat.conductivity * ufl.grad(theta), elastic, "heat_flux", (2,))
+    return BodyFields(displacement, von_mises, theta, flux)
+
+
+def _von_mises(system: System, elastic: ElasticBody, displacement: Any, theta: Any) -> Any:
+    """Return sqrt(3/2 s : s) with the stress out of plane: zero in plane stress, in plane strain from eps_yy = 0."""
+    sigma = stress(displacement, *elastic.lame)
+    plane_stress = system.case.model.plane == "stress"
+    thermal: Any = 0.0
+    if theta is not None and system.case.heat is not None:
+        thermal = elastic.thermal_modulus(system.case.materials) * (theta - system.case.heat.initial)
+        sigma = sigma - thermal * ufl.Identity(2)
+    out = 0.0 if plane_stress else elastic.lame[0] * ufl.tr(strain(displacement)) - thermal
+    xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
+    return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * xz**2)
+
+
+def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple[int, ...]) -> fem.Function:
+    """Return the expression on the body's nodes, averaged between the elements that share one."""
+    mesh, degree = elastic.body.mesh, elastic.space.ufl_element().degree
+    broken = fem.functionspace(mesh, basix.ufl.element("DG", mesh.basix_cell(), degree, shape=shape))
+    values = fem.Function(broken)
+    values.interpolate(fem.Expression(expression, interpolation_points(broken)))
+    smooth = fem.functionspace(mesh, basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=shape))
+    sums, counts = fem.Function(smooth, name=name), fem.Function(smooth)
+    size = smooth.dofmap.bs
+    cells = mesh.topology.index_map(2).size_local
+    to = smooth.dofmap.list[:cells].ravel()
+    from_ = broken.dofmap.list[:cells].ravel()
+    for component in range(size):
+        np.add.at(sums.x.array, to * size + component, values.x.array[from_ * size + component])
+        np.add.at(counts.x.array, to * size + component, 1.0)
+    for function in (sums, counts):
+        function.x.scatter_reverse(dolfinx.la.InsertMode.add)
+    sums.x.array[:] /= np.maximum(counts.x.array, 1.0)
+    sums.x.scatter_forward()
+    return sums
+
+
+def write_fields(
+    directory: Path,
+    system: System,
+    half_cycle: int,
+    fields: tuple[BodyFields, BodyFields],
+    direction: int,
+) -> None:
+    """Write the fields of a half-cycle into `directory`/fields; collective."""
+    comm = system.comm
+    folder = directory / FOLDER
+    if comm.rank == 0:
+        folder.mkdir(exist_ok=True)
+    comm.Barrier()
+    stem = f"half_cycle_{half_cycle:06d}"
+    data: dict[str, Any] = {}
+    for elastic, body in zip((system.punch, system.strip), fields, strict=True):
+        name = elastic.body.name
+        functions = [f for f in (body.displacement, body.von_mises, body.temperature, body.heat_flux) if f is not None]
+        _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
+        data.update(_gathered(name, elastic, functions))
+    if comm.rank == 0:
+        attributes = {"half_cycle": half_cycle, "direction": direction, "time": half_cycle * system.motion.duration}
+        dataset = xarray.Dataset(data, attrs=attributes)
+        part = folder / f"{stem}.part"
+        dataset.to_netcdf(part, engine="h5netcdf")
+        part.replace(folder / f"{stem}.nc")
+
+
+def _write_for_paraview(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
+    comm = elastic.body.mesh.comm
+    if dolfinx.has_adios2:
+        with dolfinx.io.VTXWriter(comm, str(stem.with_suffix(".bp")), functions, engine="BP4") as writer:
+            writer.write(0.0)
+        return
+    with dolfinx.io.XDMFFile(comm, str(stem.with_suffix(".xdmf")), "w") as file:
+        file.write_mesh(elastic.body.mesh)
+        for function in functions:  # XDMF knows vertices only
+            element = basix.ufl.element("Lagrange", elastic.body.mesh.basix_cell(), 1, shape=function.ufl_shape)
+            linear = fem.Function(fem.functionspace(elastic.body.mesh, element), name=function.name)
+            linear.interpolate(function)
+            file.write_function(linear)
+
+
+def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) -> dict[str, Any]:
+    """Return a body's nodes, cells and nodal values as variables of a dataset, on rank 0; collective."""
+    units = {"displacement": "mm", "von_mises": "MPa", "temperature": "K", "heat_flux": "mW/mm2"}
+    comm, space = elastic.body.mesh.comm, elastic.space
+    index_map, degree = space.dofmap.index_map, space.ufl_element().degree
+    cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(2).size_local]
+    corners = _subcells(space)
+    linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, 4)
+    x = space.tabulate_dof_coordinates()[: index_map.size_local, :2]
+    parts = comm.gather((x, linear))
+    gathered = [(f.name, comm.gather(_on_nodes(f, elastic).reshape(index_map.size_local, -1))) for f in functions]
+    if comm.rank != 0:
+        return {}
+    point, cell = f"{name}_point", f"{name}_cell"
+    points = np.concatenate([p[0] for p in parts])
+    data: dict[str, Any] = {f"{name}_{a}": (point, points[:, k], {"units": "mm"}) for k, a in enumerate(AXES)}
+    data[f"{name}_cells"] = ((cell, "corner"), np.concatenate([p[1] for p in parts]), {"degree": degree})
+    for field, values in gathered:
+        joined = np.concatenate(values)
+        names = [field] if joined.shape[1] == 1 else [f"{field}_{a}" for a in AXES]
+        for k, component in enumerate(names):
+            data[f"{name}_{component}"] = (point, joined[:, k], {"units": units[field]})
+    return data
+
+
+def _on_nodes(function: fem.Function, elastic: ElasticBody) -> Array:
+    """Return the owned nodal values in the order of the displacement's nodes.
+
+    Spaces of the same mesh and degree may number their nodes differently: go by the cells.
+    """
+    space, size = elastic.space, function.function_space.dofmap.bs
+    index_map = space.dofmap.index_map
+    count = index_map.size_local + index_map.num_ghosts
+    values = np.zeros((count, size))
+    to, from_ = space.dofmap.list.ravel(), function.function_space.dofmap.list.ravel()
+    values[to] = function.x.array.reshape(-1, size)[from_]
+    return values[: index_map.size_local]
+
+
+def _subcells(space: fem.FunctionSpace) -> Array:
+    """Return the corners (count, 4) of the linear cells between the nodes of one element, around each."""
+    points = space.element.basix_element.points
+    degree = space.ufl_element().degree
+    if len(points) != (degree + 1) ** 2:  # triangles: the last corner twice
+        triangles = scipy.spatial.Delaunay(points).simplices
+        return np.hstack([triangles, triangles[:, 2:]])
+    grid = np.lexsort((points[:, 0], points[:, 1])).reshape(degree + 1, degree + 1)
+    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)

@@ -117,14 +117,14 @@ class ThermalContact:
         relaxation, tolerance = (heat.relaxation, heat.split_tolerance) if heat else (1.0, 1e-4)
         contact, pressure, volume = start, start.pressure[0], np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
-            after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(pressure))
+            closed = np.where(contact.pressure[0] > 0, pressure, 0.0)  # relaxed pressures never get to zero
+            after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(closed))
             free = gap + exchange.gap(after)
             contact = self._contact.solve(free, contact, layer)
             before, volume = volume, self._volume(free)
             pressure = pressure + relaxation * (contact.pressure[0] - pressure)
             if abs(volume - before) < tolerance * volume:
-                relaxed = ContactState(pressure[None], contact.gap, contact.rigid, contact.iterations)
-                return relaxed, after, self._heat(after, terms, iteration)
+                return contact, after, self._heat(after, terms, iteration)
             if not np.isfinite(volume):
                 break
         raise ConvergenceError(

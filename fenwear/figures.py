@@ -1,7 +1,8 @@
-"""Pictures of a run, drawn from its folder alone."""
+"""Figures of a run, drawn from its folder alone."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,14 +10,23 @@ import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, Problem
-from fenwear.results import HISTORY
+from fenwear.results import HEAT_TERMS, HISTORY
+from fenwear.style import (
+    DIRECTIONS,
+    GREY,
+    contact_axis,
+    legend_beside,
+    panels,
+    reference_line,
+    run_style,
+    shades,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-DIRECTIONS = {1: ("rightward", "-"), -1: ("leftward", "--")}
-WIDTH = 7.0  # inches
+FOLDER = "figures"
 
 
 def open_history(directory: Path) -> xarray.Dataset:
@@ -32,123 +42,230 @@ def open_history(directory: Path) -> xarray.Dataset:
         raise CaseError(Problem(str(path), f"no readable history of a run: {error}")) from None
 
 
-def chosen_half_cycles(history: xarray.Dataset, wanted: tuple[int, ...] = ()) -> list[int]:
+def read_history(directory: Path) -> xarray.Dataset:
+    """Return the history of a run, in memory.
+
+    Raises:
+        CaseError: there is none, it cannot be read, or holds no half-cycle yet.
+    """
+    with open_history(directory) as history:
+        if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
+            raise CaseError(Problem(str(directory / HISTORY), "no history of a run: it has other variables"))
+        if history.sizes["half_cycle"] == 0:
+            raise CaseError(Problem(str(directory / HISTORY), "holds no half-cycle yet"))
+        return history.load()
+
+
+def chosen_half_cycles(history: xarray.Dataset, wanted: Sequence[int] = ()) -> list[int]:
     """Return the recorded half-cycles nearest to the wanted ones, or six spread over the run."""
     recorded = history.half_cycle.values
     if not wanted:
-        spread = np.unique(np.geomspace(1, recorded[-1], 6).round().astype(int))
-        wanted = tuple(int(n) for n in spread)
+        wanted = [int(n) for n in np.unique(np.geomspace(1, recorded[-1], 6).round().astype(int))]
     return sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in wanted})
 
 
-def pressure_figure(history: xarray.Dataset, half_cycles: list[int]) -> Figure:
+def mean_pressure(history: xarray.Dataset) -> float:
+    """Return the load over the nominal contact, MPa."""
+    return float((history.pressure.isel(half_cycle=-1) * history.weight).sum() / history.weight.sum())
+
+
+def directions_present(history: xarray.Dataset) -> list[int]:
+    """Return the sliding directions of a run, rightward first."""
+    return [d for d in DIRECTIONS if bool((history.direction == d).any())]
+
+
+def cycle_means(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[int, xarray.DataArray]:
+    """Return (p+ + p-)/2 of the cycles that the half-cycles belong to, by the cycle's number."""
+    recorded = set(history.half_cycle.values.tolist())
+    cycles = sorted({(n + 1) // 2 for n in half_cycles})
+    pairs = {c: [2 * c - 1, 2 * c] for c in cycles if {2 * c - 1, 2 * c} <= recorded}
+    return {c: history.pressure.sel(half_cycle=pair).mean("half_cycle") for c, pair in pairs.items()}
+
+
+def pressure_top(history: xarray.Dataset, half_cycles: Sequence[int]) -> float:
+    """Return the upper end of an axis of pressure: the edges of a fresh flat punch peak far beyond all that follows."""
+    late = float(history.pressure.sel(half_cycle=list(half_cycles[len(half_cycles) // 2 :])).max())
+    return 1.15 * max(late, float(history.pressure.median("half_cycle").max()))
+
+
+def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
     """Draw the pressure in both directions, at each chosen half-cycle and the one beside it."""
-    present = [d for d in (1, -1) if (history.direction == d).any()]
-    figure, axes = _panels(len(present), 3.2)
+    present = directions_present(history)
+    figure, axes = panels(len(present), 3.2, share_y=True)
+    mean, top = mean_pressure(history), pressure_top(history, half_cycles)
     for ax, d in zip(axes, present, strict=True):
         one_way = history.isel(half_cycle=np.flatnonzero(history.direction.values == d))
-        recorded = one_way.half_cycle.values
-        nearest = sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in half_cycles})
-        for colour, n in _coloured(nearest):
+        for colour, n in shades(chosen_half_cycles(one_way, half_cycles)):
             ax.plot(history.x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
-        ax.set_title(f"strip moves {DIRECTIONS[d][0]}", loc="left")
+        arrow = "→" if d > 0 else "←"
+        ax.set_title(f"Contact pressure while the strip moves {DIRECTIONS[d][0]} {arrow}", loc="left")
         ax.set_ylabel("contact pressure p (MPa)")
-        ax.legend(title="half-cycle", loc="center left", bbox_to_anchor=(1.0, 0.5))
-    # The edges of a fresh flat punch peak beyond all that follows.
-    top = float(history.pressure.sel(half_cycle=half_cycles[len(half_cycles) // 2 :]).max())
-    first = float(history.pressure.median("half_cycle").max())
-    axes[0].set_ylim(0, 1.15 * max(top, first))
-    _contact_axis(axes[-1])
+        ax.set_ylim(0, top)
+        reference_line(ax, mean, f"mean {mean:.2f}")
+        highest = float(one_way.pressure.sel(half_cycle=chosen_half_cycles(one_way, half_cycles)).max())
+        if highest > top:
+            ax.annotate(f"cut off: the first peaks reach {highest:.0f} MPa", (0.5, 1), xycoords="axes fraction",
+                        ha="center", va="top", color=GREY, fontsize="small")  # fmt: skip
+        legend_beside(ax, "half-cycle")
+    contact_axis(axes[-1])
     return figure
 
 
-def shape_figure(history: xarray.Dataset, half_cycles: list[int]) -> Figure:
-    """Draw the worn punch: the depth worn off, downwards, at the chosen half-cycles."""
-    figure, (ax,) = _panels(1, 3.6)
-    for colour, n in _coloured(half_cycles):
+def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+    """Draw the mean of the pressures in the two directions of a cycle, with the mean over the contact."""
+    figure, (ax,) = panels(1, 3.6)
+    means = cycle_means(history, half_cycles)
+    mean = mean_pressure(history)
+    for colour, c in shades(list(means)):
+        ax.plot(history.x, means[c], color=colour, label=f"{c:,}")
+    late = list(means)[len(means) // 2 :]
+    top = 1.15 * max([float(means[c].max()) for c in late] + [2 * mean])
+    ax.set_ylim(0, top)
+    reference_line(ax, mean, f"mean {mean:.2f}")
+    ax.set_title("Mean of the pressures in the two directions of a cycle", loc="left")
+    ax.set_ylabel("(p⁺ + p⁻) / 2 (MPa)")
+    legend_beside(ax, "cycle")
+    contact_axis(ax)
+    return figure
+
+
+def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+    """Draw the worn punch at the chosen half-cycles."""
+    figure, (ax,) = panels(1, 3.6)
+    for colour, n in shades(half_cycles):
         ax.plot(history.x, 1e3 * history.wear.sel(half_cycle=n), color=colour, label=f"{n:,}")
-    ax.set_title("the punch's lower surface, worn upwards from w = 0", loc="left")
+    ax.set_title("Worn shape: the punch's lower surface above its flat start, w = 0", loc="left")
     ax.set_ylabel("worn depth w (µm)")
     ax.set_ylim(bottom=0)
-    ax.legend(title="after half-cycle", loc="center left", bbox_to_anchor=(1.0, 0.5))
-    _contact_axis(ax)
+    legend_beside(ax, "after half-cycle")
+    contact_axis(ax)
     return figure
 
 
 def peak_figure(history: xarray.Dataset) -> Figure:
-    """Draw the largest pressure over the half-cycles, with the mean and twice the mean."""
-    figure, (ax,) = _panels(1, 3.6)
-    for (d, (name, style)), colour in zip(DIRECTIONS.items(), ("#0072B2", "#D55E00"), strict=True):
-        rows = history.direction.values == d
-        if rows.any():
-            ax.plot(history.half_cycle[rows], history.max_pressure[rows], style, color=colour, label=name)
-    mean = float((history.pressure.isel(half_cycle=-1) * history.weight).sum() / history.weight.sum())
-    for factor, name in ((1, "mean pressure"), (2, "twice the mean")):
-        ax.axhline(factor * mean, color="0.5", linewidth=0.8, linestyle=":")
-        ax.annotate(f"{name}, {factor * mean:.2f} MPa", (0, factor * mean), xycoords=("axes fraction", "data"),
-                    xytext=(4, 3), textcoords="offset points", color="0.35", fontsize="small")  # fmt: skip
-    ax.set_xscale("log")
-    ax.set_ylim(bottom=0)
-    ax.set_xlabel("half-cycle n")
-    ax.set_ylabel("largest contact pressure (MPa)")
-    ax.legend(title="strip moves")
+    """Draw over the half-cycles: largest pressure, width in contact and, with heat, largest temperature."""
+    hot = "max_temperature" in history
+    figure, axes = panels(3 if hot else 2, 2.5)
+    over = {
+        "max_pressure": ("Largest contact pressure", "pressure (MPa)"),
+        "contact_width": ("Width in contact", "width (mm)"),
+        "max_temperature": ("Largest temperature of the contact surfaces, at the end of each half-cycle",
+                            "temperature (K)"),
+    }  # fmt: skip
+    for ax, (name, (title, label)) in zip(axes, over.items(), strict=False):
+        _by_direction(ax, history, name)
+        ax.set_title(title, loc="left")
+        ax.set_ylabel(label)
+    mean = mean_pressure(history)
+    reference_line(axes[0], mean, f"mean {mean:.2f}")
+    reference_line(axes[0], 2 * mean, f"twice the mean {2 * mean:.2f}")
+    nominal = float(history.weight.sum())
+    reference_line(axes[1], nominal, f"nominal width {nominal:g}")
+    for ax in axes[:2]:
+        ax.set_ylim(bottom=0)
+    axes[1].set_ylim(top=1.15 * nominal)
+    axes[0].legend(title="strip moves", frameon=False)
+    _half_cycle_axis(axes[-1], history)
     return figure
 
 
-def temperature_figure(history: xarray.Dataset, half_cycles: list[int]) -> Figure:
-    """Draw the temperature along the contact at the chosen half-cycles, and its largest value over all."""
-    figure, (along, over) = _panels(2, 3.2, share=False)
-    for colour, n in _coloured(half_cycles):
-        along.plot(history.x, history.temperature_punch.sel(half_cycle=n), color=colour, label=f"{n:,}")
-        along.plot(history.x, history.temperature_strip.sel(half_cycle=n), "--", color=colour)
-    along.set_title("contact surfaces: punch solid, strip dashed", loc="left")
-    along.set_ylabel("temperature (K)")
-    along.legend(title="after half-cycle", loc="center left", bbox_to_anchor=(1.0, 0.5))
-    _contact_axis(along)
-    over.plot(history.half_cycle, history.max_temperature, color="#D55E00")
-    over.set_xlabel("half-cycle n")
-    over.set_ylabel("largest temperature (K)")
+def convergence_figure(history: xarray.Dataset) -> Figure:
+    """Draw over the half-cycles: the change against one cycle ago and the distance to the optimal pressure."""
+    figure, axes = panels(2, 2.7)
+    over = {
+        "periodicity": "Periodicity: largest change of pressure against one cycle ago",
+        "optimum_distance": "Distance to the optimum: largest difference to the optimal pressure",
+    }
+    for ax, (name, title) in zip(axes, over.items(), strict=True):
+        _by_direction(ax, history, name)
+        ax.set_title(title, loc="left")
+        ax.set_ylabel("over mean pressure (-)")
+    axes[0].set_yscale("log")
+    axes[1].set_ylim(bottom=0)
+    axes[0].legend(title="strip moves", frameon=False)
+    _half_cycle_axis(axes[-1], history)
     return figure
 
 
-def draw_figures(directory: Path, half_cycles: tuple[int, ...] = ()) -> list[Path]:
+def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+    """Draw the temperature along both contact surfaces at the chosen half-cycles."""
+    figure, axes = panels(2, 3.0)
+    for ax, body in zip(axes, ("punch", "strip"), strict=True):
+        for colour, n in shades(half_cycles):
+            ax.plot(history.x, history[f"temperature_{body}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
+        ax.set_title(f"Temperature of the {body}'s contact surface", loc="left")
+        ax.set_ylabel("temperature (K)")
+        legend_beside(ax, "after half-cycle")
+    contact_axis(axes[-1])
+    return figure
+
+
+def heat_balance_figure(history: xarray.Dataset) -> Figure:
+    """Draw where the friction heat of each half-cycle goes."""
+    figure, (ax,) = panels(1, 3.8)
+    friction = history.heat_friction
+    ax.plot(history.half_cycle, friction, color="0", linewidth=2.5, label="made by friction")
+    names = {
+        "convected": "lost to the surroundings",
+        "held": "lost where temperature is held",
+        "stored": "gained by both bodies",
+        "debris": "carried off by debris",
+        "carried": "carried out by the strip",
+    }
+    assert names.keys() == HEAT_TERMS.keys() - {"friction"}
+    threshold = 1e-6 * float(np.abs(friction).max())
+    for number, (name, text) in enumerate(names.items()):
+        values = history[f"heat_{name}"]
+        if float(np.abs(values).max()) > threshold:
+            ax.plot(history.half_cycle, values, label=text, **run_style(number))
+        else:
+            ax.plot([], [], " ", label=f"{text}: none")
+    ax.set_title("Heat of each half-cycle: what friction makes is the sum of the others", loc="left")
+    ax.set_ylabel("heat per half-cycle (mJ)")
+    legend_beside(ax, "")
+    _half_cycle_axis(ax, history)
+    return figure
+
+
+def all_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str, Figure]:
+    """Draw every figure that the history has data for, by its name."""
+    chosen = chosen_half_cycles(history, wanted)
+    drawn = {"shape": shape_figure(history, chosen), "pressure": pressure_figure(history, chosen)}
+    if cycle_means(history, chosen) and len(directions_present(history)) == 2:
+        drawn["mean_pressure"] = mean_pressure_figure(history, chosen)
+    drawn["peaks"] = peak_figure(history)
+    drawn["convergence"] = convergence_figure(history)
+    if "max_temperature" in history:
+        drawn["temperature"] = temperature_figure(history, chosen)
+        drawn["heat_balance"] = heat_balance_figure(history)
+    return drawn
+
+
+def draw_figures(directory: Path, half_cycles: Sequence[int] = ()) -> list[Path]:
     """Draw all figures of a run into its folder `figures`; return their paths."""
-    folder = directory / "figures"
+    folder = directory / FOLDER
+    drawn = all_figures(read_history(directory), half_cycles)
     folder.mkdir(exist_ok=True)
-    with open_history(directory) as history:
-        chosen = chosen_half_cycles(history, half_cycles)
-        drawn = {
-            "pressure": pressure_figure(history, chosen),
-            "shape": shape_figure(history, chosen),
-            "peak_pressure": peak_figure(history),
-        }
-        if "max_temperature" in history:
-            drawn["temperature"] = temperature_figure(history, chosen)
-    paths = []
-    for name, figure in drawn.items():
-        paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=150)
+    paths = [folder / f"{name}.png" for name in drawn]
+    for path, figure in zip(paths, drawn.values(), strict=True):
+        figure.savefig(path, dpi=150)
     return paths
 
 
-def _panels(count: int, height: float, *, share: bool = True) -> tuple[Figure, list[Axes]]:
-    """Return a figure of panels below each other, each as high as given, inches."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    with rc_context({"axes.spines.top": False, "axes.spines.right": False, "legend.frameon": False}):
-        figure = Figure(figsize=(WIDTH, height * count), layout="constrained")
-        return figure, list(figure.subplots(count, 1, sharex=share, sharey=share, squeeze=False)[:, 0])
-
-
-def _coloured(half_cycles: list[int]) -> list[tuple[Any, int]]:
-    """Return a colour for each half-cycle, dark to light: readable in print and to the colour-blind."""
-    from matplotlib import colormaps
-
-    shades = np.linspace(0.0, 0.85, max(len(half_cycles), 2))
-    return [(colormaps["viridis"](shade), n) for shade, n in zip(shades, half_cycles, strict=False)]
+def _by_direction(ax: Axes, history: xarray.Dataset, name: str) -> None:
+    """Draw a variable over the half-cycles, a line for each direction."""
+    for d in directions_present(history):
+        text, dashes, colour = DIRECTIONS[d]
+        rows = history.direction.values == d
+        few: dict[str, Any] = {"marker": "o", "markersize": 3} if rows.sum() < 3 else {}
+        ax.plot(history.half_cycle[rows], history[name][rows], dashes, color=colour, label=text, **few)
 
 
-def _contact_axis(ax: Axes) -> None:
-    ax.set_xlabel("position along the contact x (mm)")
-    ax.margins(x=0.01)
+def _half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
+    """Label the axis of half-cycles: logarithmic where wear alone slows down, linear with heat's own pace."""
+    first, last = int(history.half_cycle[0]), int(history.half_cycle[-1])
+    if last > 10_000 or "max_temperature" not in history:
+        ax.set_xscale("log")
+    if last > first:
+        ax.set_xlim(first, last)
+    ax.set_xlabel("half-cycle n")

@@ -21,6 +21,7 @@ from fenwear.inequality import Array
 from fenwear.system import System
 
 MAX_ITERATIONS = 200
+SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
 CLOSE = 1e-10  # change of pressure over the mean pressure that ends the implicit iterations
 
 
@@ -120,7 +121,10 @@ class ThermalContact:
             closed = np.where(contact.pressure[0] > 0, pressure, 0.0)  # relaxed pressures never get to zero
             after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(closed))
             free = gap + exchange.gap(after)
-            contact = self._contact.solve(free, contact, layer)
+            try:
+                contact = self._contact.solve(free, contact, layer)
+            except ConvergenceError as error:  # the heat of a pressure too far off opens all nodes
+                raise ConvergenceError(f"{error}; in iteration {iteration} of the split: {SPLIT_ADVICE}") from error
             before, volume = volume, self._volume(free)
             pressure = pressure + relaxation * (contact.pressure[0] - pressure)
             if abs(volume - before) < tolerance * volume:
@@ -128,8 +132,7 @@ class ThermalContact:
             if not np.isfinite(volume):
                 break
         raise ConvergenceError(
-            f"the operator split of heat and contact did not converge in {iteration} iterations; lower "
-            'heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
+            f"the operator split of heat and contact did not converge in {iteration} iterations: {SPLIT_ADVICE}"
         )
 
     def _volume(self, gap: Array) -> float:

@@ -40,6 +40,7 @@ def reduced_basis(
     scales = [duration * RATIO**k for k in range(SCALES)]
     scales += [np.inf] if body.loses_heat() else [scales[-1] * 100]
     snapshots: list[Array] = []
+    relaxed: list[Array] = []
     largest = 0.0
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
         for velocity in [mean, *(moving if k < FAST else [])]:
@@ -49,11 +50,18 @@ def reduced_basis(
             snapshots.append(fields)
             if np.isinf(scale):
                 lift = step.advance(np.zeros(body.owned))
+            else:
+                relaxed.append(step.advance_linear((body.initial() - lift)[:, None]))
     uniform = np.ones((body.owned, 1))  # carries the balance of energy
     start = (body.initial() - lift)[:, None]
-    exact = np.hstack([uniform, start]) if np.abs(start).max(initial=0.0) > 0 else uniform
+    warm = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0))) > 0
+    exact = np.hstack([uniform, start]) if warm else uniform
     exact[body.held] = 0.0
     exact = _orthonormal(body, exact, 1e-12)
+    if warm:  # how the initial temperature dies out
+        rest = np.hstack(relaxed)
+        rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
+        exact = _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 1e-12)
     rest = np.hstack(snapshots)
     rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
     return lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 1e-12)

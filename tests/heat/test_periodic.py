@@ -1,0 +1,80 @@
+"""Heat over whole cycles against the same half-cycles one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenwear import System
+from fenwear.cycle.jump import cycle_heat
+from fenwear.heat.exchange import State
+from fenwear.heat.periodic import CycleHeat
+from fenwear.inequality import Array
+
+COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
+WARM = ("heat.initial=-10", "heat.ambient=35", "strip.temperatures=[{on='strip_bottom', temperature=-30}]")
+
+
+@pytest.fixture(params=["reciprocating", "one-way"])
+def heat(request: pytest.FixtureRequest, assemble: Callable[..., System]) -> tuple[CycleHeat, Array, Array]:
+    """Return the maps of cycles, pressures of the phases with open nodes, and the conductances there."""
+    one_way = ("motion={kind='one-way', direction='leftward', speed=9.5, duration=3}",)
+    system = assemble("example1-heat", *COARSE, *WARM, *(one_way if request.param == "one-way" else ()))
+    cycles = cycle_heat(system)
+    assert cycles is not None
+    x = system.facing.x
+    pressure = np.array([np.maximum(17 + d * x, 0.0) for d in system.motion.directions])
+    return cycles, pressure, cycles.conductances(pressure)
+
+
+def follow(heat: CycleHeat, state: State, pressure: Array, conductances: Array) -> tuple[State, list[Array]]:
+    """Return the end of a cycle, half-cycle by half-cycle, and the thermal gap at the end of each."""
+    gaps = []
+    for phase in range(len(pressure)):
+        state, _ = heat.exchange.half_cycle(state, phase, pressure[phase], conductances[phase])
+        gaps.append(heat.exchange.gap(state))
+    return state, gaps
+
+
+@pytest.mark.mpi
+def test_infinitely_many_cycles_are_the_fixed_point(heat: tuple[CycleHeat, Array, Array]) -> None:
+    """A cycle from the periodic state ends where it began, with the thermal gaps of the jump on its way."""
+    cycles, pressure, conductances = heat
+    end = cycles.jump(cycles.initial(), np.inf, conductances)
+    state = end.state(pressure)
+    after, gaps = follow(cycles, cycles.parts(state), pressure, conductances)
+    np.testing.assert_allclose(np.concatenate(after), state, rtol=0, atol=1e-9 * np.abs(state).max())
+    linear = end.gap + np.einsum("ikjl,jl->ik", end.coupling, pressure)
+    np.testing.assert_allclose(linear, gaps, rtol=0, atol=1e-9 * np.abs(gaps).max())
+
+
+@pytest.mark.mpi
+def test_many_cycles_tend_to_the_periodic_state(heat: tuple[CycleHeat, Array, Array]) -> None:
+    """Cycle by cycle, from the initial temperature: the same end, found without any linear algebra."""
+    cycles, pressure, conductances = heat
+    state = cycles.parts(cycles.initial())
+    for _ in range(3000):
+        state, _ = follow(cycles, state, pressure, conductances)
+    periodic = cycles.parts(cycles.jump(cycles.initial(), np.inf, conductances).state(pressure))
+    surfaces = [np.array(cycles.exchange.contact_temperatures(s)) for s in (state, periodic)]
+    assert np.ptp(surfaces[1]) > 5
+    np.testing.assert_allclose(surfaces[0], surfaces[1], rtol=0, atol=0.01)
+
+
+@pytest.mark.mpi
+def test_a_jump_is_an_implicit_step(heat: tuple[CycleHeat, Array, Array]) -> None:
+    """N cycles at once: s1 = s0 + N (C s1 - s1), C the cycle that starts from s1; its gaps are of that cycle."""
+    cycles, pressure, conductances = heat
+    for count in (0.5, 1.0, 40.0):
+        start = cycles.initial()
+        end = cycles.jump(start, count, conductances)
+        state = end.state(pressure)
+        after, gaps = follow(cycles, cycles.parts(state), pressure, conductances)
+        change = count * (np.concatenate(after) - state)
+        np.testing.assert_allclose(state - start, change, rtol=0, atol=1e-8 * np.abs(state).max())
+        linear = end.gap + np.einsum("ikjl,jl->ik", end.coupling, pressure)
+        for one, other in zip(linear[:-1], gaps[:-1], strict=True):  # the last is of the end itself
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(gaps).max())
+        np.testing.assert_allclose(linear[-1], cycles.exchange.gap(cycles.parts(state)), rtol=1e-8, atol=1e-12)

@@ -6,17 +6,20 @@
 from fenwear.cycle.block import Block
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
+from fenwear.cycle.monotonic import Monotonic, monotonic
 from fenwear.cycle.stability import critical_speed, growth_rate, stability_number
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
 
 __all__ = [
     "Block",
+    "Monotonic",
     "Steady",
     "critical_speed",
     "cycles_to_reach",
     "growth_rate",
     "jump",
     "march",
+    "monotonic",
     "stability_number",
     "steady",
 ]

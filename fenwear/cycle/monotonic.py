@@ -1,0 +1,53 @@
+"""One-way sliding with heat: steady temperatures at the optimal pressure, and their mean for periodic motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.errors import CaseError, Problem
+from fenwear.inequality import Array
+from fenwear.system import System
+
+DIRECTIONS = (-1, 1)
+
+
+@dataclass(frozen=True)
+class Monotonic:
+    """Steady temperatures of one-way sliding at the mean speed of the motion, leftward and rightward.
+
+    Attributes:
+        pressure: Optimal pressure of each direction (2, n), MPa.
+        punch: Temperature of the punch's contact surface (2, n), K.
+        strip: Of the strip's (2, n), K.
+    """
+
+    pressure: Array
+    punch: Array
+    strip: Array
+
+    @property
+    def periodic_punch(self) -> Array:
+        """The punch under periodic motion as the paper combines it: each direction heats half of the time (n,), K."""
+        return self.punch.mean(axis=0)
+
+
+def monotonic(system: System) -> Monotonic:
+    """Return the steady temperatures at the optimal pressures; collective.
+
+    Raises:
+        CaseError: the case has no heat, or a body loses heat nowhere.
+    """
+    if system.case.heat is None:
+        raise CaseError(Problem("heat", "missing, but required here"))
+    speed = float(system.motion.mean_speeds(1)[0])
+    exchange = system.steady_exchange([d * speed for d in DIRECTIONS])
+    pressures = [system.optimum(d).pressure for d in DIRECTIONS]
+    punch, strip = [], []
+    for phase, pressure in enumerate(pressures):
+        state, _ = exchange.half_cycle(exchange.initial(), phase, pressure, exchange.conductance(pressure))
+        temperatures = exchange.contact_temperatures(state)
+        punch.append(temperatures[0])
+        strip.append(temperatures[1])
+    return Monotonic(np.array(pressures), np.array(punch), np.array(strip))

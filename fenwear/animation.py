@@ -10,14 +10,12 @@ import numpy as np
 import xarray
 
 from fenwear.figures import FOLDER, directions_present, mean_pressure, pressure_top, read_history
-from fenwear.style import DIRECTIONS, contact_axis, panels, reference_line
+from fenwear.style import DIRECTIONS, contact_axis, panels, reference_line, save_gif
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FRAMES = 40
-MILLISECONDS = 150
-HOLD = 2000  # on the last frame
 
 
 def frames_of(history: xarray.Dataset, count: int = FRAMES) -> list[int]:
@@ -68,16 +66,14 @@ class HistoryFrames:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from PIL import Image
 
-        canvas = FigureCanvasAgg(self.figure)
+        canvas: Any = FigureCanvasAgg(self.figure)
         canvas.draw()
         self.figure.set_layout_engine("none")  # arranged once: frames must not jiggle, and it is slow
-        return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").quantize(64)
-
-
-def save_gif(images: Sequence[Any], path: Path, milliseconds: int = MILLISECONDS) -> None:
-    """Write pictures as an endless GIF that rests on the last one."""
-    durations = [milliseconds] * (len(images) - 1) + [HOLD]
-    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0, optimize=False)
+        return (
+            Image.fromarray(np.asarray(canvas.buffer_rgba()))
+            .convert("RGB")
+            .quantize(64, method=Image.Quantize.FASTOCTREE)
+        )
 
 
 def draw_animation(directory: Path) -> Path:

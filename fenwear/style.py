@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,3 +62,9 @@ def contact_axis(ax: Axes) -> None:
     ax.set_xlabel(ALONG_CONTACT)
     for shared in ax.get_shared_x_axes().get_siblings(ax):
         shared.margins(x=0.01)
+
+
+def save_gif(images: Sequence[Any], path: Path, milliseconds: int = 150) -> None:
+    """Write pictures as an endless GIF that rests on the last one."""
+    durations = [milliseconds] * (len(images) - 1) + [2000]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0, optimize=False)

@@ -101,7 +101,10 @@ class _Run:
         self.moment = start or Moment(0, system.facing.initial_gap, (), None)
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
-        self.warnings = _warnings(system)
+        self.warnings: list[str] = []
+        if self.case.run.integration == "explicit":
+            self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
+            self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
         for warning in self.warnings:
             log(f"warning: {warning}")
         after = None if start is None else start.half_cycle
@@ -209,10 +212,7 @@ class _Signals:
             signal.signal(number, handler)
 
 
-def _warnings(system: System) -> list[str]:
-    if system.case.run.integration != "explicit":
-        return []
-    number = stability_number(system)
+def _warnings(number: float) -> list[str]:
     if number <= 1:
         return []
     return [

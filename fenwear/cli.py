@@ -64,6 +64,8 @@ def run(
     case: CaseArgument = DEFAULT_CASE,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
     settings: SetOption = [],  # noqa: B006  (typer wants a list)
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -73,11 +75,15 @@ def run(
     loaded = _load(case, settings)
     if resume and output is None:
         raise CaseError(Problem("--resume", "expected the folder of the run to go on with, as -o DIR"))
-    summary, directory = run_case(loaded, Path(case).stem, output, log, resume=resume)
+    if quiet and verbose:
+        raise CaseError(Problem("--quiet", "given together with --verbose; expected one of them"))
+    say = (lambda _message: None) if quiet else log
+    progress = "none" if quiet else "lines" if verbose else "bar"
+    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
     if as_json:
         _print_json(summary)
     else:
-        log(f"results in {directory}")
+        say(f"results in {directory}")
 
 
 @app.command("steady")

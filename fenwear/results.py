@@ -25,6 +25,7 @@ SECONDS_BETWEEN_WRITES = 2.0
 # name: (dimensions, units, long_name); a Block has an attribute of each name
 VARIABLES = {
     "half_cycle": (("half_cycle",), "1", "number of the half-cycle"),
+    "time": (("half_cycle",), "s", "time at the end of the half-cycle"),
     "direction": (("half_cycle",), "1", "sliding direction of the strip: 1 rightward, -1 leftward"),
     "pressure": (("half_cycle", "x"), "MPa", "contact pressure during the half-cycle"),
     "gap": (("half_cycle", "x"), "mm", "gap between punch and strip during the half-cycle"),

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -26,6 +26,7 @@ from fenwear.results import HistoryWriter, free_directory, make_directory, summa
 from fenwear.system import System
 
 Log = Callable[[str], None]
+Progress = Literal["bar", "lines", "none"]
 
 
 def run_case(
@@ -35,6 +36,7 @@ def run_case(
     log: Log,
     *,
     resume: bool = False,
+    progress: Progress = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
@@ -45,6 +47,7 @@ def run_case(
         output: New folder of the results, or with `resume` the folder of the run to go on with.
         log: Called with each message.
         resume: Go on from the checkpoint in `output`.
+        progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
 
     Returns:
@@ -60,12 +63,13 @@ def run_case(
     system = System(case, comm)
     system.prepare()
     setup = time.perf_counter() - begin
-    run = _Run(system, output or on_root(comm, lambda: free_directory(Path("results") / name)), log, resume=resume)
+    directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
+    run = _Run(system, directory, log, resume=resume)
     begin = time.perf_counter()
     failure: Exception | None = None
     stop = "all half-cycles done"
     try:
-        run.march()
+        run.march(progress)
     except (ConvergenceError, InterruptedRunError) as error:
         stop, failure = str(error), error
     times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
@@ -112,10 +116,11 @@ class _Run:
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
 
-    def march(self) -> None:
+    def march(self, progress: Progress) -> None:
         """Compute all half-cycles; collective."""
+        last, done = self.case.run.half_cycles, self.moment.half_cycle
         with _Signals() as signals:
-            for block in _with_progress(self._blocks(), self.case.run.half_cycles, self.moment.half_cycle, self.comm):
+            for block in _with_progress(self._blocks(), last, done, self.comm, progress):
                 self._take(block)
                 wishes = signals.received or (time.monotonic() > self._checkpoint_due)
                 interrupted, due = self.comm.allreduce(np.array([bool(signals.received), bool(wishes)], dtype=int)) > 0
@@ -221,12 +226,22 @@ def _warnings(number: float) -> list[str]:
     ]
 
 
-def _with_progress(blocks: Iterator[Block], half_cycles: int, done: int, comm: MPI.Comm) -> Iterator[Block]:
-    """Pass the blocks on, with a progress bar on rank 0 where standard error is a terminal."""
-    quiet = comm.rank != 0 or not sys.stderr.isatty()
-    with tqdm(total=half_cycles, initial=done, unit=" half-cycles", disable=quiet) as bar:
+def _with_progress(
+    blocks: Iterator[Block], half_cycles: int, done: int, comm: MPI.Comm, progress: Progress
+) -> Iterator[Block]:
+    """Pass the blocks on and tell of them: on rank 0, and a bar on a terminal only."""
+    bar_hidden = progress != "bar" or comm.rank != 0 or not sys.stderr.isatty()
+    begin = time.perf_counter()
+    with tqdm(total=half_cycles, initial=done, unit=" half-cycles", disable=bar_hidden) as bar:
         for block in blocks:
-            bar.update(int(block.half_cycle[-1]) - bar.n)
+            number = int(block.half_cycle[-1])
             hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"
-            bar.set_postfix_str(f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}")
+            state = f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
+            bar.update(number - bar.n)
+            bar.set_postfix_str(state)
+            if progress == "lines" and comm.rank == 0:
+                rate = (number - done) / (time.perf_counter() - begin)
+                left = (half_cycles - number) / rate
+                line = f"half-cycle {number:,} of {half_cycles:,}, {rate:,.0f} a second, {left:,.0f} s left, {state}"
+                print(line, file=sys.stderr, flush=True)
             yield block

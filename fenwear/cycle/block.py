@@ -90,6 +90,11 @@ class Block:
         return len(self.half_cycle)
 
     @property
+    def time(self) -> Array:
+        """Time at the end of each half-cycle (k,), s."""
+        return self.half_cycle * self.system.motion.duration
+
+    @property
     def max_pressure(self) -> Array:
         """Largest pressure of each half-cycle (k,), MPa."""
         return self.pressure.max(axis=1)

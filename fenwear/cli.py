@@ -70,7 +70,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
-    from fenwear.run import run_case
+    from fenwear.run import Progress, run_case
 
     loaded = _load(case, settings)
     if resume and output is None:
@@ -78,7 +78,7 @@ def run(
     if quiet and verbose:
         raise CaseError(Problem("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
-    progress = "none" if quiet else "lines" if verbose else "bar"
+    progress: Progress = "none" if quiet else "lines" if verbose else "bar"
     summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
     if as_json:
         _print_json(summary)

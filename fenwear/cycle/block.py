@@ -92,7 +92,7 @@ class Block:
     @property
     def time(self) -> Array:
         """Time at the end of each half-cycle (k,), s."""
-        return self.half_cycle * self.system.motion.duration
+        return self.half_cycle.astype(float) * self.system.motion.duration
 
     @property
     def max_pressure(self) -> Array:

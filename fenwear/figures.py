@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -252,13 +252,24 @@ def draw_figures(directory: Path, half_cycles: Sequence[int] = ()) -> list[Path]
     return paths
 
 
+def mark_few(points: Sized) -> dict[str, Any]:
+    """Return the style of a line of so few points that without marks nothing may be seen."""
+    return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
+
+
 def _by_direction(ax: Axes, history: xarray.Dataset, name: str) -> None:
     """Draw a variable over the half-cycles, a line for each direction."""
     for d in directions_present(history):
         text, dashes, colour = DIRECTIONS[d]
         rows = history.direction.values == d
-        few: dict[str, Any] = {"marker": "o", "markersize": 3} if rows.sum() < 3 else {}
-        ax.plot(history.half_cycle[rows], history[name][rows], dashes, color=colour, label=text, **few)
+        ax.plot(
+            history.half_cycle[rows],
+            history[name][rows],
+            dashes,
+            color=colour,
+            label=text,
+            **mark_few(rows.nonzero()[0]),
+        )
 
 
 def _half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:

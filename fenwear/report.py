@@ -48,6 +48,8 @@ caption { text-align: left; font-weight: 600; padding: .8rem 0 .3rem; }
 th, td { text-align: left; vertical-align: top; padding: .2rem .6rem .2rem 0;
   border-bottom: 1px solid #ddd; font-weight: 400; }
 thead th { font-weight: 600; }
+thead th:nth-child(2) { text-align: right; }
+.places thead th:nth-child(2) { text-align: left; }
 td.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.unit { width: 3.5rem; }
 .wide { overflow-x: auto; }
@@ -141,7 +143,7 @@ def _head(title: str, directory: Path, summary: dict[str, Any], history: xarray.
     stamp = f'<time datetime="{written.isoformat(timespec="seconds")}">{written:%d %B %Y, %H:%M %Z}</time>'
     return (
         f"<header>\n<h1>{_e(title)}</h1>\n<p>Run <strong>{_e(directory.resolve().name)}</strong>: "
-        f"{last:,} half-cycles, {_e(stop)}. Results of {stamp}.</p>\n</header>\n<main>"
+        f"{last:,} half-cycles; {_e(stop)}. Results of {stamp}.</p>\n</header>\n<main>"
     )
 
 
@@ -162,10 +164,11 @@ def _rows(values: dict[str, Any], *, cut: int = 0) -> str:
     )
 
 
-def _table(caption: str, rows: str, columns: Sequence[str] = ("quantity", "value", "unit")) -> str:
+def _table(caption: str, rows: str, columns: Sequence[str] = ("quantity", "value", "unit"), kind: str = "wide") -> str:
     head = "".join(f'<th scope="col">{_e(name)}</th>' for name in columns)
     return (
-        f'<div class="wide"><table>\n<caption>{_e(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n'
+        f'<div class="{kind}" role="region" aria-label="{_e(caption)}" tabindex="0">'
+        f"<table>\n<caption>{_e(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n"
         f"<tbody>\n{rows}\n</tbody>\n</table></div>"
     )
 
@@ -200,7 +203,7 @@ def _key_numbers(summary: dict[str, Any], history: xarray.Dataset) -> str:
         at = "".join(f'<td class="number">{_data(p, numbers[p])}</td>' for p in _indexed("x_mm", numbers))
         rows = f'<tr><th scope="row">position x</th><td>mm</td>{at}</tr>\n{rows}'
         tables.append(_table("At places along the contact, end of the run", rows,
-                             ("quantity", "unit", *("" for _ in places))))  # fmt: skip
+                             ("quantity", "unit", *("" for _ in places)), "wide places"))  # fmt: skip
     return "\n".join(tables)
 
 

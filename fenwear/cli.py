@@ -189,6 +189,37 @@ def mesh_command(
     log(f"mesh in {output}")
 
 
+@app.command("plot")
+def plot_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
+) -> None:
+    """Draw a run: figures, pictures of the bodies, animation and report.html, into its folder."""
+    from fenwear.report import write_report
+
+    for path in on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True)):
+        print(path)
+
+
+@app.command("compare")
+def compare_command(
+    directories: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The folders of several runs.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The figure to write: .png, .pdf or .svg.")] = Path(
+        "compare.png"
+    ),
+    as_json: JsonOption = False,
+) -> None:
+    """Put several runs in one figure and one table, with the differences of their cases."""
+    from fenwear.compare import compare, draw_comparison
+
+    comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))
+    on_root(MPI.COMM_WORLD, lambda: draw_comparison(comparison, output))
+    if as_json:
+        _print_json(comparison.as_json())
+    else:
+        print(comparison.text())
+    log(f"figure in {output}")
+
+
 @app.command("info")
 def info_command(as_json: JsonOption = False) -> None:
     """Print the versions of the stack and the built-in cases."""

@@ -20,8 +20,8 @@ from fenwear.cycle import Block, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, Problem
 from fenwear.fields import body_fields, write_fields
-from fenwear.figures import draw_figures
 from fenwear.parallel import on_root
+from fenwear.report import try_report
 from fenwear.results import HistoryWriter, free_directory, make_directory, summarise, write_case, write_summary
 from fenwear.system import System
 
@@ -195,7 +195,7 @@ class _Run:
                 self.extremes["growth_rate_per_s"] = growth_rate(self.system, pressure)
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
-        on_root(self.comm, lambda: draw_figures(self.directory, self.case.output.figures_at) and None)
+        on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 
 

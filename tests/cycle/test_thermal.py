@@ -15,7 +15,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle import Block, growth_rate
 from fenwear.cycle.jump import cycle_heat
 from fenwear.cycle.moment import Moment
-from fenwear.inequality import Array
+from fenwear.arrays import Array
 
 Assemble = Callable[..., System]
 MEAN = 1e4 / 600
@@ -107,7 +107,6 @@ def test_jump_equals_march(assemble: Assemble, settings: tuple[str, ...], half_c
 
 
 @pytest.mark.parametrize("coefficient", [4e-7, 4e-6])
-@pytest.mark.mpi
 def test_march_tends_to_the_steady_state(assemble: Assemble, coefficient: float) -> None:
     """Where the feedback is stable a march and the direct solve agree, up to the wear between two half-cycles.
 

@@ -17,7 +17,7 @@ from scipy.special import k0e
 
 from fenwear.elasticity import ElasticBody, stress
 from fenwear.heat.conduction import HeatBody
-from fenwear.inequality import Array
+from fenwear.arrays import Array
 from fenwear.surface import condense, surface_nodes
 
 Make = Callable[..., Any]

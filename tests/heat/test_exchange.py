@@ -11,7 +11,7 @@ import pytest
 from fenwear import System, jump, march
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
-from fenwear.inequality import Array
+from fenwear.arrays import Array
 
 Make = Callable[..., Any]
 HEIGHTS, CONDUCTIVITIES, FAR = (2.0, 3.0), (5.0, 1.5), (90.0, 20.0)  # of punch and strip

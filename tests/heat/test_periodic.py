@@ -11,7 +11,7 @@ from fenwear import System
 from fenwear.cycle.jump import cycle_heat
 from fenwear.heat.exchange import State
 from fenwear.heat.periodic import CycleHeat
-from fenwear.inequality import Array
+from fenwear.arrays import Array
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 WARM = ("heat.initial=-10", "heat.ambient=35", "strip.temperatures=[{on='strip_bottom', temperature=-30}]")
@@ -50,7 +50,6 @@ def test_infinitely_many_cycles_are_the_fixed_point(heat: tuple[CycleHeat, Array
     np.testing.assert_allclose(linear, gaps, rtol=0, atol=1e-9 * np.abs(gaps).max())
 
 
-@pytest.mark.mpi
 def test_many_cycles_tend_to_the_periodic_state(heat: tuple[CycleHeat, Array, Array]) -> None:
     """Cycle by cycle, from the initial temperature: the same end, found without any linear algebra."""
     cycles, pressure, conductances = heat

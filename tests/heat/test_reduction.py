@@ -9,7 +9,7 @@ import pytest
 
 from fenwear import System, march
 from fenwear.cycle import Block
-from fenwear.inequality import Array
+from fenwear.arrays import Array
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 WARM = (
@@ -55,7 +55,6 @@ def test_error_follows_the_tolerance(assemble: Callable[..., System]) -> None:
     assert errors[3] < 2e-3 < errors[2]
 
 
-@pytest.mark.mpi
 def test_steady_state_is_in_the_basis(assemble: Callable[..., System]) -> None:
     """Long times too: half-cycles without number end at the same temperatures."""
     ends = []

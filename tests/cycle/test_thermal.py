@@ -11,11 +11,11 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import ConvergenceError, System, jump, load_case, march, steady
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block, growth_rate
 from fenwear.cycle.jump import cycle_heat
 from fenwear.cycle.moment import Moment
-from fenwear.arrays import Array
 
 Assemble = Callable[..., System]
 MEAN = 1e4 / 600

@@ -15,9 +15,9 @@ from dolfinx import fem
 from scipy.integrate import quad
 from scipy.special import k0e
 
+from fenwear.arrays import Array
 from fenwear.elasticity import ElasticBody, stress
 from fenwear.heat.conduction import HeatBody
-from fenwear.arrays import Array
 from fenwear.surface import condense, surface_nodes
 
 Make = Callable[..., Any]

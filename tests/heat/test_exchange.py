@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from fenwear import System, jump, march
+from fenwear.arrays import Array
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
-from fenwear.arrays import Array
 
 Make = Callable[..., Any]
 HEIGHTS, CONDUCTIVITIES, FAR = (2.0, 3.0), (5.0, 1.5), (90.0, 20.0)  # of punch and strip

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fenwear import System
+from fenwear.arrays import Array
 from fenwear.cycle.jump import cycle_heat
 from fenwear.heat.exchange import State
 from fenwear.heat.periodic import CycleHeat
-from fenwear.arrays import Array
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 WARM = ("heat.initial=-10", "heat.ambient=35", "strip.temperatures=[{on='strip_bottom', temperature=-30}]")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fenwear import System, march
-from fenwear.cycle import Block
 from fenwear.arrays import Array
+from fenwear.cycle import Block
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 WARM = (

@@ -22,7 +22,7 @@ def main() -> int:
     import numpy as np
     import petsc4py
 
-    petsc4py.init([sys.argv[0], *petsc_options])
+    petsc4py.init([sys.argv[0], "-no_signal_handler", *petsc_options])  # signals are ours, or the system's
     from mpi4py import MPI
     from petsc4py import PETSc
 

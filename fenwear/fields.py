@@ -19,10 +19,10 @@ import ufl
 import xarray
 from dolfinx import fem
 
+from fenwear.arrays import Array
 from fenwear.compat import interpolation_points
 from fenwear.elasticity import ElasticBody, strain, stress
 from fenwear.heat.conduction import HeatBody
-from fenwear.inequality import Array
 from fenwear.surface import SurfaceNodes
 from fenwear.system import System
 

@@ -11,9 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.elasticity import ElasticBody
 from fenwear.errors import CaseError, Problem
-from fenwear.surface import Array, Surface, SurfaceNodes, rigid_motion
+from fenwear.surface import Surface, SurfaceNodes, rigid_motion
 
 
 @dataclass(frozen=True)

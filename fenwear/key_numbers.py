@@ -62,7 +62,10 @@ def read_case(directory: Path) -> dict[str, Any]:
     path = directory / CASE
     try:
         return tomllib.loads(path.read_text("utf-8"))
-    except (OSError, ValueError) as error:
+    except OSError as error:
+        message = f"{error.strerror}; expected the folder of a run"
+        raise CaseError(Problem(str(path), message)) from None
+    except ValueError as error:
         raise CaseError(Problem(str(path), f"no readable case of a run: {error}")) from None
 
 

@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gamma
 
+from fenwear.arrays import Array
 from fenwear.case import OneWay, Reciprocating
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
+from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, ConvergenceError, Problem
-from fenwear.inequality import Array, Mask
 from fenwear.interface import Statics
 
 

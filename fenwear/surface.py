@@ -17,9 +17,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from fenwear.arrays import Array
 from fenwear.elasticity import ElasticBody
-
-Array = NDArray[np.float64]
 
 BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
 

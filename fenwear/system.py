@@ -11,15 +11,15 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenwear.case import Body, Case, Heat
+from fenwear.arrays import Array, Mask
+from fenwear.case import Body, Case, Heat, changed_case
 from fenwear.contact import CondensedContact, ContactSolver
-from fenwear.contact_full import FullContact
+from fenwear.contact.full import FullContact
 from fenwear.elasticity import ElasticBody
 from fenwear.errors import CaseError, Problem
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
-from fenwear.inequality import Array, Mask
 from fenwear.interface import Facing, Interface, Statics, face, join, statics
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
@@ -61,12 +61,13 @@ class System:
         Raises:
             CaseError: an override does not fit, or the punch would tip over.
         """
-        return self.with_case(self.case.changed(*settings))
+        return self.with_case(changed_case(self.case, *settings))
 
     def with_case(self, case: Case) -> System:
         """Return the system of another case, as `vary`; collective."""
         if not _same_bodies(self.case, case):
             return System(case, self.comm)
+        self.prepare()  # what is not made yet would be made anew in every variant
         other = copy.copy(self)
         for name in ("motion", "wear", "interface", "exchange", "reduced_exchange", "heat_bodies", "_surfaces"):
             other.__dict__.pop(name, None)

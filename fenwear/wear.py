@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.case import WearLaw
-from fenwear.inequality import Array
 
 
 @dataclass(frozen=True)

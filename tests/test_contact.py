@@ -11,9 +11,9 @@ import pytest
 from petsc4py import PETSc
 
 from fenwear import ConvergenceError, System
+from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState
-from fenwear.contact_full import FullContact
-from fenwear.inequality import Array
+from fenwear.contact.full import FullContact
 
 FINE = ("geometry.parameters.elements_along_contact=32", "geometry.parameters.edge_grading=64")
 A, P = 30.0, 1000.0  # half-width, mm; load per thickness, N/mm

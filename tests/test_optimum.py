@@ -10,7 +10,7 @@ from scipy.integrate import quad
 from scipy.optimize import fsolve
 
 from fenwear import CaseError, System, load_case
-from fenwear.inequality import Array
+from fenwear.arrays import Array
 
 A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
 

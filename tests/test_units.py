@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fenwear.units import convert, quantity_text
+from fenwear.case.units import convert, quantity_text
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
-from fenwear.inequality import Array
 from fenwear.system import System
 
 

@@ -16,12 +16,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
 from fenwear.cycle.moment import Moment, beginning, joined, parted
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
-from fenwear.inequality import Array
 from fenwear.system import System
 from fenwear.wear import WornLayer
 

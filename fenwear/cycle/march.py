@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
 from fenwear.cycle.moment import Moment, beginning
 from fenwear.cycle.thermal import ThermalContact
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
-from fenwear.inequality import Array
 from fenwear.system import System
 from fenwear.wear import WornLayer
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.heat.exchange import State
-from fenwear.inequality import Array
 from fenwear.system import System
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.errors import CaseError, Problem
-from fenwear.inequality import Array
 from fenwear.system import System
 
 DIRECTIONS = (-1, 1)

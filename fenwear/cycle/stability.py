@@ -6,8 +6,8 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
+from fenwear.arrays import Array, Mask
 from fenwear.cycle.jump import cycle_heat
-from fenwear.inequality import Array, Mask
 from fenwear.system import System
 from fenwear.wear import WornLayer
 

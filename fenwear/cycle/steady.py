@@ -18,11 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linprog
 
+from fenwear.arrays import Array, Mask
 from fenwear.contact import ContactState
+from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
-from fenwear.inequality import Array, DenseInequality, Mask
 from fenwear.system import System
 from fenwear.wear import WornLayer
 

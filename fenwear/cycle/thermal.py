@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.contact import ContactSolver, ContactState, Layer
 from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import HeatExchange, State
-from fenwear.inequality import Array
 from fenwear.system import System
 
 MAX_ITERATIONS = 200

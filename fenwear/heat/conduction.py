@@ -21,10 +21,10 @@ import ufl
 from dolfinx import fem, mesh
 from petsc4py import PETSc
 
+from fenwear.arrays import Array
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.elasticity import region_field
 from fenwear.errors import CaseError, Problem
-from fenwear.inequality import Array
 from fenwear.mesh import BodyMesh
 
 PREFIX = "fenwear_heat_"

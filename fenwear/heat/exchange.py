@@ -20,9 +20,9 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.heat.field import Field, Functional
-from fenwear.inequality import Array
 
 State = tuple[Array, Array]  # of the punch and of the strip
 

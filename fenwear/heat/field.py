@@ -11,8 +11,8 @@ from typing import Protocol
 
 import scipy.linalg
 
+from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, HeatStep
-from fenwear.inequality import Array
 from fenwear.parallel import total
 
 Functional = Callable[[Array], Array]

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from fenwear.arrays import Array
 from fenwear.heat.exchange import HeatExchange, State
-from fenwear.inequality import Array
 
 
 @dataclass(frozen=True)

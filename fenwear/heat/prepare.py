@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.heat.conduction import HeatBody, HeatStep
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.reduction import reduced_basis
-from fenwear.inequality import Array
 from fenwear.interface import Facing
 from fenwear.motion import Motion
 from fenwear.parallel import total

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody
-from fenwear.inequality import Array
 from fenwear.parallel import total
 
 RATIO = 4.0  # of one time scale to the next

@@ -15,7 +15,7 @@ import numpy as np
 
 from fenwear import System, load_case, march, steady
 from fenwear.contact import CondensedContact
-from fenwear.contact_full import FullContact
+from fenwear.contact.full import FullContact
 from fenwear.cycle import jump
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fenwear import System, jump, march
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
-from fenwear.inequality import Array
 from fenwear.wear import WornLayer
 
 MEAN = 1e4 / 600

@@ -17,7 +17,8 @@ from typing import Protocol
 
 import numpy as np
 
-from fenwear.inequality import Array, DenseInequality
+from fenwear.arrays import Array
+from fenwear.contact.inequality import DenseInequality
 from fenwear.interface import Interface
 
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding

@@ -13,9 +13,10 @@ from __future__ import annotations
 import numpy as np
 from petsc4py import PETSc
 
-from fenwear.contact import ContactState, Layer
+from fenwear.arrays import Array
+from fenwear.contact.condensed import ContactState, Layer
+from fenwear.contact.inequality import check, configure
 from fenwear.elasticity import ElasticBody
-from fenwear.inequality import Array, check, configure
 from fenwear.interface import Interface
 from fenwear.surface import SurfaceNodes
 

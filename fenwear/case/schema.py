@@ -8,19 +8,15 @@ same keys.
 
 from __future__ import annotations
 
-import difflib
 import math
-import tomllib
-from collections.abc import Mapping, Sequence
-from importlib import resources
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import pydantic
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
 
-from fenwear.errors import CaseError, Problem
-from fenwear.units import convert, quantity_text
+from fenwear.case.units import convert, quantity_text
 
 
 def _quantity(unit: str) -> Any:
@@ -332,17 +328,6 @@ class Case(_Part):
         """The folder of the case file, None for a built-in case or one made in Python."""
         return self._folder
 
-    def changed(self, *settings: str) -> Case:
-        """Return the case with overrides `key.path=value`, as of `load_case`.
-
-        Raises:
-            CaseError: an override does not fit.
-        """
-        data = self.resolved()
-        for setting in settings:
-            _apply(data, setting)
-        return make_case(data, self._folder)
-
     def at(self, folder: Path | None) -> Case:
         """Return this case with the folder that its geometry's path starts from."""
         placed = self.model_copy()
@@ -367,155 +352,8 @@ class Case(_Part):
         return tomli_w.dumps(self.resolved())
 
 
-def builtin_cases() -> dict[str, str]:
-    """Return the names of the built-in cases with their titles."""
-    folder = resources.files("fenwear") / "cases"
-    files = {f.name.removesuffix(".toml"): f for f in folder.iterdir() if f.name.endswith(".toml")}
-    return {name: tomllib.loads(files[name].read_text("utf-8"))["title"] for name in sorted(files)}
-
-
-def load_case(source: str | Path, settings: Sequence[str] = ()) -> Case:
-    """Read a case file, or a built-in case by its name.
-
-    Args:
-        source: Path of a TOML file, or one of `builtin_cases()`.
-        settings: Overrides `key.path=value`, the value in TOML notation (a bare word is a string).
-
-    Raises:
-        CaseError: the file cannot be read, or anything in it is wrong; lists all problems.
-    """
-    data, folder = _read_tables(str(source))
-    for setting in settings:
-        _apply(data, setting)
-    return make_case(data, folder)
-
-
-def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, Any], Path | None]:
-    """Return the tables of a case, laid over those of the case it names as its base, and its folder."""
-    path = Path(source)
-    if path.suffix != ".toml" and not path.exists():
-        if source not in builtin_cases():
-            known = ", ".join(builtin_cases())
-            raise CaseError(Problem(source, f"no such case file, nor a built-in case ({known})"))
-        text, folder = (resources.files("fenwear") / "cases" / f"{source}.toml").read_text("utf-8"), None
-    else:
-        text, folder = _read_text(path), path.parent
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise CaseError(Problem(source, f"not a TOML file: {error}")) from None
-    base = data.pop("base", None)
-    if base is None:
-        return data, folder
-    if not isinstance(base, str):
-        raise CaseError(Problem("base", f"expected the name of a case, got {base!r}"))
-    if base in base_of or len(base_of) > 8:
-        raise CaseError(Problem("base", f"{base!r} has itself as its base"))
-    if folder is not None and base.endswith(".toml"):
-        base = str(folder / base)
-    below, base_folder = _read_tables(base, (*base_of, base))
-    own_geometry = "file" in data.get("geometry", {})
-    return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
-
-
-def _laid_over(below: Any, above: Any) -> Any:
-    """Return nested tables, those `above` before those `below`; one that states its kind stands alone."""
-    if not (isinstance(below, dict) and isinstance(above, dict)) or "kind" in above:
-        return above
-    return {**below, **{key: _laid_over(below.get(key), value) for key, value in above.items()}}
-
-
-def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
-    """Validate `data`, nested as in a case file.
-
-    Raises:
-        CaseError: lists every unknown key, wrong unit and impossible value.
-    """
-    try:
-        return Case.model_validate(data).at(folder)
-    except pydantic.ValidationError as error:
-        raise CaseError([p for e in error.errors() for p in _problems(e)]) from None
-
-
-def _read_text(path: Path) -> str:
-    try:
-        return path.read_bytes().decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise CaseError(Problem(str(path), f"not a UTF-8 text (byte {error.start})")) from None
-    except OSError as error:
-        raise CaseError(Problem(str(path), f"cannot be read: {error.strerror}")) from None
-
-
-def _apply(data: dict[str, Any], setting: str) -> None:
-    """Set one `key.path=value` in the nested tables of `data`."""
-    key, equals, text = setting.partition("=")
-    names = [name.strip() for name in key.split(".")]
-    if not equals or not all(names):
-        raise CaseError(Problem("--set", f"expected key.path=value, got {setting!r}"))
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
-    place: Any = data
-    for name in names[:-1]:
-        place = _step(place, name, setting)
-    if isinstance(place, list):
-        _step(place, names[-1], setting)
-        place[int(names[-1])] = value
-    else:
-        place[names[-1]] = value
-
-
-def _step(place: Any, name: str, setting: str) -> Any:
-    if isinstance(place, list) and name.isdigit() and int(name) < len(place):
-        return place[int(name)]
-    if isinstance(place, dict):
-        return place.setdefault(name, {})
-    raise CaseError(Problem("--set", f"{setting!r} reaches into {name!r}, which is not a table"))
-
-
-def _problems(error: Any) -> list[Problem]:  # noqa: PLR0911
-    """Turn one pydantic error into problems with the key's path as in the case file."""
-    union_tags = ("reciprocating", "one-way")
-    key = ".".join(str(step) for step in error["loc"] if step not in union_tags)
-    message = str(error["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
-    match error["type"]:
-        case "extra_forbidden":
-            return [Problem(key, f"unknown key{_suggestion(error['loc'])}")]
-        case "missing":
-            return [Problem(key, "missing, but required")]
-        case "union_tag_not_found" | "union_tag_invalid":
-            return [Problem(f"{key}.kind", f"expected one of {', '.join(union_tags)}")]
-        case "value_error" if key and ": " in message and message.split(":")[0].isidentifier():
-            name, _, rest = message.partition(": ")
-            return [Problem(f"{key}.{name}", rest)]
-        case "value_error" if not key:
-            return [Problem(*line.split(": ", 1)) for line in message.splitlines()]
-        case "value_error":
-            return [Problem(key, message)]
-    return [Problem(key, f"expected {message[:1].lower()}{message[1:]}")]
-
-
-def _suggestion(location: tuple[str | int, ...]) -> str:
-    """Return "; did you mean ...?" for a misspelt key, or the keys that are known there."""
-    model: Any = Case
-    for step in location[:-1]:
-        field = getattr(model, "model_fields", {}).get(step)
-        models = _models_in(field.annotation if field else model)
-        model = next((m for m in models if getattr(m, "model_fields", {}).get("kind") is None), None) or (
-            models[0] if models else None
-        )
-        if isinstance(step, str) and len(models) > 1:
-            model = None
-    names = list(getattr(model, "model_fields", {}))
-    close = difflib.get_close_matches(str(location[-1]), names, n=1)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known here are {', '.join(names)}" if names else ""
-
-
-def _models_in(annotation: Any) -> list[Any]:
+def part_models(annotation: Any) -> list[Any]:
     """Return the case models inside a type such as dict[str, Material] or tuple[Load, ...]."""
     if isinstance(annotation, type) and issubclass(annotation, _Part):
         return [annotation]
-    return [m for argument in getattr(annotation, "__args__", ()) for m in _models_in(argument)]
+    return [m for argument in getattr(annotation, "__args__", ()) for m in part_models(argument)]

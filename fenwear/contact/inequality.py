@@ -10,13 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 ZERO_PIVOT = 71  # PETSC_ERR_MAT_LU_ZRPVT

@@ -22,6 +22,7 @@ from fenwear.system import System
 
 MAX_ITERATIONS = 200
 SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
+WORTH_IT = 12  # iterations with the same conductances after which a costly response of their own pays
 CLOSE = 1e-10  # change of pressure over the mean pressure that ends the implicit iterations
 
 
@@ -49,6 +50,7 @@ class ThermalContact:
         self.direction = system.motion.directions[phase]
         self._contact: ContactSolver = system.contact((self.direction,))
         self._response: _Response | None = None
+        self._asked, self._repeats = b"", 0  # conductances asked for last, and how often in a row
 
     def solve(
         self, temperature: State, gap: Array, start: ContactState | None, layer: Layer | None
@@ -102,14 +104,16 @@ class ThermalContact:
 
     def _respond(self, conductance: Array) -> _Response:
         """Return the response for these conductances, or a near one where it is costly to make."""
-        known = self._response
-        same = known is not None and np.array_equal(known.conductance, conductance, equal_nan=True)
+        known, key = self._response, conductance.tobytes()
+        self._repeats = self._repeats + 1 if key == self._asked else 0
+        self._asked = key
         heat = self.system.case.heat
         costly = heat is not None and (heat.operator == "full" or heat.conductance_per_pressure is not None)
-        if known is None or (not same and not costly):
-            state, terms = self.exchange.response(self.phase, conductance)
-            known = self._response = _Response(conductance, state, terms, self.exchange.gap_change(state))
-        return known
+        if known is not None and (known.conductance.tobytes() == key or (costly and self._repeats < WORTH_IT)):
+            return known
+        state, terms = self.exchange.response(self.phase, conductance)
+        self._response = _Response(conductance, state, terms, self.exchange.gap_change(state))
+        return self._response
 
     def _split(
         self, temperature: State, gap: Array, start: ContactState, layer: Layer | None

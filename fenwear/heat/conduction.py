@@ -20,6 +20,7 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Body, Heat, Material, Model
@@ -198,11 +199,10 @@ class HeatBody:
         return placed
 
     @cached_property
-    def contact_rows(self) -> Array:
+    def contact_rows(self) -> csr_array:
         """The matrix that picks the temperatures at the contact nodes (n, owned): this rank's columns."""
-        rows = np.zeros((len(self.nodes), self.owned))
-        rows[self._mine, self._mine_local] = 1.0
-        return rows
+        places = (self._mine, self._mine_local)
+        return csr_array((np.ones(len(self._mine)), places), shape=(len(self.nodes), self.owned))
 
     @cached_property
     def _capacity_matrix(self) -> PETSc.Mat:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import scipy.linalg
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, HeatStep
@@ -34,14 +35,14 @@ class Field(Protocol):
     def advance_linear(self, step: int, states: Array) -> Array:
         """Return what a step makes of changes of the state (dim, k), without its sources."""
 
-    def observe(self, rows: Array) -> Functional:
+    def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional rows . theta of a state.
 
         Args:
-            rows: (j, owned), over the full field's owned degrees of freedom.
+            rows: (j, owned), over the full field's owned degrees of freedom; dense or sparse.
         """
 
-    def observe_change(self, rows: Array) -> Functional:
+    def observe_change(self, rows: Array | csr_array) -> Functional:
         """Return the same functional of changes of the state, (dim,) or (dim, k)."""
 
     def temperature(self, state: Array) -> Array:
@@ -77,7 +78,7 @@ class FullField:
         """Solve one step for several changes."""
         return self.steps[step].advance_linear(states)
 
-    def observe(self, rows: Array) -> Functional:
+    def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional, summed over the ranks."""
         comm = self.body.body.mesh.comm
 
@@ -135,12 +136,12 @@ class ReducedField:
         """Apply the dense step to changes."""
         return self._propagators[step] @ states
 
-    def observe(self, rows: Array) -> Functional:
+    def observe(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional; collective to make, not to call."""
         matrix, constant = self._sum(rows @ self.basis), self._sum(rows @ self.lift)
         return lambda state: matrix @ state + constant
 
-    def observe_change(self, rows: Array) -> Functional:
+    def observe_change(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional of changes; collective to make, not to call."""
         matrix = self._sum(rows @ self.basis)
         return lambda states: matrix @ states

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Case
@@ -92,8 +93,9 @@ def _exchange(
 
 def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], facing: Facing, gap_rows: Array) -> Side:
     body = field.body
-    to_interface = np.eye(len(facing.x)) if body.body.name == "punch" else facing.transfer
-    contact_rows = to_interface @ body.contact_rows
+    contact_rows = body.contact_rows
+    if body.body.name == "strip":
+        contact_rows = csr_array(facing.transfer) @ contact_rows
     balance_rows = [body.storage, body.convected]
     for step in steps:
         balance_rows += [step.held_by_end, step.held_by_start, step.velocity * body.carried]

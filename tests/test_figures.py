@@ -146,6 +146,7 @@ def test_chosen_half_cycles(history: xarray.Dataset) -> None:
     """The recorded ones nearest to the wanted; by default from the first to the last."""
     assert chosen_half_cycles(history, (1, 19, 1000)) == [1, 19, 20]
     default = chosen_half_cycles(history)
+    assert chosen_half_cycles(history, (1, 1000, 2000)) == default
     assert (default[0], default[-1]) == (1, 20)
     assert len(default) <= 6
 

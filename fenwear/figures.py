@@ -62,6 +62,12 @@ def chosen_half_cycles(history: xarray.Dataset, wanted: Sequence[int] = ()) -> l
     # Most of them beyond the end: they were chosen for a longer run.
     if 2 * sum(n <= recorded[-1] for n in wanted) <= len(wanted):
         wanted = [int(n) for n in np.unique(np.geomspace(1, recorded[-1], 6).round().astype(int))]
+    return nearest_half_cycles(history, wanted)
+
+
+def nearest_half_cycles(history: xarray.Dataset, wanted: Sequence[int]) -> list[int]:
+    """Return the recorded half-cycles nearest to the wanted ones."""
+    recorded = history.half_cycle.values
     return sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in wanted})
 
 
@@ -96,14 +102,15 @@ def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figu
     mean, top = mean_pressure(history), pressure_top(history, half_cycles)
     for ax, d in zip(axes, present, strict=True):
         one_way = history.isel(half_cycle=np.flatnonzero(history.direction.values == d))
-        for colour, n in shades(chosen_half_cycles(one_way, half_cycles)):
+        nearest = nearest_half_cycles(one_way, half_cycles)
+        for colour, n in shades(nearest):
             ax.plot(history.x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
         arrow = "→" if d > 0 else "←"
         ax.set_title(f"Contact pressure while the strip moves {DIRECTIONS[d][0]} {arrow}", loc="left")
         ax.set_ylabel("contact pressure p (MPa)")
         ax.set_ylim(0, top)
         reference_line(ax, mean, f"mean {mean:.2f}")
-        highest = float(one_way.pressure.sel(half_cycle=chosen_half_cycles(one_way, half_cycles)).max())
+        highest = float(one_way.pressure.sel(half_cycle=nearest).max())
         if highest > top:
             ax.annotate(f"cut off: the first peaks reach {highest:.0f} MPa", (0.5, 1), xycoords="axes fraction",
                         ha="center", va="top", color=GREY, fontsize="small")  # fmt: skip

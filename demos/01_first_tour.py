@@ -32,7 +32,6 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray
-from IPython.display import display
 
 from fenwear import load_case
 from fenwear.figures import peak_figure, pressure_figure, read_history, shape_figure
@@ -124,7 +123,7 @@ print(f"width in contact {float(last.contact_width):.1f} {last.contact_width.uni
 
 # %%
 shown = [1, 10, 50, 200] if COARSE else [1, 20, 200, 800, 2600]
-display(pressure_figure(history, shown))
+pressure_figure(history, shown)
 
 # %% [markdown]
 # ## Worn shape
@@ -133,7 +132,7 @@ display(pressure_figure(history, shown))
 # every second half-cycle. In the end the shape only moves down as a whole.
 
 # %%
-display(shape_figure(history, shown))
+shape_figure(history, shown)
 
 # %% [markdown]
 # ## How far has it come?
@@ -143,7 +142,7 @@ display(shape_figure(history, shown))
 # `steady` gets there at once; `"run.integration=jump"` takes many cycles in one step.
 
 # %%
-display(peak_figure(history))
+peak_figure(history)
 
 # %% [markdown]
 # ## Stress in the bodies

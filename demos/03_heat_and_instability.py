@@ -238,4 +238,5 @@ plt.show()
 #
 # - `system.vary("heat.partition=0.5", "wear.punch.coefficient=4e-7")`: ten times the wear. Is it stable?
 # - `system.vary("motion.angular_frequency=5")`: half the speed. (The steps of heat are prepared anew: some seconds.)
-# - `"heat.conductance='perfect'"`: no jump of temperature between punch and strip.
+# - `"heat.conductance='perfect'"`: no jump of temperature between punch and strip. Then the two share the heat by
+#   themselves, whatever $\kappa$ is.

@@ -232,7 +232,7 @@ class Heat(_Part):
     )
 
     reduction_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
-        default=1e-4, description="of the reduced operator's basis, relative"
+        default=3e-5, description="of the reduced operator's basis, relative"
     )
 
 

@@ -163,7 +163,7 @@ class HeatBody:
         a, b, f, rate, speed = self._step_forms
         rate.value = 0.0 if math.isinf(duration) else 1 / duration
         speed.value = velocity
-        return HeatStep(self, _matrix(a), _matrix(b), self._vector(f), velocity)
+        return HeatStep(self, _matrix(a), _matrix(b), self._vector(f), velocity, duration)
 
     def loses_heat(self) -> bool:
         """Return whether a heat sink exists: convection or a held temperature; collective."""
@@ -251,7 +251,9 @@ class HeatStep:
             temperatures replace: with them the heat that enters through these boundaries.
     """
 
-    def __init__(self, body: HeatBody, a: PETSc.Mat, b: PETSc.Mat, f: PETSc.Vec, velocity: float) -> None:
+    def __init__(
+        self, body: HeatBody, a: PETSc.Mat, b: PETSc.Mat, f: PETSc.Vec, velocity: float, duration: float
+    ) -> None:
         self.body, self.velocity = body, velocity
         start = body.space.dofmap.index_map.local_range[0]
         rows = (body.held + start).astype(np.int32)
@@ -272,7 +274,12 @@ class HeatStep:
         self._ksp.setOperators(a)
         self._ksp.setType("preonly")
         self._ksp.pc.setType("lu")
-        self._ksp.pc.setFactorSolverType("mumps")
+        if body.body.mesh.comm.size == 1 and duration < np.inf:
+            # Solved thousands of times: PETSc's own factor answers four times as fast as MUMPS.
+            self._ksp.pc.setFactorSolverType("petsc")
+            self._ksp.pc.setFactorOrdering("amd")
+        else:
+            self._ksp.pc.setFactorSolverType("mumps")
         self._ksp.setFromOptions()
         self._ksp.setUp()
         self._factor = self._ksp.pc.getFactorMatrix()

@@ -24,6 +24,7 @@ from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.heat.field import Field, Functional
 
+MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 State = tuple[Array, Array]  # of the punch and of the strip
 
 
@@ -68,6 +69,21 @@ class StepPlan:
     speed: float
 
 
+@dataclass(frozen=True)
+class _FluxMap:
+    """The fluxes (q_1, q_2) of a step, linear in what they come from; both surfaces concatenated.
+
+    Attributes:
+        by_temperature: From the surfaces' temperatures without flux (2 n, 2 n).
+        by_heat: From the friction heat (2 n, n).
+        by_ambient: From the temperature of the surroundings (2 n,).
+    """
+
+    by_temperature: Array
+    by_heat: Array
+    by_ambient: Array
+
+
 class HeatExchange:
     """Both bodies' temperatures over half-cycles, with the heat between them.
 
@@ -95,12 +111,12 @@ class HeatExchange:
         self.duration, self.friction, self.weights, self.thickness = duration, friction, weights, thickness
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
         self._contact_responses = [[side.contact_change(r) for r in side.field.responses] for side in sides]
-        self._inverses: dict[tuple[int, int, bytes], Array] = {}
+        self._flux_maps: dict[tuple[int, int, bytes], _FluxMap] = {}
 
     def varied(self, heat: Heat, friction: float) -> HeatExchange:
         """Return the exchange of another friction, partition or conductance with the same prepared bodies."""
         other = copy.copy(self)
-        other.heat, other.friction = heat, friction
+        other.heat, other.friction, other._flux_maps = heat, friction, {}
         return other
 
     def initial(self) -> State:
@@ -223,22 +239,31 @@ class HeatExchange:
         self, kinds: tuple[int, int], bare: list[Array], heat: Array, conductance: Array, ambient: float
     ) -> list[Array]:
         """Return q_1 and q_2 into the bodies (n,) or (n, k), mW/mm², from the temperatures without flux."""
-        conducts, own, jump = (_column(a, heat.ndim) for a in _row_factors(conductance))
-        kept, h = (1 - self.heat.debris) * heat, self.heat.convection
-        first = np.where(
-            conducts, own * self.heat.partition * kept - jump * (bare[0] - bare[1]), -h * (bare[0] - ambient)
-        )
-        second = np.where(conducts, kept, -h * (bare[1] - ambient))
-        return np.split(self._inverse(kinds, conductance) @ np.concatenate([first, second]), 2)
+        fluxes = self._flux_map(kinds, conductance)
+        total = fluxes.by_temperature @ np.concatenate(bare) + fluxes.by_heat @ heat
+        if ambient:
+            total += fluxes.by_ambient * ambient
+        n = len(conductance)
+        return [total[:n], total[n:]]
 
-    def _inverse(self, kinds: tuple[int, int], conductance: Array) -> Array:
-        """Return the inverse of the system for the fluxes; kept for conductances met before."""
+    def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> _FluxMap:
+        """Return the map to the fluxes; kept for conductances met before."""
         key = (*kinds, conductance.tobytes())
-        if key not in self._inverses:
-            if len(self._inverses) > 200:
-                self._inverses.clear()
-            self._inverses[key] = scipy.linalg.inv(self._flux_matrix(kinds, conductance))
-        return self._inverses[key]
+        if key not in self._flux_maps:
+            if len(self._flux_maps) > max(20, MEMORY // (48 * len(conductance) ** 2)):
+                self._flux_maps.clear()
+            self._flux_maps[key] = self._make_flux_map(kinds, conductance)
+        return self._flux_maps[key]
+
+    def _make_flux_map(self, kinds: tuple[int, int], conductance: Array) -> _FluxMap:
+        conducts, own, jump = _row_factors(conductance)
+        kept, h, n = 1 - self.heat.debris, self.heat.convection, len(conductance)
+        inverse = scipy.linalg.inv(self._flux_matrix(kinds, conductance))
+        loss = np.where(conducts, 0.0, h)
+        first, second = inverse[:, :n], inverse[:, n:]
+        by_temperature = np.hstack([first * (-jump * conducts - loss), first * (jump * conducts) - second * loss])
+        by_heat = (first * (own * self.heat.partition) + second) * (kept * conducts)
+        return _FluxMap(by_temperature, by_heat, first @ loss + second @ loss)
 
     def _flux_matrix(self, kinds: tuple[int, int], conductance: Array) -> Array:
         t1, t2 = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
@@ -254,8 +279,3 @@ def _row_factors(conductance: Array) -> tuple[NDArray[Any], NDArray[Any], NDArra
     perfect = np.isinf(conductance)
     jump = np.where(perfect, 1.0, np.nan_to_num(conductance, nan=0.0, posinf=0.0))
     return ~np.isnan(conductance), np.where(perfect, 0.0, 1.0), jump
-
-
-def _column(values: NDArray[Any], dimensions: int) -> NDArray[Any]:
-    """Return values (n,) so that they multiply arrays (n,) or (n, k)."""
-    return values.reshape(-1, *(1 for _ in range(dimensions - 1)))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
+from fenwear.boundary import boundary_figure
 from fenwear.errors import CaseError, Problem
 from fenwear.results import HEAT_TERMS, HISTORY
 from fenwear.style import (
@@ -253,6 +254,10 @@ def draw_figures(directory: Path, half_cycles: Sequence[int] = ()) -> list[Path]
     """Draw all figures of a run into its folder `figures`; return their paths."""
     folder = directory / FOLDER
     drawn = all_figures(read_history(directory), half_cycles)
+    files = sorted((directory / "fields").glob("half_cycle_*.nc"))
+    if files and "temperature" in drawn:
+        with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
+            drawn["boundary_temperature"] = boundary_figure(fields)
     folder.mkdir(exist_ok=True)
     paths = [folder / f"{name}.png" for name in drawn]
     for path, figure in zip(paths, drawn.values(), strict=True):

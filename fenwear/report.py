@@ -20,7 +20,8 @@ from fenwear.results import CASE, HISTORY
 
 REPORT = "report.html"
 SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
-            "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact"}  # fmt: skip
+            "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
+            "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
 ALT = {
     "shape": "Worn depth in micrometres along the contact, a line for each chosen half-cycle.",
     "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, "
@@ -31,6 +32,8 @@ ALT = {
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
     "half-cycle.",
+    "boundary_temperature": "Temperature round the punch from the middle of the contact on, and along the strip's upper "
+    "surface, at the last half-cycle with fields.",
     "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
 }
 STYLE = """

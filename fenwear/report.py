@@ -32,8 +32,8 @@ ALT = {
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
     "half-cycle.",
-    "boundary_temperature": "Temperature round the punch from the middle of the contact on, and along the strip's upper "
-    "surface, at the last half-cycle with fields.",
+    "boundary_temperature": "Temperature round the punch from the middle of its contact on, and along the strip's "
+    "upper surface, at the last half-cycle with fields.",
     "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
 }
 STYLE = """

@@ -72,9 +72,6 @@ def _not_facing(reason: str) -> None:
     raise CaseError(Problem("geometry", f"the contact surfaces do not face each other: {reason}"))
 
 
-ROUNDING = 1e-12  # a shape function at a node that lies on another one
-
-
 def interpolation(nodes: Array, degree: int, x: Array) -> Array:
     """Return the matrix of piecewise Lagrange interpolation from `nodes` to `x`.
 
@@ -91,8 +88,7 @@ def interpolation(nodes: Array, degree: int, x: Array) -> Array:
     same = np.eye(degree + 1, dtype=bool)
     factors = np.where(same, 1.0, difference) / np.where(same, 1.0, spacing)
     matrix = np.zeros((len(x), len(nodes)))
-    values = factors.prod(axis=2)
-    np.put_along_axis(matrix, columns, np.where(np.abs(values) < ROUNDING, 0.0, values), axis=1)
+    np.put_along_axis(matrix, columns, factors.prod(axis=2), axis=1)
     return matrix
 
 

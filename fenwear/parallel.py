@@ -31,13 +31,6 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
     return comm.bcast(result)
 
 
-def agree(comm: MPI.Comm, error: Exception | None) -> None:
-    """Raise the lowest rank's error on every rank, if any rank has one; collective."""
-    for found in comm.allgather(error):
-        if found is not None:
-            raise found
-
-
 def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the sum over the ranks, equal to the last bit on all of them; collective."""
     result = np.empty(partial.shape)

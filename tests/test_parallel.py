@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from fenwear import CaseError, System, jump, load_case, march, steady
 from fenwear.errors import Problem
-from fenwear.parallel import agree, on_root
+from fenwear.parallel import on_root
 
 COMM = MPI.COMM_WORLD
 several = pytest.mark.skipif(COMM.size == 1, reason="needs several ranks: mpirun -n 2 python3 -m pytest -m mpi")
@@ -61,12 +61,3 @@ def test_on_root() -> None:
 
     with pytest.raises(CaseError, match="key: on rank 0"):
         on_root(COMM, fail)
-
-
-@pytest.mark.mpi
-def test_agree() -> None:
-    """An error on the last rank alone is raised on every one."""
-    agree(COMM, None)
-    mine = CaseError(Problem("key", "only here")) if COMM.rank == COMM.size - 1 else None
-    with pytest.raises(CaseError, match="key: only here"):
-        agree(COMM, mine)

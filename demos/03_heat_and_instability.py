@@ -48,7 +48,7 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 system = System(load_case("example1-heat", settings))
 system.prepare()
 x, mean = system.facing.x, system.statics.mean_pressure
-speed = system.motion.mean_speeds(1)[0]
+speed = system.motion.mean_speed
 print(f"mean sliding speed {speed:.2f} mm/s, mean pressure {mean:.2f} MPa")
 print(f"mean friction power {0.001 * system.case.contact.friction * 10_000 * speed:.1f} W")
 

@@ -21,6 +21,7 @@ from fenwear.errors import CaseError, Problem
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.system import System
+from fenwear.wear import Worn
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS = "case.toml", "moment.npz"
@@ -52,7 +53,8 @@ def _begin(new: Path, system: System, moment: Moment) -> None:
         np.savez(
             file,
             half_cycle=moment.half_cycle,
-            wear=moment.wear,
+            wear=moment.worn.punch,
+            wear_strip=moment.worn.strip,
             jump_length=moment.jump_length,
             periodic_phases=moment.periodic_phases,
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in ("pressure", "gap", "rigid")},
@@ -92,7 +94,8 @@ def load(directory: Path, system: System, exchange: HeatExchange | None) -> Mome
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
     numbers = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
-    return Moment(int(arrays["half_cycle"]), arrays["wear"], contacts, temperature, *numbers)
+    worn = Worn(arrays["wear"], arrays["wear_strip"])
+    return Moment(int(arrays["half_cycle"]), worn, contacts, temperature, *numbers)
 
 
 def _find(directory: Path) -> Path:

@@ -48,7 +48,7 @@ class BodyFields:
 
 
 def body_fields(
-    system: System, pressure: Array, rigid: Array, direction: int, temperatures: tuple[Array, Array] | None
+    system: System, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
 ) -> tuple[BodyFields, BodyFields]:
     """Return the fields of the punch and the strip; collective.
 
@@ -56,20 +56,21 @@ def body_fields(
         system: The assembled problem.
         pressure: Contact pressure (n,), MPa.
         rigid: Amplitudes of the rigid modes (modes,).
-        direction: Sliding direction d.
+        phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
     """
-    facing, slip = system.facing, direction * system.case.contact.friction
-    on_punch = facing.weights * pressure
-    loads = (on_punch, -(facing.transfer.T @ on_punch))
+    facing, slip = system.facings[phase], system.slips()[phase]
+    normal, tangential = facing.weights * pressure, facing.weights * pressure * slip
+    to_strip = -facing.transfer.T
+    loads = ((normal, tangential), (to_strip @ normal, to_strip @ tangential))
     count = len(system.punch.rigid_modes)
     amplitudes = (rigid[:count], rigid[count:])
     heat_bodies = system.heat_bodies or (None, None)
     punch, strip = (
-        _solve(system, elastic, nodes, load, slip, modes, heat, None if temperatures is None else temperatures[k])
+        _solve(system, elastic, nodes, load, modes, heat, None if temperatures is None else temperatures[k])
         for k, (elastic, nodes, load, modes, heat) in enumerate(
             zip(
-                (system.punch, system.strip),
+                system.phase_bodies[phase],
                 (facing.punch, facing.strip),
                 loads,
                 amplitudes,
@@ -85,15 +86,14 @@ def _solve(
     system: System,
     elastic: ElasticBody,
     nodes: SurfaceNodes,
-    load: Array,
-    slip: float,
+    load: tuple[Array, Array],
     rigid: Array,
     heat: HeatBody | None,
     temperature: Array | None,
 ) -> BodyFields:
-    """Return one body's fields under nodal contact loads (n,), N/mm along e_n; collective."""
+    """Return one body's fields under nodal contact loads along e_n and e_t (n,) each, N/mm; collective."""
     force = elastic.load.copy()
-    vectors = load[:, None] * (nodes.normal + slip * nodes.tangent)
+    vectors = load[0][:, None] * nodes.normal + load[1][:, None] * nodes.tangent
     start, stop = elastic.space.dofmap.index_map.local_range
     own = (nodes.block >= start) & (nodes.block < stop)
     rows = 2 * (nodes.block[own, None] - start) + np.arange(2)
@@ -175,7 +175,11 @@ def write_fields(
         _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
         data.update(_gathered(name, elastic, functions))
     if comm.rank == 0:
-        attributes = {"half_cycle": half_cycle, "direction": direction, "time": half_cycle * system.motion.duration}
+        attributes = {
+            "half_cycle": half_cycle,
+            "direction": direction,
+            "time": float(system.motion.time(np.array(half_cycle))),
+        }
         dataset = xarray.Dataset(data, attrs=attributes)
         part = folder / f"{stem}.part"
         dataset.to_netcdf(part, engine="h5netcdf")

@@ -6,7 +6,7 @@ nodes the nodal force per thickness is w_i p_i, so each node is one complementar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,23 +14,31 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.elasticity import ElasticBody
 from fenwear.errors import CaseError, Problem
+from fenwear.mortar import lagrange, transfer_matrix
 from fenwear.surface import Surface, SurfaceNodes, rigid_motion
+
+STEEPEST = 0.7  # cosine between a surface's normal and the contact's: steeper parts never touch
 
 
 @dataclass(frozen=True)
 class Facing:
-    """The punch's contact nodes opposite the strip's surface.
+    """The punch's contact nodes opposite the strip's surface at one position of the strip.
+
+    The contact frame (e_n into the punch, e_t along the sliding) is that of the strip's surface opposite
+    each node, for both bodies: what acts on one then acts on the other the other way.
 
     Attributes:
-        punch: The punch's contact nodes; the interface takes their coordinates and weights.
-        strip: The strip's contact nodes.
-        transfer: Takes values at the strip's nodes to the punch's (n, n_strip).
-        initial_gap: Distance along e_n before any deformation (n,), mm.
+        punch: The punch's contact nodes in the contact frame; the interface takes their coordinates and weights.
+        strip: The strip's contact nodes, on its material.
+        transfer: Takes displacements and temperatures at the strip's nodes to the punch's (n, n_strip).
+        material: Takes worn depths on the strip's material to the punch's nodes (n, n_strip).
+        initial_gap: Distance along e_n before any deformation and wear (n,), mm.
     """
 
     punch: SurfaceNodes
     strip: SurfaceNodes
     transfer: Array
+    material: Array
     initial_gap: Array
 
     @property
@@ -43,9 +51,49 @@ class Facing:
         """Quadrature weights (n,), mm."""
         return self.punch.weights
 
+    @cached_property
+    def to_strip(self) -> Array:
+        """What puts depths worn at the interface nodes on the strip's material (n_strip, n), areas kept."""
+        return self.material.T * self.weights / self.strip.weights[:, None]
+
+    def opening(self, punch: Array, strip: Array) -> Array:
+        """Return the gap opened by depths worn off both bodies (n,), mm."""
+        return punch + self.material @ strip
+
     def interpolate(self, values: Array, x: Array) -> Array:
         """Return the finite-element function of nodal `values` (n,) at abscissae `x`."""
         return interpolation(self.x, self.punch.degree, np.atleast_1d(x)) @ values
+
+    def moved(self, offset: float, *, whole: bool) -> Facing:
+        """Return the surfaces with the strip moved by `offset` towards +x, mm.
+
+        Args:
+            whole: Whether the strip moves as a whole; else its material only, past the place where its
+                displacements and temperatures are described.
+
+        Raises:
+            CaseError: the strip's contact surface does not reach below the whole punch there.
+        """
+        if offset == 0.0:
+            return self
+        x, strip = self.x, self.strip.x[:, 0] + offset
+        slack = 1e-6 * (x[-1] - x[0])
+        if x[0] < strip[0] - slack or x[-1] > strip[-1] + slack:
+            raise CaseError(
+                Problem(
+                    "motion",
+                    f"the stroke runs off the meshed strip: moved by {offset:g} mm, strip_contact spans x = "
+                    f"{strip[0]:g} to {strip[-1]:g} mm, but punch_contact {x[0]:g} to {x[-1]:g} mm",
+                )
+            )
+        material = transfer_matrix(x, self.punch.degree, strip, self.strip.degree)
+        if not whole:
+            return replace(self, material=material)
+        heights = np.einsum("ic,ic->i", self.punch.normal, self.punch.x - material @ self._shifted(offset))
+        return replace(self, transfer=material, material=material, initial_gap=heights)
+
+    def _shifted(self, offset: float) -> Array:
+        return self.strip.x + np.array([offset, 0.0])
 
 
 def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
@@ -54,18 +102,37 @@ def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
     Raises:
         CaseError: the surfaces do not face each other.
     """
-    x, z = punch.x[:, 0], punch.x[:, 1]
+    x = punch.x[:, 0]
     low, high = strip.x[[0, -1], 0]
     slack = 1e-6 * (x[-1] - x[0])
+    for name, nodes in (("punch", punch), ("strip", strip)):
+        if np.diff(nodes.x[:, 0]).min() <= 0:
+            _not_facing(f"{name}_contact folds back on itself along x")
     if x[0] < low - slack or x[-1] > high + slack:
         _not_facing(f"punch_contact spans x = {x[0]:g} to {x[-1]:g} mm, strip_contact only {low:g} to {high:g} mm")
-    transfer = interpolation(strip.x[:, 0], strip.degree, x)
-    if (np.einsum("ic,ic->i", punch.normal, transfer @ strip.normal) < 0.5).any():
-        _not_facing("the outward normals of punch_contact and strip_contact do not point at each other")
-    gap = (z - transfer @ strip.x[:, 1]) * punch.normal[:, 1]
-    if abs(gap.min()) > 0.01 * (x[-1] - x[0]):
-        _not_facing(f"punch_contact lies {gap.min():g} mm above strip_contact where they are closest")
-    return Facing(punch, strip, transfer, gap)
+    transfer = transfer_matrix(x, punch.degree, strip.x[:, 0], strip.degree)
+    normal = transfer @ strip.normal
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    facing = np.einsum("ic,ic->i", punch.normal, normal)
+    if (facing < STEEPEST).any():
+        worst = int(np.argmin(facing))
+        _not_facing(
+            f"their outward normals do not point at each other at x = {x[worst]:g} mm: they are "
+            f"{np.degrees(np.arccos(np.clip(facing[worst], -1, 1))):.0f} degrees off"
+        )
+    # Forces act along the common normal: a node's weight is its length seen along it.
+    common = replace(
+        punch,
+        normal=normal,
+        tangent=np.stack([normal[:, 1], -normal[:, 0]], axis=1),
+        weights=punch.weights * facing,
+    )
+    gap = np.einsum("ic,ic->i", normal, punch.x - transfer @ strip.x)
+    closest = float(gap.min())
+    if abs(closest) > 0.01 * (x[-1] - x[0]):
+        way = "above" if closest > 0 else "inside"
+        _not_facing(f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest")
+    return Facing(common, strip, transfer, transfer, gap)
 
 
 def _not_facing(reason: str) -> None:
@@ -82,13 +149,8 @@ def interpolation(nodes: Array, degree: int, x: Array) -> Array:
     ends = nodes[::degree]
     facet = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(ends) - 2)
     columns = facet[:, None] * degree + np.arange(degree + 1)
-    local = nodes[columns]
-    difference = x[:, None, None] - local[:, None, :]  # point, shape function, factor
-    spacing = local[:, :, None] - local[:, None, :]
-    same = np.eye(degree + 1, dtype=bool)
-    factors = np.where(same, 1.0, difference) / np.where(same, 1.0, spacing)
     matrix = np.zeros((len(x), len(nodes)))
-    np.put_along_axis(matrix, columns, factors.prod(axis=2), axis=1)
+    np.put_along_axis(matrix, columns, lagrange(nodes[columns], x), axis=1)
     return matrix
 
 
@@ -96,7 +158,7 @@ def interpolation(nodes: Array, degree: int, x: Array) -> Array:
 class Statics:
     """What the equilibrium of the rigid modes needs of the interface; no elasticity in it.
 
-    (H + d mu H_t)^T W p + F = 0, per thickness.
+    (H + H_t tau)^T W p + F = 0, per thickness, tau the traction along e_t over the pressure: d mu.
 
     Attributes:
         facing: The nodes and the transfer.
@@ -112,9 +174,13 @@ class Statics:
     resultant: Array
     mode_names: tuple[str, ...]
 
-    def equilibrium(self, direction: int, friction: float) -> Array:
-        """Return (H + d mu H_t)^T W (modes, n): the load that pressure balances."""
-        return ((self.rigid_normal + direction * friction * self.rigid_tangential) * self.facing.weights[:, None]).T
+    def equilibrium(self, slip: float | Array) -> Array:
+        """Return (H + tau H_t)^T W (modes, n): the load that pressure balances.
+
+        Args:
+            slip: tau = d mu, the same everywhere or (n,).
+        """
+        return (self.rigid_normal.T + slip * self.rigid_tangential.T) * self.facing.weights
 
     @property
     def mean_pressure(self) -> float:
@@ -140,7 +206,7 @@ def statics(facing: Facing, punch: ElasticBody, strip: ElasticBody) -> Statics:
 
 @dataclass(frozen=True)
 class Interface:
-    """Two condensed bodies in contact: gap = (S_n + d mu S_t) p + H a + g_load + g_0 + w.
+    """Two condensed bodies in contact: gap = (S_n + S_t tau) p + H a + g_load + g_0 + w, tau = d mu.
 
     Attributes:
         statics: H, H_t, F, the nodes and the transfer.
@@ -154,14 +220,23 @@ class Interface:
     tangential_compliance: Array
     load_gap: Array
 
-    def compliance(self, direction: int, friction: float) -> Array:
-        """Return S_n + d mu S_t (n, n), mm/MPa."""
-        return self.normal_compliance + direction * friction * self.tangential_compliance
+    def compliance(self, slip: float | Array) -> Array:
+        """Return S_n + S_t tau (n, n), mm/MPa.
+
+        Args:
+            slip: tau = d mu, the same everywhere or (n,).
+        """
+        return self.normal_compliance + self.tangential_compliance * slip
 
     @cached_property
     def elastic_length(self) -> float:
         """Gap that a uniform unit pressure opens on average, mm/MPa: the scale of gaps."""
         return float(np.abs(self.normal_compliance.sum(axis=1)).mean())
+
+    @property
+    def facing(self) -> Facing:
+        """The nodes and the transfer."""
+        return self.statics.facing
 
 
 def join(statics: Statics, punch: Surface, strip: Surface) -> Interface:

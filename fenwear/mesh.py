@@ -81,6 +81,8 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
         raise CaseError(Problem("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
     if path.suffix not in (".geo", ".msh"):
         raise CaseError(Problem("geometry.file", f"expected a .geo or a .msh file, got {geometry.file!r}"))
+    if path.suffix == ".msh" and geometry.order != 1:
+        raise CaseError(Problem("geometry.order", "a .msh file has its own; it belongs to a .geo file"))
     if path.suffix == ".msh" and geometry.parameters:
         raise CaseError(Problem("geometry.parameters", "a .msh file has none; they belong to a .geo file"))
     return path
@@ -147,6 +149,7 @@ def _load(gmsh: Any, geometry: Geometry, path: Path) -> None:
         _merge(gmsh, path)
         if path.suffix == ".geo":
             gmsh.model.mesh.generate(2)
+            gmsh.model.mesh.setOrder(geometry.order)
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(Problem("geometry.file", f"gmsh on {path.name}: {error}")) from None
     _check_groups(gmsh, path)

@@ -26,20 +26,26 @@ class Optimum:
         pressure: (n,), MPa.
         velocity: Rigid-body wear velocity lambda of each mode: mm/s for lambda_F, rad/s for lambda_M.
         residual: Largest error of the equilibrium relative to the load.
+        tilt: chi (n,), the angle between the normal and the wear velocity, tan chi = w_t / w_n (4), rad.
     """
 
     pressure: Array
     velocity: dict[str, float]
     residual: float
+    tilt: Array
 
 
-def check_equilibrium(statics: Statics, direction: int, friction: float) -> None:
+def check_equilibrium(statics: Statics, direction: int, slip: Array) -> None:
     """Make sure that some pressure p >= 0 balances the loads.
+
+    Args:
+        direction: Sliding direction d, for the message.
+        slip: tau = d mu (n,).
 
     Raises:
         CaseError: the loads would lift the punch or tip it over.
     """
-    rows = statics.equilibrium(direction, friction)
+    rows = statics.equilibrium(slip)
     scale = np.abs(rows).max(axis=1, initial=1e-300)
     target = -statics.resultant / scale
     size = np.abs(target).max(initial=0.0)
@@ -59,8 +65,7 @@ def check_equilibrium(statics: Statics, direction: int, friction: float) -> None
 
 def optimum(
     statics: Statics,
-    direction: int,
-    friction: float,
+    slip: Array,
     wear_rate: float,
     pressure_exponent: float,
     zone: Mask | None = None,
@@ -68,7 +73,7 @@ def optimum(
     """Return the optimal pressure and the wear velocity.
 
     Args:
-        direction: Sliding direction d.
+        slip: tau = d mu (n,).
         wear_rate: K, the mean of beta~ v^a, mm/s MPa^-b.
         pressure_exponent: b.
         zone: Nodes that are in contact (n,) bool; by default all.
@@ -76,7 +81,7 @@ def optimum(
     Raises:
         ConvergenceError: Newton's method found no equilibrium.
     """
-    weights_rows = statics.equilibrium(direction, friction)
+    weights_rows = statics.equilibrium(slip)
     modes = statics.rigid_normal
     if zone is not None:
         weights_rows = weights_rows * zone
@@ -111,7 +116,8 @@ def optimum(
     names = statics.mode_names
     if zone is not None:
         pressure = pressure * zone
-    return Optimum(pressure * p_mean, dict(zip(names, velocity.tolist(), strict=True)), residual)
+    tilt = np.arctan2(statics.rigid_tangential @ velocity, modes @ velocity)
+    return Optimum(pressure * p_mean, dict(zip(names, velocity.tolist(), strict=True)), residual, tilt)
 
 
 def _pressure(w: Array, b: float) -> Array:

@@ -56,16 +56,24 @@ HEAT_TERMS = {
 }
 
 
-def _variables(*, heat: bool) -> dict[str, tuple[tuple[str, ...], str, str]]:
-    if not heat:
-        return VARIABLES
+# the same where the strip wears
+STRIP_VARIABLES = {
+    "wear_strip": (("half_cycle", "x_strip"), "mm", "worn depth of the strip at the end of the half-cycle"),
+    "worn_area_strip": (("half_cycle",), "mm2", "cross-section worn off the strip in the half-cycle"),
+}
+
+
+def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
+    if case.heat is None:
+        return variables
     terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
-    return {**VARIABLES, **HEAT_VARIABLES, **terms}
+    return {**variables, **HEAT_VARIABLES, **terms}
 
 
 def _values(block: Block, name: str) -> NDArray[Any]:
     """Return the values of a variable over a block's half-cycles."""
-    if name in VARIABLES or block.heat is None:
+    if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
         return getattr(block, name)
     if name == "heat_balance_error":
         return block.heat.balance_error
@@ -109,8 +117,8 @@ class HistoryWriter:
     def __init__(self, directory: Path, system: System, resumed_after: int | None = None) -> None:
         """Begin a history, or go on with the one of a run that is resumed after a half-cycle."""
         self.path = directory / HISTORY
-        self._variables = _variables(heat=system.case.heat is not None)
-        self._phases = len(system.motion.directions)
+        self._variables = _variables(system.case)
+        self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
         self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
         self._pending: list[dict[str, NDArray[Any]]] = []
@@ -135,17 +143,23 @@ class HistoryWriter:
             file.attrs["Conventions"] = "CF-1.11"
             file.attrs["case"] = system.case.to_toml()
             file.attrs["versions"] = json.dumps(versions())
-            file.dimensions = {"half_cycle": None, "x": len(facing.x)}
-            for name, values, long_name in (
-                ("x", facing.x, "position along the contact, from the centre of the geometry"),
-                ("weight", facing.weights, "length that each contact node stands for"),
-            ):
-                variable = file.create_variable(name, ("x",), float)
+            coordinates = {
+                "x": ("x", facing.x, "position along the contact, from the centre of the geometry"),
+                "weight": ("x", facing.weights, "length that each contact node stands for"),
+            }
+            if system.case.wear.strip is not None:
+                along = "position along the strip, on its material, as x in the middle position"
+                coordinates["x_strip"] = ("x_strip", facing.strip.x[:, 0], along)
+                coordinates["weight_strip"] = ("x_strip", facing.strip.weights, "length that each node stands for")
+            sizes = {dimension: len(values) for dimension, values, _ in coordinates.values()}
+            file.dimensions = {"half_cycle": None, **sizes}
+            for name, (dimension, values, long_name) in coordinates.items():
+                variable = file.create_variable(name, (dimension,), float)
                 variable[:] = values
                 variable.attrs.update(units="mm", long_name=long_name)
             for name, (dimensions, units, long_name) in self._variables.items():
                 kind = int if name in ("half_cycle", "direction", "coupling_iterations") else float
-                chunks = (256, *(len(facing.x) for _ in dimensions[1:]))
+                chunks = (256, *(sizes[d] for d in dimensions[1:]))
                 variable = file.create_variable(name, dimensions, kind, chunks=chunks)
                 variable.attrs.update(units=units, long_name=long_name)
 
@@ -203,7 +217,7 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
     width = facing.x[-1] - facing.x[0]
     centre = (facing.x[-1] + facing.x[0]) / 2
     places = centre + width * np.array([-0.25, 0.0, 0.25])
-    phases = len(system.motion.directions)
+    phases = system.motion.half_cycles
     names = {1: "rightward", -1: "leftward"}
     return {
         "title": system.case.title,
@@ -212,6 +226,7 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
         "mean_pressure_MPa": system.statics.mean_pressure,
         "x_mm": places.tolist(),
         "wear_mm": facing.interpolate(last.wear[-1], places).tolist(),
+        **_strip_summary(system, last),
         **{
             names[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
@@ -228,6 +243,18 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
         "degrees_of_freedom": system.punch.stiffness.size[0] + system.strip.stiffness.size[0],
         "ranks": system.comm.size,
         "versions": versions(),
+    }
+
+
+def _strip_summary(system: System, last: Block) -> dict[str, Any]:
+    """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
+    if system.case.wear.strip is None:
+        return {}
+    depth, nodes = last.wear_strip[-1], system.facing.strip
+    return {
+        "wear_strip_max_mm": float(depth.max()),
+        "worn_area_strip_mm2": float(nodes.weights @ depth),
+        "worn_area_punch_mm2": float(system.facing.weights @ last.wear[-1]),
     }
 
 

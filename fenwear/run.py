@@ -17,7 +17,7 @@ from tqdm import tqdm
 from fenwear import checkpoint
 from fenwear.case import Case
 from fenwear.cycle import Block, growth_rate, jump, march, stability_number
-from fenwear.cycle.moment import Moment
+from fenwear.cycle.moment import Moment, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, Problem
 from fenwear.fields import body_fields, write_fields
 from fenwear.parallel import on_root
@@ -102,7 +102,7 @@ class _Run:
             on_root(self.comm, lambda: make_directory(directory))
         on_root(self.comm, lambda: write_case(directory, self.case))
         self.start = start
-        self.moment = start or Moment(0, system.facing.initial_gap, (), None)
+        self.moment = start or Moment(0, system.unworn(), (), None)
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []
@@ -167,9 +167,11 @@ class _Run:
         temperatures = None
         if self.exchange is not None and temperature is not None:
             temperatures = self.exchange.temperatures(temperature)
-        direction = int(block.direction[-1])
-        fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], direction, temperatures)
-        write_fields(self.directory, self.system, int(block.half_cycle[-1]), fields, direction)
+        half_cycle, motion = int(block.half_cycle[-1]), self.system.motion
+        stroke = (half_cycle - 1) % motion.half_cycles
+        phase = stroke * motion.positions + motion.positions // 2
+        fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], phase, temperatures)
+        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]))
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
@@ -188,11 +190,9 @@ class _Run:
             self._write_fields(self.last)
         if self.moment.half_cycle > 0:
             self._save()
-        phases = len(self.system.motion.directions)
-        if self.last.heat is not None and all(contact is not None for contact in self.moment.contacts):
-            pressure = np.concatenate([c.pressure for c in self.moment.contacts if c is not None])
-            if len(pressure) == phases:
-                self.extremes["growth_rate_per_s"] = growth_rate(self.system, pressure)
+        contacts = joined(self.moment.contacts)
+        if self.last.heat is not None and contacts is not None and self.case.wear.strip is None:
+            self.extremes["growth_rate_per_s"] = growth_rate(self.system, contacts.pressure)
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         on_root(self.comm, lambda: try_report(self.directory, self.log))

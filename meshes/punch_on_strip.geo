@@ -13,6 +13,7 @@ DefineConstant[
   pins_on_left_side = 0,        // 1: pins on both sides of the punch; 0: on the right side only
   strip_length = 1140,
   strip_height = 100,
+  overlap = 0,                  // how far strip_contact reaches beyond the punch, for a strip that moves under it
   elements_along_contact = 16,  // even, so that a node lies at x = 0
   edge_grading = 4,             // element size in the middle of the contact over that at its edges
   growth = 0.5                  // growth of the element size per length away from the contact
@@ -29,6 +30,9 @@ If(strip_length <= punch_width)
 EndIf
 If(pin_height_1 <= 0 || pin_height_1 > punch_height || pin_height_2 < 0 || pin_height_2 > punch_height)
   Error("a pin is off the punch: pin_height_1 and pin_height_2 must not exceed punch_height");
+EndIf
+If(overlap < 0 || overlap >= (strip_length - punch_width) / 2)
+  Error("overlap must not be negative, and strip_contact must end within the strip");
 EndIf
 If(elements_along_contact < 2 || elements_along_contact % 2 != 0 || edge_grading < 1 || growth <= 0)
   Error("elements_along_contact must be even, edge_grading at least 1 and growth positive");
@@ -115,33 +119,51 @@ For i In {0 : #heights[] - 2}
 EndFor
 
 // ---- Strip: under the punch, and on both sides of it ------------------------------------------
-abscissae[] = {-strip_length / 2, -half_width, 0, half_width, strip_length / 2};
-top[] = {}; bottom[] = {}; depth[] = {}; top_lines[] = {}; bottom_lines[] = {}; strip[] = {};
+// Every line runs outwards from x = 0, as on the punch: mirror images and facing nodes agree to the last digit.
+distances[] = {0, half_width};
+If(overlap > 0)
+  distances[] += {half_width + overlap};
+EndIf
+distances[] += {strip_length / 2};
 Ratio = 1 + growth * strip_height / edge_size;
-Count = Ceil(Log(Ratio) / Log(1 + growth));
-Ratio = Ratio ^ (1 / Count);
-For i In {0 : 4}
-  p = newp; Point(p) = {abscissae[i], strip_height, 0}; top[] += p;
-  p = newp; Point(p) = {abscissae[i], 0, 0}; bottom[] += p;
-  l = newl; Line(l) = {top[i], bottom[i]}; depth[] += l;
-  Transfinite Curve{l} = Count + 1 Using Progression Ratio;
-EndFor
-Ratio = 1 + growth * (strip_length / 2 - half_width) / edge_size;
-Count = Ceil(Log(Ratio) / Log(1 + growth));
-Ratio = Ratio ^ (1 / Count);
-For i In {0 : 3}
-  // Every line runs outwards from x = 0, as on the punch: mirror images and facing nodes agree to the last digit.
-  from = (i < 2) ? i + 1 : i;
-  to = (i < 2) ? i : i + 1;
-  a = newl; Line(a) = {top[from], top[to]}; top_lines[] += a;
-  b = newl; Line(b) = {bottom[from], bottom[to]}; bottom_lines[] += b;
-  c = newll; Curve Loop(c) = {a, depth[to], -b, -depth[from]};
-  s = news; Plane Surface(s) = {c}; strip[] += s;
-  If(i == 0 || i == 3)
-    Transfinite Curve{a, b} = Count + 1 Using Progression Ratio;
-  Else
-    Transfinite Curve{a, b} = half_count + 1 Using Progression contact_ratio;
-  EndIf
+deep_count = Ceil(Log(Ratio) / Log(1 + growth));
+deep_ratio = Ratio ^ (1 / deep_count);
+
+strip[] = {}; strip_contact[] = {}; strip_free[] = {}; bottom_lines[] = {}; strip_ends[] = {};
+p = newp; Point(p) = {0, strip_height, 0}; middle_top = p;
+p = newp; Point(p) = {0, 0, 0}; middle_bottom = p;
+l = newl; Line(l) = {middle_top, middle_bottom}; middle_line = l;
+Transfinite Curve{l} = deep_count + 1 Using Progression deep_ratio;
+For side In {0 : 1}
+  top = middle_top; bottom = middle_bottom; inner = middle_line;
+  For i In {1 : #distances[] - 1}
+    x = (2 * side - 1) * distances[i];
+    p = newp; Point(p) = {x, strip_height, 0}; outer_top = p;
+    p = newp; Point(p) = {x, 0, 0}; outer_bottom = p;
+    a = newl; Line(a) = {top, outer_top};
+    b = newl; Line(b) = {bottom, outer_bottom};
+    l = newl; Line(l) = {outer_top, outer_bottom};
+    Transfinite Curve{l} = deep_count + 1 Using Progression deep_ratio;
+    If(i == 1)
+      Transfinite Curve{a, b} = half_count + 1 Using Progression contact_ratio;
+    Else
+      from_edge = distances[i - 1] - half_width;
+      Ratio = (edge_size + growth * (distances[i] - half_width)) / (edge_size + growth * from_edge);
+      Count = Ceil(Log(Ratio) / Log(1 + growth));
+      Ratio = Ratio ^ (1 / Count);
+      Transfinite Curve{a, b} = Count + 1 Using Progression Ratio;
+    EndIf
+    If(i < #distances[] - 1)
+      strip_contact[] += a;
+    Else
+      strip_free[] += a;
+      strip_ends[] += l;
+    EndIf
+    bottom_lines[] += b;
+    c = newll; Curve Loop(c) = {a, l, -b, -inner};
+    s = news; Plane Surface(s) = {c}; strip[] += s;
+    top = outer_top; bottom = outer_bottom; inner = l;
+  EndFor
 EndFor
 
 Transfinite Surface{:};
@@ -155,7 +177,7 @@ Physical Curve("punch_contact") = {across[0], across[1]};
 Physical Curve("punch_load") = {across[#across[] - 2], across[#across[] - 1]};
 Physical Curve("punch_free") = sides[];
 Physical Point("punch_pin") = pins[];
-Physical Curve("strip_contact") = {top_lines[1], top_lines[2]};
-Physical Curve("strip_free") = {top_lines[0], top_lines[3]};
+Physical Curve("strip_contact") = strip_contact[];
+Physical Curve("strip_free") = strip_free[];
 Physical Curve("strip_bottom") = bottom_lines[];
-Physical Curve("strip_ends") = {depth[0], depth[4]};
+Physical Curve("strip_ends") = strip_ends[];

@@ -185,11 +185,11 @@ def test_case_that_does_not_fit_the_geometry(settings: list[str], expected: str)
 def test_surfaces_that_do_not_face(tmp_path: Path) -> None:
     """A punch beside the strip, above it, or upside down does not touch it."""
     text = (meshes_folder() / READY).read_text("utf-8")
-    tail = 'Physical Curve("strip_contact") = {top_lines[1], top_lines[2]};'
+    tail = 'Physical Curve("strip_contact") = strip_contact[];'
     for number, (new, expected) in enumerate(
         [
-            ('Physical Curve("strip_contact") = {top_lines[1]};', "punch_contact spans"),
-            ('Physical Curve("strip_contact") = {bottom_lines[1], bottom_lines[2]};', "do not point at each other"),
+            ('Physical Curve("strip_contact") = {strip_contact[0]};', "punch_contact spans"),
+            ('Physical Curve("strip_contact") = {bottom_lines[0], bottom_lines[#distances[] - 1]};', "do not point at each other"),
             (tail + " Translate{0, 5, 0}{Surface{lower[], upper[]};}", "5 mm above"),
         ]
     ):

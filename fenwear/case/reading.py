@@ -11,10 +11,12 @@ from typing import Any
 
 import pydantic
 
-from fenwear.case.schema import Case, OneWay, Reciprocating, part_models
+from fenwear.case.schema import Case, Dependence, OneWay, Reciprocating, Tabulated, part_models
 from fenwear.errors import CaseError, Problem
 
-MOTIONS: dict[str | int, type] = {"reciprocating": Reciprocating, "one-way": OneWay}
+MOTIONS: dict[str | int, type] = {"reciprocating": Reciprocating, "one-way": OneWay, "table": Tabulated}
+
+FORMS = {*MOTIONS, "number", "dependence"}  # what pydantic puts into a path besides keys
 
 
 def builtin_cases() -> dict[str, str]:
@@ -70,7 +72,10 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
 
 def _laid_over(below: Any, above: Any) -> Any:
     """Return nested tables, those `above` before those `below`; one that names its kind or file stands alone."""
-    if not (isinstance(below, dict) and isinstance(above, dict)) or {"kind", "file"} & above.keys():
+    if (
+        not (isinstance(below, dict) and isinstance(above, dict))
+        or {"kind", "file", "beta", "archard", "energy"} & above.keys()
+    ):
         return above
     return {**below, **{key: _laid_over(below.get(key), value) for key, value in above.items()}}
 
@@ -126,7 +131,7 @@ def _step(place: Any, name: str, setting: str) -> Any:
 
 def _problems(error: Any) -> list[Problem]:  # noqa: PLR0911
     """Turn one pydantic error into problems with the key's path as in the case file."""
-    key = ".".join(str(step) for step in error["loc"] if step not in MOTIONS)
+    key = ".".join(str(step) for step in error["loc"] if step not in FORMS)
     message = str(error["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
     match error["type"]:
         case "extra_forbidden":
@@ -152,6 +157,8 @@ def _suggestion(location: tuple[str | int, ...]) -> str:
         field = getattr(model, "model_fields", {}).get(step)
         if step in MOTIONS:
             model = MOTIONS[step]
+        elif step == "dependence":
+            model = Dependence
         elif field is not None:
             model = next(iter(part_models(field.annotation)), None)
     names = list(getattr(model, "model_fields", {}))

@@ -13,10 +13,22 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
-import pydantic
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer, model_validator
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    Tag,
+    model_validator,
+)
 
+from fenwear.arrays import Array
+from fenwear.case.dependence import evaluate, parse_expression
 from fenwear.case.units import convert, quantity_text
+from fenwear.errors import CaseError, Problem
 
 
 def _quantity(unit: str) -> Any:
@@ -59,6 +71,19 @@ class Geometry(_Part):
     file: str = "punch_on_strip.geo"
     parameters: dict[str, Annotated[float, BeforeValidator(_parameter)]] = {}
     degree: Annotated[int, Field(ge=1, le=8, strict=True)] = 4
+    order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
+        default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
+    )
+    follow_wear: Annotated[Number, Field(gt=0)] | None = Field(
+        default=0.5, description="worn depth over the elements' height above which the mesh follows the worn surface"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _follow_or_not(cls, data: object) -> object:
+        if isinstance(data, Mapping) and data.get("follow_wear") == "never":
+            return {**data, "follow_wear": None}
+        return data
 
 
 class Model(_Part):
@@ -99,12 +124,38 @@ class Load(_Part):
     on: str
     force: tuple[Force, Force] | None = None
     traction: tuple[Stress, Stress] | None = None
+    over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None, description="(fraction of the cycle, factor) pairs: the load varies linearly between them"
+    )
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
         if (self.force is None) == (self.traction is None):
             raise ValueError("give either force or traction")
+        if self.over_cycle is not None:
+            fractions = [fraction for fraction, _ in self.over_cycle]
+            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
+                raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
         return self
+
+    def at(self, fraction: float) -> Load:
+        """Return the load at this fraction of the cycle."""
+        if self.over_cycle is None:
+            return self
+        return self._scaled(float(np.interp(fraction, *np.array(self.over_cycle).T)))
+
+    def mean(self) -> Load:
+        """Return the mean of the load over the cycle."""
+        if self.over_cycle is None:
+            return self
+        fractions, factors = np.array(self.over_cycle).T
+        return self._scaled(float(np.diff(fractions) @ (factors[1:] + factors[:-1]) / 2))
+
+    def _scaled(self, factor: float) -> Load:
+        force, traction = (
+            None if pair is None else (factor * pair[0], factor * pair[1]) for pair in (self.force, self.traction)
+        )
+        return Load(on=self.on, force=force, traction=traction)
 
 
 class Prescribed(_Part):
@@ -126,17 +177,90 @@ class Body(_Part):
     )
 
 
+class Dependence(_Part):
+    """A coefficient that depends on T (K), p (MPa) or v (mm/s): an expression, or a table with straight lines."""
+
+    expression: str | None = None
+    table: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None, description="(argument, value) pairs; beyond its ends the end values hold"
+    )
+    of: Literal["T", "p", "v"] = "T"
+    unit: str = ""
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if (self.expression is None) == (self.table is None):
+            raise ValueError("give either expression or table")
+        if self.expression is not None:
+            try:
+                parse_expression(self.expression)
+            except ValueError as error:
+                raise ValueError(f"expression: {error}") from None
+        if self.table is not None:
+            arguments = [argument for argument, _ in self.table]
+            if len(arguments) < 2 or np.any(np.diff(arguments) <= 0):
+                raise ValueError("table: expected at least two pairs [argument, value] with rising arguments")
+        return self
+
+    def values(self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str) -> Array:
+        """Return the coefficient times `factor` at T, p, v of the `state` (shape).
+
+        Raises:
+            CaseError: it is negative or not finite somewhere; `key` is the case's key.
+        """
+        if self.table is not None:
+            values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
+        else:
+            values = evaluate(parse_expression(self.expression or ""), state, shape)
+        wrong = ~(np.isfinite(values) & (values >= 0))
+        if wrong.any():
+            node = int(np.flatnonzero(wrong)[0])
+            at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g}" for name in ("T", "p", "v"))
+            raise CaseError(Problem(key, f"expected zero or more, got {values[node]:g} at {at} (K, MPa, mm/s)"))
+        return values * factor
+
+
+def _form(value: object) -> str:
+    return "dependence" if isinstance(value, (Mapping, Dependence)) else "number"
+
+
+def _constant_or_dependence(constant: Any) -> Any:
+    """Return the type of a coefficient that is a constant of this type, or depends on the state."""
+    return Annotated[
+        Annotated[constant, Tag("number")] | Annotated[Dependence, Tag("dependence")],
+        Discriminator(_form),
+    ]
+
+
 class Contact(_Part):
     """Unilateral contact with Coulomb friction in gross sliding."""
 
-    friction: Annotated[Number, Field(ge=0)] = 0.0
+    friction: _constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=0.0, description="mu"
+    )
+    transverse_friction: Number = Field(
+        default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
+    )
     solver: Literal["condensed", "full"] = "condensed"
 
 
 class WearLaw(_Part):
-    """Wear rate normal to the surface = coefficient p^b v^a, equation (1)."""
+    """Wear rate normal to the surface = beta~ p^b v^a, equation (1).
 
-    coefficient: float = Field(description="beta~, in (mm/s) MPa^-b (mm/s)^-a")
+    beta~ is given as `coefficient`; or as `beta`, beta~ = beta mu^b; or, for a = b = 1, by Archard's
+    dimensionless coefficient K and the `hardness` H, beta~ = K / H, or by the volume worn for each
+    energy of friction, `energy`, beta~ = energy mu.
+    """
+
+    coefficient: _constant_or_dependence(float | None) = Field(  # type: ignore[valid-type]
+        default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
+    )
+    beta: float | None = Field(default=None, description="beta, in the same unit; beta~ = beta mu^b")
+    archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
+    hardness: Annotated[Stress, Field(gt=0)] | None = None
+    energy: Annotated[float, *_quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
+        default=None, description="volume worn over the energy of friction; beta~ = energy mu"
+    )
     pressure_exponent: Annotated[Number, Field(gt=0)] = 1.0
     speed_exponent: Annotated[Number, Field(gt=0)] = 1.0
 
@@ -146,50 +270,146 @@ class WearLaw(_Part):
         unit = f"MPa^-{pressure_exponent:g}"
         return unit if speed_exponent == 1 else f"{unit}*mm^{1 - speed_exponent:g}*s^{speed_exponent - 1:g}"
 
+    @property
+    def unit(self) -> str:
+        """The unit of beta~."""
+        return self.coefficient_unit(self.pressure_exponent, self.speed_exponent)
+
     @model_validator(mode="before")
     @classmethod
-    def _convert_coefficient(cls, data: object) -> object:
-        if isinstance(data, Mapping) and "coefficient" in data:
-            exponents = (data.get("pressure_exponent", 1.0), data.get("speed_exponent", 1.0))
-            if all(isinstance(e, (int, float)) and not isinstance(e, bool) and 0 < e < 100 for e in exponents):
+    def _convert_coefficients(cls, data: object) -> object:
+        if not isinstance(data, Mapping):
+            return data
+        exponents = (data.get("pressure_exponent", 1.0), data.get("speed_exponent", 1.0))
+        if not all(isinstance(e, (int, float)) and not isinstance(e, bool) and 0 < e < 100 for e in exponents):
+            return data
+        converted = dict(data)
+        for key in {"coefficient", "beta"} & data.keys():
+            if not isinstance(data[key], (Mapping, Dependence, type(None))):
                 try:
-                    number = convert(data["coefficient"], cls.coefficient_unit(*exponents))
+                    converted[key] = convert(data[key], cls.coefficient_unit(*exponents))
                 except ValueError as error:
-                    raise ValueError(f"coefficient: {error}") from None
-                return {**data, "coefficient": number}
-        return data
+                    raise ValueError(f"{key}: {error}") from None
+        return converted
 
-    @pydantic.field_validator("coefficient")
-    @classmethod
-    def _not_negative(cls, value: float) -> float:
-        if not (math.isfinite(value) and value >= 0):
-            raise ValueError("expected a finite number, zero or larger")
-        return value
+    @model_validator(mode="after")
+    def _one_coefficient(self) -> Self:
+        given = [key for key in ("coefficient", "beta", "archard", "energy") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of coefficient, beta, archard and energy, got {' and '.join(given) or 'none'}")
+        for key in ("coefficient", "beta"):
+            value = getattr(self, key)
+            if isinstance(value, float) and not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{key}: expected a finite number, zero or larger")
+        if (self.archard is None) != (self.hardness is None):
+            raise ValueError("hardness: expected together with archard, and only then")
+        if (self.archard, self.energy) != (None, None) and (self.pressure_exponent, self.speed_exponent) != (1.0, 1.0):
+            raise ValueError(f"{given[0]}: expected with exponents of 1 only; give coefficient or beta")
+        if isinstance(self.coefficient, Dependence):
+            try:
+                convert(f"1 {self.coefficient.unit}" if self.coefficient.unit else 1.0, self.unit)
+            except ValueError as error:
+                raise ValueError(f"coefficient: unit: {error}") from None
+        return self
+
+    @property
+    def scale(self) -> float:
+        """What turns values of a dependent coefficient into its internal unit."""
+        if isinstance(self.coefficient, Dependence) and self.coefficient.unit:
+            return convert(f"1 {self.coefficient.unit}", self.unit)
+        return 1.0
+
+    def resolved(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the dumped tables `data` of this law with the units of its coefficients."""
+        for key in ("coefficient", "beta"):
+            if isinstance(getattr(self, key), float):
+                data[key] = quantity_text(getattr(self, key), self.unit)
+        return data
 
 
 class Wear(_Part):
     """The wear law of each body that wears."""
 
-    punch: WearLaw
+    punch: WearLaw | None = None
+    strip: WearLaw | None = None
+
+    @model_validator(mode="after")
+    def _some_law(self) -> Self:
+        if self.punch is None and self.strip is None:
+            raise ValueError("expected the wear law of punch, strip or both")
+        return self
 
 
-class Reciprocating(_Part):
-    """Harmonic sliding, v = u0 omega |sin omega t|, equation (10); it starts rightward."""
+class _Motion(_Part):
+    """What all motions share."""
+
+    axis: Literal["x", "y"] = Field(default="x", description="x: along the contact; y: out of the plane")
+
+
+class _ToAndFro(_Motion):
+    positions: Annotated[int, Field(ge=1, le=200, strict=True)] | None = Field(
+        default=None,
+        description="of the strip under the punch in each half-cycle; 1: opposite each other throughout; "
+        "by default 1 unless the strip wears, then 9",
+    )
+
+
+class Reciprocating(_ToAndFro):
+    """Sliding to and fro over 2 u0 in each half-cycle; it starts rightward, from -u0.
+
+    sinusoidal: v = u0 omega |sin omega t|, equation (10); triangular: constant speed; trapezoidal: the
+    speed rises linearly over the fraction `ramp` of the half-cycle, stays, and falls again.
+    """
 
     kind: Literal["reciprocating"]
     amplitude: Annotated[Length, Field(gt=0)]
-    angular_frequency: Annotated[AngularFrequency, Field(gt=0)]
-    phases: ClassVar[int] = 2
+    angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = None
+    period: Annotated[Time, Field(gt=0)] | None = None
+    profile: Literal["sinusoidal", "triangular", "trapezoidal"] = "sinusoidal"
+    ramp: Annotated[Number, Field(gt=0, le=0.5)] | None = None
+
+    @model_validator(mode="after")
+    def _one_frequency(self) -> Self:
+        if (self.angular_frequency is None) == (self.period is None):
+            raise ValueError("give either angular_frequency or period")
+        if (self.ramp is not None) != (self.profile == "trapezoidal"):
+            raise ValueError("ramp: expected with a trapezoidal profile, and only then")
+        return self
+
+    @property
+    def half_period(self) -> float:
+        """Duration of a half-cycle, s."""
+        return math.pi / self.angular_frequency if self.angular_frequency else (self.period or 0.0) / 2
 
 
-class OneWay(_Part):
+class OneWay(_Motion):
     """Steady sliding in one direction, counted in steps of `duration`."""
 
     kind: Literal["one-way"]
     direction: Literal["leftward", "rightward"]
     speed: Annotated[Speed, Field(gt=0)]
     duration: Annotated[Time, Field(gt=0)]
-    phases: ClassVar[int] = 1
+    track: Annotated[Length, Field(gt=0)] | None = Field(
+        default=None, description="length of the closed track over which the strip's wear spreads"
+    )
+
+
+class Tabulated(_ToAndFro):
+    """The strip's position over one cycle, straight lines between the given times; every stroke is a half-cycle."""
+
+    kind: Literal["table"]
+    times: Annotated[tuple[Time, ...], Field(min_length=3)]
+    displacements: Annotated[tuple[Length, ...], Field(min_length=3)] = Field(description="of the strip, towards +x")
+
+    @model_validator(mode="after")
+    def _a_cycle(self) -> Self:
+        if len(self.times) != len(self.displacements):
+            raise ValueError(f"displacements: expected {len(self.times)} values, one for each time")
+        if self.times[0] != 0 or np.any(np.diff(self.times) <= 0):
+            raise ValueError("times: expected 0 first, and rising")
+        if self.displacements[0] != self.displacements[-1] or len(set(self.displacements)) < 2:
+            raise ValueError("displacements: expected a motion that ends where it starts")
+        return self
 
 
 class Heat(_Part):
@@ -275,7 +495,7 @@ class Case(_Part):
     strip: Body
     contact: Contact = Contact()
     wear: Wear
-    motion: Annotated[Reciprocating | OneWay, Field(discriminator="kind")]
+    motion: Annotated[Reciprocating | OneWay | Tabulated, Field(discriminator="kind")]
     heat: Heat | None = None
     run: Run
     output: Output = Output()
@@ -300,13 +520,44 @@ class Case(_Part):
             problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
-        if self.run.integration == "jump" and self.run.half_cycles < self.motion.phases:
-            problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
+        problems += self._sliding_problems()
         if not any(load.force or load.traction for load in self.punch.loads):
             problems.append("punch.loads: expected at least one load that presses the punch on the strip")
         if problems:
             raise ValueError("\n".join(problems))
         return self
+
+    def _sliding_problems(self) -> list[str]:
+        problems = []
+        motion, one_way = self.motion, isinstance(self.motion, OneWay)
+        least = 1 if one_way else 2
+        if self.run.integration == "jump" and self.run.half_cycles < least:
+            problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
+        if self.wear.strip is not None:
+            if isinstance(motion, OneWay):
+                if motion.track is None and motion.axis == "x":
+                    problems.append("motion.track: missing, but required where the strip wears in one-way sliding")
+            elif motion.positions == 1 and motion.axis == "x":
+                problems.append("motion.positions: expected 2 or more, since the strip's wear spreads over the stroke")
+        if motion.axis == "y" and self.heat is not None:
+            problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
+        if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
+            problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
+        if motion.axis == "y" and not isinstance(motion, OneWay) and (motion.positions or 1) > 1:
+            problems.append("motion.positions: expected 1 for sliding out of the plane")
+        friction = self.contact.friction
+        for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
+            if law is not None and law.coefficient is None and law.archard is None and friction == 0:
+                problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
+        return problems
+
+    @property
+    def varies(self) -> bool:
+        """Whether a coefficient depends on the state, or a load on the time in the cycle."""
+        laws = [law.coefficient for law in (self.wear.punch, self.wear.strip) if law is not None]
+        loads = [load.over_cycle for body in (self.punch, self.strip) for load in body.loads]
+        dependent = any(isinstance(value, Dependence) for value in (self.contact.friction, *laws))
+        return dependent or any(table is not None for table in loads)
 
     def _thermal_problems(self, heat: Heat) -> list[str]:
         needed = ("conductivity", "heat_capacity", "density", "expansion")
@@ -339,10 +590,11 @@ class Case(_Part):
         data = self.model_dump(mode="json", exclude_none=True)
         if self._folder is not None and (self._folder / self.geometry.file).is_file():
             data["geometry"]["file"] = str((self._folder / self.geometry.file).resolve())  # wherever it is read next
-        law = self.wear.punch
-        data["wear"]["punch"]["coefficient"] = quantity_text(
-            law.coefficient, law.coefficient_unit(law.pressure_exponent, law.speed_exponent)
-        )
+        for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
+            if law is not None:
+                data["wear"][body] = law.resolved(data["wear"][body])
+        if self.geometry.follow_wear is None:
+            data["geometry"]["follow_wear"] = "never"
         return data
 
     def to_toml(self) -> str:

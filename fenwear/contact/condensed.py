@@ -2,25 +2,30 @@
 
 For every phase of the motion (a sliding direction d) and every contact node:
 
-    gap = (S_n + d mu S_t) p + H a + g >= 0,    p >= 0,    p gap = 0,
-    (H + d mu H_t)^T W p + F = 0   for the rigid modes a,
+    gap = (S_n + S_t tau) p + H a + g >= 0,    p >= 0,    p gap = 0,
+    (H + H_t tau)^T W p + F = 0   for the rigid modes a,
 
-g the gap of the unloaded bodies with their loads' effect and the worn depth. A `Layer` adds to the
-gaps of all phases what their own pressures open, such as the wear of the step they belong to.
+tau = d mu the traction of friction over the pressure, g the gap of the unloaded bodies with their
+loads' effect and the worn depth. A `Layer` adds to the gaps of all phases what their own pressures
+open, such as the wear of the step they belong to.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
+import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.contact.inequality import DenseInequality
+from fenwear.contact.inequality import Bordered, BorderedInequality, DenseInequality
 from fenwear.interface import Interface
 
+DENSE = 400  # unknowns up to which one dense elimination beats one for each phase
+PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
 
@@ -41,14 +46,27 @@ class ContactState:
     iterations: int
 
 
+@dataclass(frozen=True)
+class Sliding:
+    """What slides in one phase.
+
+    Attributes:
+        interface: The surfaces opposite each other, under the loads of the phase.
+        slip: tau = d mu (n,), the traction on the punch along e_t over the pressure.
+    """
+
+    interface: Interface
+    slip: Array
+
+
 class Layer(Protocol):
-    """What the phases' own pressures add to every phase's gap, node by node."""
+    """What the phases' own pressures add to every phase's gap."""
 
     def opening(self, pressure: Array) -> Array:
-        """Return the added gap (n,), mm, from the pressures (m, n)."""
+        """Return the added gap (m, n), mm, from the pressures (m, n)."""
 
-    def slope(self, pressure: Array) -> Array:
-        """Return its derivative to each pressure (m, n), mm/MPa."""
+    def border(self, pressure: Array) -> tuple[Array, Array]:
+        """Return L (m, n, q) and R (m, q, n): its derivative, of phase k to pressures j, is L_k R_j, mm/MPa."""
 
 
 class ContactSolver(Protocol):
@@ -68,14 +86,15 @@ class CondensedContact:
     """The inequality on the condensed interface, with unknown (p, a) for each phase.
 
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
-    PETSc's absolute tolerances mean the same for every case.
+    PETSc's absolute tolerances mean the same for every case. Phases meet in the layer only: where
+    there are many, one small elimination for each of them takes the place of one of all.
     """
 
-    def __init__(self, interface: Interface, friction: float, directions: Sequence[int]) -> None:
-        self.interface = interface
-        self.directions = tuple(directions)
+    def __init__(self, phases: Sequence[Sliding]) -> None:
+        self.phases = list(phases)
+        interface = phases[0].interface
         statics = interface.statics
-        n, r, m = len(statics.facing.weights), len(statics.resultant), len(self.directions)
+        n, r, m = len(statics.facing.weights), len(statics.resultant), len(self.phases)
         self.shape = (m, n)
         self._pressure_scale = statics.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
@@ -83,59 +102,86 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * statics.facing.weights.sum()
         size = n + r
-        self._elastic = np.zeros((m * size, m * size))
+        self._blocks = np.zeros((m, size, size))
+        self._elastic: Array | None = None
         self._offset = np.zeros((m, size))
-        self._offset[:, n:] = statics.resultant / self._resultant_scale
-        for phase, d in enumerate(self.directions):
-            block = self._elastic[phase * size : (phase + 1) * size, phase * size : (phase + 1) * size]
-            block[:n, :n] = interface.compliance(d, friction) * (self._pressure_scale / self._gap_scale)
-            block[:n, n:] = statics.rigid_normal * (self._rigid_scale / self._gap_scale)
-            block[n:, :n] = statics.equilibrium(d, friction) * (self._pressure_scale / self._resultant_scale[:, None])
-        self._operator, self._coupling = self._elastic, None  # type: Array, Array | None
+        self._loads = np.array([phase.interface.load_gap for phase in self.phases])
+        for phase, block, offset in zip(self.phases, self._blocks, self._offset, strict=True):
+            offset[n:] = phase.interface.statics.resultant / self._resultant_scale
+            block[:n, n:] = phase.interface.statics.rigid_normal * (self._rigid_scale / self._gap_scale)
+        self._slips = [phase.slip for phase in self.phases]
+        for k, slip in enumerate(self._slips):
+            self._fill_slip(k, slip)
+        self._coupling: Array | None = None
         self._layer: Layer | None = None
         self._filled = False
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
-        upper = np.full(m * size, np.inf)
-        self._inequality = DenseInequality(
-            lower, upper, self._residual, self._jacobian, "fenwear_contact_", "the contact of punch and strip"
-        )
+        self._bounds = (lower, np.full(m * size, np.inf))
+
+    def _fill_slip(self, k: int, slip: Array) -> None:
+        n, interface = self.shape[1], self.phases[k].interface
+        balance = interface.statics.equilibrium(slip)
+        self._blocks[k, :n, :n] = interface.compliance(slip) * (self._pressure_scale / self._gap_scale)
+        self._blocks[k, n:, :n] = balance * (self._pressure_scale / self._resultant_scale[:, None])
+
+    def slide(self, slips: Sequence[Array]) -> None:
+        """Set tau of each phase, (n,) each."""
+        for k, (slip, before) in enumerate(zip(slips, self._slips, strict=True)):
+            if slip is not before and not np.array_equal(slip, before):
+                self._fill_slip(k, slip)
+                self._elastic, self._filled = None, False
+        self._slips = list(slips)
+
+    @cached_property
+    def _dense(self) -> DenseInequality:
+        return DenseInequality(*self._bounds, self._residual, self._dense_jacobian, PREFIX, NAME)
+
+    @cached_property
+    def _bordered(self) -> BorderedInequality:
+        m, n = self.shape
+        matrix = Bordered(self._blocks, np.zeros((m, n, 0)), np.zeros((m, 0, n)))
+        return BorderedInequality(*self._bounds, self._residual, self._bordered_jacobian, matrix, PREFIX, NAME)
 
     def _pressures(self, x: Array) -> Array:
-        return x.reshape(len(self.directions), -1)[:, : self.shape[1]] * self._pressure_scale
+        return x.reshape(self._offset.shape)[:, : self.shape[1]] * self._pressure_scale
 
     def _residual(self, x: Array, f: Array) -> None:
-        np.dot(self._operator, x, out=f)
-        f += self._offset.ravel()
+        n, parts = self.shape[1], f.reshape(self._offset.shape)
+        np.matmul(self._blocks, x.reshape(self._offset.shape)[:, :, None], out=parts[:, :, None])
+        parts += self._offset
+        if self._coupling is not None:
+            parts[:, :n] += np.tensordot(self._coupling, self._pressures(x), axes=2) / self._gap_scale
         if self._layer is not None:
-            f.reshape(self._offset.shape)[:, : self.shape[1]] += (
-                self._layer.opening(self._pressures(x)) / self._gap_scale
-            )
+            parts[:, :n] += self._layer.opening(self._pressures(x)) / self._gap_scale
 
-    def _jacobian(self, x: Array, jacobian: Array) -> None:
+    def _dense_jacobian(self, x: Array, jacobian: Array) -> None:
         if self._layer is None and self._filled:
             return  # the operator alone, as the last time
-        jacobian[:] = self._operator
+        jacobian[:] = self._operator()
         self._filled = self._layer is None
         if self._layer is not None:
             m, n = self.shape
-            slope = self._layer.slope(self._pressures(x)) * (self._pressure_scale / self._gap_scale)
-            nodes, size = np.arange(n), self._offset.shape[1]
-            for row in range(m):
-                for column in range(m):
-                    jacobian[row * size + nodes, column * size + nodes] += slope[column]
+            left, right = self._layer.border(self._pressures(x))
+            scale, size = self._pressure_scale / self._gap_scale, self._offset.shape[1]
+            for k in range(m):
+                for j in range(m):
+                    jacobian[k * size : k * size + n, j * size : j * size + n] += (left[k] @ right[j]) * scale
 
-    def _couple(self, coupling: Array | None) -> None:
-        """Add what pressures open besides elasticity to the operator, where it is not there yet."""
-        if coupling is self._coupling:
-            return
-        self._coupling, self._filled = coupling, False
-        if coupling is None:
-            self._operator = self._elastic
-            return
-        m, n = self.shape
-        self._operator = self._elastic.copy()
-        phases = self._operator.reshape(m, -1, m, self._offset.shape[1])
-        phases[:, :n, :, :n] += coupling * (self._pressure_scale / self._gap_scale)
+    def _operator(self) -> Array:
+        """Return the derivative of the residual without the layer (m size, m size)."""
+        (m, n), size = self.shape, self._offset.shape[1]
+        if self._elastic is None:
+            self._elastic = scipy.linalg.block_diag(*self._blocks)
+        if self._coupling is None:
+            return self._elastic
+        operator = self._elastic.copy()
+        operator.reshape(m, size, m, size)[:, :n, :, :n] += self._coupling * (self._pressure_scale / self._gap_scale)
+        return operator
+
+    def _bordered_jacobian(self, x: Array, matrix: Bordered) -> None:
+        if self._layer is not None:
+            left, right = self._layer.border(self._pressures(x))
+            matrix.left, matrix.right = left, right * (self._pressure_scale / self._gap_scale)
 
     def solve(
         self,
@@ -158,19 +204,25 @@ class CondensedContact:
         """
         n = self.shape[1]
         offset = self._offset
-        offset[:, :n] = (gap + self.interface.load_gap) / self._gap_scale
+        offset[:, :n] = (gap + self._loads) / self._gap_scale
         guess = np.zeros_like(offset)
         if start is None:
             guess[:, :n] = 1.0
         else:
             guess[:, :n] = start.pressure / self._pressure_scale
             guess[:, n:] = start.rigid / self._rigid_scale
+        if coupling is not self._coupling:
+            self._coupling, self._filled = coupling, False
         self._layer = layer
-        self._couple(coupling)
-        x = self._inequality.solve(guess.ravel()).reshape(offset.shape)
+        alone = coupling is None and layer is not None and offset.size > DENSE
+        inequality = self._bordered if alone else self._dense
+        x = inequality.solve(guess.ravel()).reshape(offset.shape)
         pressure = np.where(x[:, :n] > ZERO, x[:, :n], 0.0) * self._pressure_scale
-        residual = self._operator @ x.ravel() + offset.ravel()
-        gaps = residual.reshape(offset.shape)[:, :n] * self._gap_scale
-        if layer is not None:
-            gaps = gaps + layer.opening(pressure)
-        return ContactState(pressure, gaps, x[:, n:] * self._rigid_scale, self._inequality.snes.getIterationNumber())
+        residual = np.empty_like(offset)
+        self._residual(x.ravel(), residual.ravel())
+        return ContactState(
+            pressure,
+            residual[:, :n] * self._gap_scale,
+            x[:, n:] * self._rigid_scale,
+            inequality.snes.getIterationNumber(),
+        )

@@ -5,7 +5,7 @@ change of the active set factors the whole system again.
 
     K_1 u_1 - C_1 p = f_1,    K_2 u_2 + C_2 p = f_2,
     gap = N_1 u_1 - N_2 u_2 + H a + g >= 0,    p >= 0,    p gap = 0,
-    (H + d mu H_t)^T W p + F = 0.
+    (H + H_t tau)^T W p + F = 0.
 """
 
 from __future__ import annotations
@@ -28,9 +28,7 @@ class FullContact:
     rigid modes to rank 0, coupled through global numbers: no partition can lose a contact pair.
     """
 
-    def __init__(
-        self, punch: ElasticBody, strip: ElasticBody, interface: Interface, friction: float, direction: int
-    ) -> None:
+    def __init__(self, punch: ElasticBody, strip: ElasticBody, interface: Interface, slip: Array) -> None:
         self.interface = interface
         self.comm = punch.body.mesh.comm
         statics = interface.statics
@@ -41,7 +39,6 @@ class FullContact:
         n, modes = len(facing.weights), len(statics.resultant)
         self._size = (n, modes)
 
-        slip = direction * friction
         weights = np.diag(facing.weights)
         rows = [
             [punch.stiffness, None, -_forces(punch, facing.punch, weights, slip)],
@@ -50,7 +47,7 @@ class FullContact:
         ]
         if modes:
             rows = [[*rows[0], None], [*rows[1], None], [*rows[2], self._rank0_matrix(statics.rigid_normal)]]
-            rows.append([None, None, self._rank0_matrix(statics.equilibrium(direction, friction)), None])
+            rows.append([None, None, self._rank0_matrix(statics.equilibrium(slip)), None])
         nest = PETSc.Mat().createNest(rows, comm=self.comm)
         self._operator = nest.convert("aij" if self.comm.size == 1 else "mpiaij")
         self._offset = self._operator.createVecLeft()
@@ -143,15 +140,15 @@ class FullContact:
         return matrix
 
 
-def _forces(elastic: ElasticBody, nodes: SurfaceNodes, distribution: Array, slip: float) -> PETSc.Mat:
-    """Return C (dofs, n): nodal forces p (e_n + d mu e_t), zero where supported; collective.
+def _forces(elastic: ElasticBody, nodes: SurfaceNodes, distribution: Array, slip: Array) -> PETSc.Mat:
+    """Return C (dofs, n): nodal forces p (e_n + tau e_t), zero where supported; collective.
 
     Args:
         distribution: Force at each node of this surface from each pressure (nodes, n).
-        slip: d mu.
+        slip: tau = d mu of each pressure (n,).
     """
-    vectors = nodes.normal + slip * nodes.tangent
-    values = vectors[:, :, None] * distribution[:, None, :]  # node, component, pressure
+    vectors = nodes.normal[:, :, None] + nodes.tangent[:, :, None] * slip
+    values = vectors * distribution[:, None, :]  # node, component, pressure
     comm = elastic.body.mesh.comm
     count = distribution.shape[1]
     sizes = (elastic.stiffness.getSizes()[0], (count if comm.rank == 0 else 0, count))
@@ -178,7 +175,7 @@ def _normals(elastic: ElasticBody, nodes: SurfaceNodes, transfer: Array) -> PETS
     if comm.rank == 0:
         columns = (2 * nodes.block[:, None] + np.arange(2)).astype(np.int32)
         for row in range(count):
-            used = np.flatnonzero(np.abs(transfer[row]) > 1e-14)
+            used = np.flatnonzero(transfer[row])
             matrix.setValues([row], columns[used].ravel(), (transfer[row, used, None] * nodes.normal[used]).ravel())
     matrix.assemble()
     return matrix

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
 from fenwear.system import System
+from fenwear.wear import Worn
 
 
 @dataclass(frozen=True)
@@ -44,12 +45,17 @@ class BlockHeat:
 
 @dataclass(frozen=True)
 class HalfCycleHeat:
-    """The heat of one half-cycle: one row of `BlockHeat`."""
+    """The heat of one half-cycle, or of one of its phases: one row of `BlockHeat`."""
 
     temperature_punch: Array
     temperature_strip: Array
     terms: Array
     coupling_iterations: int
+
+    def then(self, later: HalfCycleHeat) -> HalfCycleHeat:
+        """Return the heat of this phase and the next one."""
+        iterations = max(self.coupling_iterations, later.coupling_iterations)
+        return HalfCycleHeat(later.temperature_punch, later.temperature_strip, self.terms + later.terms, iterations)
 
 
 @dataclass(frozen=True)
@@ -60,15 +66,18 @@ class Block:
         system: What they were computed on.
         half_cycle: Number of each half-cycle (k,), from 1.
         direction: Its sliding direction d (k,).
-        pressure: p during it (k, n), MPa.
-        gap: Gap during it (k, n), mm.
-        wear: Worn depth at its end (k, n), mm.
-        rigid: Amplitudes of the rigid modes (k, modes).
-        worn_area: Cross-section worn off in it, the integral of its wear (k,), mm².
+        pressure: p in its middle position (k, n), MPa.
+        gap: Gap there (k, n), mm.
+        wear: Worn depth of the punch at its end (k, n), mm.
+        wear_strip: Of the strip, on its material (k, n_strip), mm.
+        rigid: Amplitudes of the rigid modes there (k, modes).
+        worn_area: Cross-section worn off the punch in it, the integral of its wear (k,), mm².
+        worn_area_strip: The same of the strip (k,), mm².
         optimum_distance: Largest distance to the optimal pressure of the present contact zone,
             over the mean pressure (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
             mean pressure (k,); NaN in the first cycle.
+        equilibrium_error: Largest error of the force and moment balance relative to the load (k,).
         heat: Temperatures and heat balance; None without heat.
         end: From where the run goes on.
     """
@@ -79,10 +88,13 @@ class Block:
     pressure: Array
     gap: Array
     wear: Array
+    wear_strip: Array
     rigid: Array
     worn_area: Array
+    worn_area_strip: Array
     optimum_distance: Array
     periodicity: Array
+    equilibrium_error: Array
     heat: BlockHeat | None = field(default=None, kw_only=True)
     end: Moment = field(kw_only=True)
 
@@ -92,7 +104,7 @@ class Block:
     @property
     def time(self) -> Array:
         """Time at the end of each half-cycle (k,), s."""
-        return self.half_cycle.astype(float) * self.system.motion.duration
+        return self.system.motion.time(self.half_cycle)
 
     @property
     def max_pressure(self) -> Array:
@@ -104,18 +116,24 @@ class Block:
         """Width of the nodes in contact, by their weights (k,), mm."""
         return (self.pressure > 0) @ self.system.statics.facing.weights
 
-    @cached_property
-    def equilibrium_error(self) -> Array:
-        """Largest error of the force and moment balance relative to the load (k,)."""
-        statics, friction = self.system.statics, self.system.case.contact.friction
-        lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
-        scale = lengths * statics.mean_pressure * statics.facing.weights.sum()
-        error = np.zeros(len(self))
-        for d in np.unique(self.direction):
-            rows = self.direction == d
-            balance = self.pressure[rows] @ statics.equilibrium(d, friction).T + statics.resultant
-            error[rows] = np.abs(balance / scale).max(axis=1, initial=0.0)
-        return error
+
+@dataclass(frozen=True)
+class PhaseRecord:
+    """What one phase of a half-cycle came to.
+
+    Attributes:
+        phase: Its number in the cycle.
+        contact: Its contact.
+        before: Pressure of the same phase one cycle ago (n,), MPa; None in the first cycle.
+        areas: Cross-sections worn off punch and strip, mm².
+        slip: tau = d mu (n,).
+    """
+
+    phase: int
+    contact: ContactState
+    before: Array | None
+    areas: tuple[float, float]
+    slip: Array
 
 
 @dataclass
@@ -127,29 +145,43 @@ class Recorder:
     _rows: list[tuple[object, ...]] = field(default_factory=list)
     _heat: list[HalfCycleHeat] = field(default_factory=list)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
+    _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last slip
 
-    def add(
-        self,
-        half_cycle: int,
-        direction: int,
-        phase: int,
-        state: ContactState,
-        wear: Array,
-        worn: Array,
-        previous: Array | None,
-        heat: HalfCycleHeat | None = None,
-    ) -> float:
-        """Record one half-cycle and return its periodicity."""
-        pressure = state.pressure[phase]
+    def add(self, half_cycle: int, phases: Sequence[PhaseRecord], worn: Worn, heat: HalfCycleHeat | None) -> float:
+        """Record one half-cycle and return its periodicity.
+
+        Args:
+            half_cycle: Its number.
+            phases: Its phases in their order.
+            worn: Depths at its end.
+            heat: Of all its phases.
+        """
+        middle = phases[len(phases) // 2]
+        state, pressure = middle.contact, middle.contact.pressure[0]
         scale = self.system.statics.mean_pressure
-        change = float("nan") if previous is None else float(np.abs(pressure - previous).max()) / scale
+        direction = self.system.motion.phases[middle.phase].direction
+        change = max(
+            float("nan") if p.before is None else float(np.abs(p.contact.pressure[0] - p.before).max()) / scale
+            for p in phases
+        )
         distance = float(np.abs(pressure - self._optimum(direction, pressure)).max()) / scale
-        area = float(self.system.statics.facing.weights @ worn)
-        row = (half_cycle, direction, pressure, state.gap[phase], wear, state.rigid[phase], area, distance, change)
-        self._rows.append(row)
+        row = (half_cycle, direction, pressure, state.gap[0], worn.punch, worn.strip, state.rigid[0])
+        areas = np.sum([p.areas for p in phases], axis=0).tolist()
+        self._rows.append((*row, *areas, distance, change, max(self._balance(p) for p in phases)))
         if heat is not None:
             self._heat.append(heat)
         return change
+
+    def _balance(self, record: PhaseRecord) -> float:
+        """Return the largest error of the force and moment balance relative to the load."""
+        statics = self.system.interfaces[record.phase].statics
+        lengths = self.system.mode_lengths
+        scale = lengths * self.system.statics.mean_pressure * statics.facing.weights.sum()
+        known = self._equilibria.get(record.phase)
+        if known is None or known[0] is not record.slip:
+            self._equilibria[record.phase] = known = (record.slip, statics.equilibrium(record.slip))
+        balance = known[1] @ record.contact.pressure[0] + statics.resultant
+        return float(np.abs(balance / scale).max(initial=0.0))
 
     @property
     def full(self) -> bool:

@@ -2,7 +2,7 @@
 
 All phases of a cycle stand in one inequality with the wear of N cycles at their own pressures:
 
-    gap_d = S_d p_d + H a_d + g + w_n + N beta~ S (p_+^b + p_-^b) >= 0,   p_d >= 0,   p_d gap_d = 0,
+    gap_k = S_k p_k + H a_k + g_k + w_n + N beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
 
 and, with heat, the thermal gap at the end of N cycles, which is linear in the same pressures. It is
 stable for any N. A step is made whole and in two halves; their difference in pressure is the error
@@ -11,19 +11,21 @@ estimate, and the halves are kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.contact import ContactState
-from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.moment import Moment, beginning, joined, parted
 from fenwear.errors import ConvergenceError
+from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
 from fenwear.system import System
-from fenwear.wear import WornLayer
+from fenwear.wear import Worn, WornLayer
 
 MAX_ITERATIONS = 60  # of contact with the nodes that conduct
 CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
@@ -57,13 +59,13 @@ def jump(
     Raises:
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
     """
-    phases = len(system.motion.directions)
+    strokes = system.motion.half_cycles
     stepper = _Stepper(system)
-    cycles = half_cycles // phases
-    ends = sorted({-(-stop // phases) for stop in stops} | {cycles})
+    cycles = half_cycles // strokes
+    ends = sorted({-(-stop // strokes) for stop in stops} | {cycles})
     moment = start or stepper.beginning()
     recorder = Recorder(system, block)
-    done, length = moment.half_cycle // phases, moment.jump_length
+    done, length = moment.half_cycle // strokes, moment.jump_length
     while done < cycles:
         tried = min(length, next(end for end in ends if end > done) - done)
         try:
@@ -75,8 +77,8 @@ def jump(
                 continue
             if recorder:
                 yield recorder.take(moment)
-            raise ConvergenceError(f"half-cycle {done * phases + 1}: {error}") from error
-        error_estimate = _largest_change(whole, end) / system.statics.mean_pressure
+            raise ConvergenceError(f"half-cycle {done * strokes + 1}: {error}") from error
+        error_estimate = _largest_change(whole, end) / _present_mean(system, end)
         factor = 0.9 * np.sqrt(tolerance / max(error_estimate, 1e-300))
         if error_estimate > tolerance and tried > 1:
             length = max(1, int(tried * max(0.2, factor)))
@@ -84,7 +86,7 @@ def jump(
         done += tried
         if tried == length or factor < 1:  # a step cut short by an end says little of the next length
             length = max(1, int(tried * min(5.0, factor)))
-        end = replace(end, half_cycle=done * phases, jump_length=length)
+        end = replace(end, half_cycle=done * strokes, jump_length=length)
         change = stepper.record(recorder, moment, end, tried)
         moment = end
         finished = periodic_within is not None and change < periodic_within
@@ -99,8 +101,10 @@ class _Stepper:
 
     def __init__(self, system: System) -> None:
         self.system = system
-        self.contact = system.contact(system.motion.directions)
+        self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.heat = cycle_heat(system)
+        self.slips = system.slips()
+        self.wear = system.phases_wear
 
     def beginning(self) -> Moment:
         """Return the unworn bodies at their initial temperature."""
@@ -108,8 +112,11 @@ class _Stepper:
 
     def step(self, moment: Moment, cycles: float) -> Moment:
         """Return the moment `cycles` cycles later."""
-        layer = WornLayer(self.system.wear, cycles)
-        gap = self.system.facing.initial_gap + moment.wear
+        if not self.system.constant_coefficients:
+            self._update(moment)
+        layer = WornLayer(self.wear, cycles)
+        phases = range(len(self.slips))
+        gap = np.array([self.system.gap(phase, moment.worn) for phase in phases])
         contact, temperature = joined(moment.contacts), moment.temperature
         if self.heat is None or temperature is None or contact is None:
             # With heat this is the first step: which nodes conduct is seen from the contact without it.
@@ -124,30 +131,65 @@ class _Stepper:
                 self.system.statics.mean_pressure,
             )
             temperature = self.heat.parts(end)
-        return Moment(moment.half_cycle, moment.wear + layer.opening(contact.pressure), parted(contact), temperature)
+        worn = moment.worn + self.wear.worn(contact.pressure).times(cycles)
+        return Moment(moment.half_cycle, worn, parted(contact), temperature)
+
+    def _update(self, moment: Moment) -> None:
+        """Take friction and wear at the pressures and temperatures at the start of the step."""
+        surfaces = None
+        if self.heat is not None and moment.temperature is not None:
+            surfaces = self.heat.exchange.contact_temperatures(moment.temperature)
+        pressures = [None if contact is None else contact.pressure[0] for contact in moment.contacts]
+        self.take([self.system.conditions(k, pressure, surfaces) for k, pressure in enumerate(pressures)])
+
+    def take(self, conditions: Sequence[ContactConditions]) -> None:
+        """Take friction and wear at the conditions of the phases."""
+        system = self.system
+        self.wear = system.wear.phases(conditions)
+        if system.friction.constant:
+            return
+        self.slips = system.slips(conditions)
+        if isinstance(self.contact, CondensedContact):
+            self.contact.slide(self.slips)
+        if self.heat is not None:
+            mu = np.array([system.friction.values(state) for state in conditions])
+            self.heat = CycleHeat(self.heat.exchange.with_friction(mu))
 
     def record(self, recorder: Recorder, before: Moment, after: Moment, cycles: int) -> float:
-        """Record the phases of the last cycle; return the largest change of pressure per cycle."""
-        directions = self.system.motion.directions
-        heats = self._last_cycle_heat(after)
+        """Record the half-cycles of the last cycle; return the largest change of pressure per cycle."""
+        motion, changes = self.system.motion, []
         contacts = [_present(contact) for contact in after.contacts]
-        worn = [self.system.wear.depth(contact.pressure[0]) for contact in contacts]
-        changes = []
-        for phase, contact in enumerate(contacts):
-            old, previous = before.contacts[phase], None
-            if old is not None:
-                previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
-            number = after.half_cycle - (len(directions) - 1 - phase)
-            depth = after.wear - np.sum(worn[phase + 1 :], axis=0)  # the phases after this one have worn the rest
-            changes.append(
-                recorder.add(number, directions[phase], 0, contact, depth, worn[phase], previous, heats[phase])
-            )
+        heats = self._last_cycle_heat(after)
+        # Half-cycles after one have worn what is missing at its end.
+        depths = [after.worn]
+        phases = list(range(len(contacts)))
+        for stroke in reversed(range(1, motion.half_cycles)):
+            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
+            depths.insert(0, depths[0] - self._worn(own, contacts))
+        for stroke, depth in enumerate(depths):
+            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
+            records = [self._phase_record(k, contacts[k], before.contacts[k], cycles) for k in own]
+            number = after.half_cycle - (motion.half_cycles - 1 - stroke)
+            own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
+            heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
+            changes.append(recorder.add(number, records, depth, heat))
         return max(changes)
+
+    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState]) -> Worn:
+        pressures = np.concatenate([contacts[k].pressure for k in phases])
+        return self.wear.some(phases).worn(pressures)
+
+    def _phase_record(self, phase: int, contact: ContactState, old: ContactState | None, cycles: int) -> PhaseRecord:
+        previous = None
+        if old is not None:
+            previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
+        areas = self.wear.some([phase]).worn_area(contact.pressure)
+        return PhaseRecord(phase, contact, previous, areas, self.slips[phase])
 
     def _last_cycle_heat(self, moment: Moment) -> list[HalfCycleHeat | None]:
         """Return the heat of one more cycle at the pressures of the moment."""
         if self.heat is None or moment.temperature is None:
-            return [None] * len(self.system.motion.directions)
+            return [None] * len(moment.contacts)
         heats: list[HalfCycleHeat | None] = []
         exchange, state = self.heat.exchange, moment.temperature
         for phase, contact in enumerate(moment.contacts):
@@ -197,6 +239,13 @@ def solve_with_heat(
 def _largest_change(one: Moment, other: Moment) -> float:
     pairs = zip(one.contacts, other.contacts, strict=True)
     return max(float(np.abs(_present(a).pressure - _present(b).pressure).max()) for a, b in pairs)
+
+
+def _present_mean(system: System, moment: Moment) -> float:
+    """Return the mean pressure over what is in contact, at least that over the nominal contact, MPa."""
+    mean, weights = system.statics.mean_pressure, system.facing.weights
+    widths = [float(weights @ (_present(contact).pressure[0] > 0)) for contact in moment.contacts]
+    return mean * max(1.0, float(weights.sum()) / max(*widths, weights.min()))
 
 
 def _present(contact: ContactState | None) -> ContactState:

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
+from functools import reduce
 
-from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
 from fenwear.cycle.moment import Moment, beginning
-from fenwear.cycle.thermal import ThermalContact
+from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.errors import ConvergenceError
-from fenwear.heat.exchange import State
+from fenwear.motion import Motion
 from fenwear.system import System
-from fenwear.wear import WornLayer
+from fenwear.wear import Worn
 
 BLOCK = 200
-# Of a phase: temperature at the start, gap, the same phase one cycle ago -> contact, temperature, heat.
-Solve = Callable[
-    [int, State | None, Array, ContactState | None], tuple[ContactState, State | None, HalfCycleHeat | None]
-]
 
 
 def march(
@@ -49,43 +45,39 @@ def march(
     Raises:
         ConvergenceError: a half-cycle, which it names, did not converge; all before it are yielded.
     """
-    directions = system.motion.directions
-    solve = _solver(system, implicit)
-    exchange = system.exchange
+    motion, exchange = system.motion, system.exchange
+    steps = [PhaseStep(system, phase, implicit=implicit) for phase in range(len(motion.phases))]
     moment = start or beginning(system, None if exchange is None else exchange.initial())
-    gap0, contacts = system.facing.initial_gap, list(moment.contacts)
-    wear, temperature, periodic_phases = moment.wear, moment.temperature, moment.periodic_phases
     recorder = Recorder(system, block)
     for half_cycle in range(moment.half_cycle + 1, half_cycles + 1):
-        phase = (half_cycle - 1) % len(directions)
-        before = contacts[phase]
         try:
-            contact, temperature, heat = solve(phase, temperature, gap0 + wear, before)
+            ends, worn, contacts = _half_cycle(steps, motion, moment, half_cycle)
         except ConvergenceError as error:
             if recorder:
                 yield recorder.take(moment)
             raise ConvergenceError(f"half-cycle {half_cycle}: {error}") from error
-        worn = system.wear.depth(contact.pressure[0])
-        wear = wear + worn
-        contacts[phase] = contact
-        previous = None if before is None else before.pressure[0]
-        change = recorder.add(half_cycle, directions[phase], 0, contact, wear, worn, previous, heat)
-        periodic_phases = periodic_phases + 1 if periodic_within is not None and change < periodic_within else 0
-        finished = periodic_phases >= len(directions)
-        moment = Moment(half_cycle, wear, tuple(contacts), temperature, periodic_phases=periodic_phases)
+        heats = [end.heat for end in ends if end.heat is not None]
+        heat = reduce(HalfCycleHeat.then, heats) if heats else None
+        change = recorder.add(half_cycle, [end.record for end in ends], worn, heat)
+        repeats = periodic_within is not None and change < periodic_within
+        periodic = moment.periodic_phases + 1 if repeats else 0
+        finished = periodic >= motion.half_cycles
+        moment = Moment(half_cycle, worn, contacts, ends[-1].temperature, periodic_phases=periodic)
         if recorder.full or finished or half_cycle == half_cycles or half_cycle in stops:
             yield recorder.take(moment)
         if finished:
             return
 
 
-def _solver(system: System, implicit: bool) -> Solve:
-    """Return what solves a half-cycle of a phase: contact alone, or contact with heat."""
-    layer = WornLayer(system.wear) if implicit else None
-    exchange = system.exchange
-    if exchange is None:
-        contacts = [system.contact((d,)) for d in system.motion.directions]
-        return lambda phase, _, gap, start: (contacts[phase].solve(gap, start, layer), None, None)
-    thermal = [ThermalContact(system, exchange, phase) for phase in range(len(system.motion.directions))]
-    initial = exchange.initial()
-    return lambda phase, temperature, gap, start: thermal[phase].solve(temperature or initial, gap, start, layer)
+def _half_cycle(
+    steps: Sequence[PhaseStep], motion: Motion, moment: Moment, half_cycle: int
+) -> tuple[list[PhaseEnd], Worn, tuple[ContactState | None, ...]]:
+    """Return the ends of the phases of a half-cycle, the worn depths and the last contact of every phase."""
+    first = (half_cycle - 1) % motion.half_cycles * motion.positions
+    worn, temperature, contacts = moment.worn, moment.temperature, list(moment.contacts)
+    ends = []
+    for phase in range(first, first + motion.positions):
+        end = steps[phase].solve(temperature, worn, contacts[phase])
+        worn, temperature, contacts[phase] = worn + end.worn, end.temperature, end.record.contact
+        ends.append(end)
+    return ends, worn, tuple(contacts)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.heat.exchange import State
 from fenwear.system import System
+from fenwear.wear import Worn
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class Moment:
 
     Attributes:
         half_cycle: Its number; 0 before the first.
-        wear: Worn depth (n,), mm.
+        worn: Worn depths of both bodies.
         contacts: The last contact of each phase; None where there was none yet.
         temperature: State of the heat exchange; None without heat.
         jump_length: Cycles that the next jump tries.
@@ -26,7 +26,7 @@ class Moment:
     """
 
     half_cycle: int
-    wear: Array
+    worn: Worn
     contacts: tuple[ContactState | None, ...]
     temperature: State | None
     jump_length: int = 1
@@ -35,8 +35,7 @@ class Moment:
 
 def beginning(system: System, temperature: State | None) -> Moment:
     """Return the unworn bodies at their initial temperature."""
-    phases = len(system.motion.directions)
-    return Moment(0, np.zeros_like(system.facing.initial_gap), (None,) * phases, temperature)
+    return Moment(0, system.unworn(), (None,) * len(system.motion.phases), temperature)
 
 
 def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:

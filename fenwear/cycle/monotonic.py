@@ -41,7 +41,7 @@ def monotonic(system: System) -> Monotonic:
     """
     if system.case.heat is None:
         raise CaseError(Problem("heat", "missing, but required here"))
-    speed = float(system.motion.mean_speeds(1)[0])
+    speed = system.motion.mean_speed
     exchange = system.steady_exchange([d * speed for d in DIRECTIONS])
     pressures = [system.optimum(d).pressure for d in DIRECTIONS]
     punch, strip = [], []

@@ -9,7 +9,6 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.jump import cycle_heat
 from fenwear.system import System
-from fenwear.wear import WornLayer
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 
@@ -19,20 +18,22 @@ def stability_number(system: System) -> float:
 
     On closed contact a worn depth lowers the pressure by P = (I - H-part) S^-1, the leading block of
     the inverse of [[S, H], [E, 0]]. An explicit half-cycle multiplies an error of the shape by
-    I - K P with K = beta~ S b p^(b-1) at the mean pressure: stable while K times the largest
-    eigenvalue of P is below 2.
+    I - K P with K = beta~ S b p^(b-1) of both bodies at the mean pressure, in the phase that wears most:
+    stable while K times the largest eigenvalue of P is below 2.
     """
-    statics, friction = system.statics, system.case.contact.friction
+    statics = system.statics
     n, r = statics.rigid_normal.shape
-    law, mean = system.case.wear.punch, statics.mean_pressure
-    stiffness = system.wear.per_power * law.pressure_exponent * mean ** (law.pressure_exponent - 1)
+    uniform = np.full((len(system.motion.phases), n), statics.mean_pressure)
+    wear = system.phases_wear
+    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
     scale = system.interface.elastic_length
     largest = 0.0
-    for d in system.motion.directions:
+    for d in sorted(set(system.motion.directions)):
+        slip = system.slip(d)
         matrix = np.zeros((n + r, n + r))
-        matrix[:n, :n] = system.interface.compliance(d, friction) / scale
+        matrix[:n, :n] = system.interface.compliance(slip) / scale
         matrix[:n, n:] = statics.rigid_normal
-        matrix[n:, :n] = statics.equilibrium(d, friction)
+        matrix[n:, :n] = statics.equilibrium(slip)
         factor = scipy.linalg.lu_factor(matrix)
 
         def respond(shape: Array, factor: tuple[Array, Array] = factor) -> Array:
@@ -42,14 +43,14 @@ def stability_number(system: System) -> float:
         start = np.where(np.arange(n) % 2, 1.0, -1.0)  # the fastest mode alternates from node to node
         values = eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)
         largest = max(largest, float(np.abs(values).max()) / scale)
-    return stiffness * largest / 2
+    return float(slopes.max()) * largest / 2
 
 
 def growth_rate(system: System, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
-    Negative: every disturbance dies out. The cycle's map of temperature and worn depth is linearised
-    around the given pressures with the same nodes in contact and implicit wear, and its eigenvalue
+    Negative: every disturbance dies out. The strip does not wear. The cycle's map of temperature and
+    worn depth is linearised around the given pressures with the same nodes in contact and implicit wear, and its eigenvalue
     largest in size taken: ln |lambda| over the duration of a cycle. A rigid motion of the worn shape changes
     nothing, nor does the shape where nothing touches; these disturbances (lambda = 1) do not count.
 
@@ -61,11 +62,13 @@ def growth_rate(system: System, pressure: Array) -> float:
     n = pressure.shape[1]
     dim = 0 if heat is None else heat.gap_rows.shape[1]
     maps = None if heat is None else heat.maps(heat.conductances(pressure))
-    slopes = WornLayer(system.wear).slope(pressure)
+    punch = system.phases_wear.punch
+    slopes = np.zeros_like(pressure) if punch is None else punch.slope(pressure)
+    slips = system.slips()
     cycle = np.eye(dim + n)
-    for phase, d in enumerate(system.motion.directions):
+    for phase, interface in enumerate(system.interfaces):
         change = np.zeros((dim + n, dim + n))  # of temperature and depth over the phase
-        compliance = system.interface.compliance(d, system.case.contact.friction)
+        compliance = interface.compliance(slips[phase])
         disturbance = np.zeros((n, dim + n))
         disturbance[:, dim:] = np.eye(n)
         if heat is not None and maps is not None:
@@ -74,7 +77,7 @@ def growth_rate(system: System, pressure: Array) -> float:
             compliance = compliance + heat.gap_rows @ one.response
             change[:dim, :dim] = one.propagator
         compliance = compliance + np.diag(slopes[phase])  # wear at the end of the phase: no step is too long
-        answer = -_restricted_stiffness(system, d, compliance, pressure[phase] > 0) @ disturbance
+        answer = -_restricted_stiffness(system, slips[phase], compliance, pressure[phase] > 0) @ disturbance
         if maps is not None:
             change[:dim] += maps[phase].response @ answer
         change[dim:, dim:] = np.eye(n)
@@ -82,20 +85,19 @@ def growth_rate(system: System, pressure: Array) -> float:
         cycle = change @ cycle
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL
-    duration = system.motion.duration * len(system.motion.directions)
-    return float(np.log(np.abs(values[counted]).max()) / duration)
+    return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
 
 
-def _restricted_stiffness(system: System, direction: int, compliance: Array, closed: Mask) -> Array:
+def _restricted_stiffness(system: System, slip: Array, compliance: Array, closed: Mask) -> Array:
     """Return minus the pressure (n, n) that each unit of gap makes where `closed` nodes stay closed."""
-    statics, friction = system.statics, system.case.contact.friction
+    statics = system.statics
     nodes = np.flatnonzero(closed)
     k, r = len(nodes), statics.rigid_normal.shape[1]
     scale = system.interface.elastic_length
     matrix = np.zeros((k + r, k + r))
     matrix[:k, :k] = compliance[np.ix_(nodes, nodes)] / scale
     matrix[:k, k:] = statics.rigid_normal[nodes]
-    matrix[k:, :k] = statics.equilibrium(direction, friction)[:, nodes]
+    matrix[k:, :k] = statics.equilibrium(slip)[:, nodes]
     stiffness = np.zeros((len(closed), len(closed)))
     stiffness[np.ix_(nodes, nodes)] = np.linalg.inv(matrix)[:k, :k] / scale
     return stiffness
@@ -118,9 +120,10 @@ def critical_speed(system: System, direction: int) -> float:
     """
     n = len(system.facing.weights)
     everywhere = np.ones(n, dtype=bool)
-    compliance = system.interface.compliance(direction, system.case.contact.friction)
-    stiffness = _restricted_stiffness(system, direction, compliance, everywhere)
-    speed = float(system.motion.mean_speeds(1)[0])
+    slip = system.slip(direction)
+    compliance = system.interface.compliance(slip)
+    stiffness = _restricted_stiffness(system, slip, compliance, everywhere)
+    speed = system.motion.mean_speed
     for _ in range(50):  # the strip's temperature depends on its speed
         exchange = system.steady_exchange([direction * speed])
         uniform = np.full(n, system.statics.mean_pressure)

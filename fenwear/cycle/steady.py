@@ -3,31 +3,38 @@
 At the end the wear of a cycle is a rigid motion of the punch, H lambda, and the shape omega (worn
 depth, initial gap and the rigid motion of the first phase together) no longer changes:
 
-    gap_d = S_d p_d + H a_d + omega + g_load >= 0,  p_d >= 0,  p_d gap_d = 0     for each phase,
-    beta~ S (sum of p_d^b) - H lambda >= 0,  omega <= a bound far above any elastic gap,
+    gap_k = S_k p_k + H a_k + omega + g_load >= 0,  p_k >= 0,  p_k gap_k = 0     for each phase,
+    beta~ (sum of S_k p_k^b) - H lambda >= 0,  omega <= a bound far above any elastic gap,
 
 with the equilibrium of each phase; a of the first phase is zero by the choice of omega. Where the
 wear outruns the rigid motion for ever the surface opens without limit: there omega is at its bound.
+
+Wear of the strip joins where it keeps the strip's shape: sliding out of the plane, or on a closed
+track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
+position touches it: there is no state that repeats.
 """
 
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
+from fenwear.case import OneWay
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
 from fenwear.errors import ConvergenceError
+from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
 from fenwear.system import System
-from fenwear.wear import WornLayer
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
+MAX_ITERATIONS, CLOSE = 60, 1e-9  # of coefficients that depend on the state; change of pressure over the mean
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
 
@@ -36,8 +43,8 @@ class SteadyHeat:
     """The temperatures of the cyclic steady state.
 
     Attributes:
-        punch: Of the punch's contact surface at the end of each phase (phases, n), K.
-        strip: Of the strip's (phases, n), K.
+        punch: Of the punch's contact surface at the end of each half-cycle (half_cycles, n), K.
+        strip: Of the strip's (half_cycles, n), K.
         mean_fields: Mean of the ends of the phases, of this rank's own nodes of both bodies, K.
     """
 
@@ -51,12 +58,12 @@ class Steady:
     """The cyclic steady state; for one-way sliding the steady state, equal to the optimum.
 
     Attributes:
-        directions: Sliding direction of each phase.
-        pressure: (phases, n), MPa.
-        gap: (phases, n), mm.
+        directions: Sliding direction of each half-cycle.
+        pressure: In the middle position of each half-cycle (half_cycles, n), MPa.
+        gap: The same (half_cycles, n), mm.
         shape: Worn depth without its rigid part (n,), mm; NaN where the surfaces never touch.
-        contact_width: Width in contact in each phase (phases,), mm.
-        wear_per_cycle: Depth worn in a cycle (n,), mm.
+        contact_width: Width in contact there (half_cycles,), mm.
+        wear_per_cycle: Depth worn off both bodies in a cycle (n,), mm.
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
         iterations: Newton iterations.
         seconds: Wall time of the solve.
@@ -81,31 +88,29 @@ class _SteadyInequality:
     def __init__(self, system: System) -> None:
         statics, interface = system.statics, system.interface
         self.system = system
-        self.directions = system.motion.directions
-        m, n, r = len(self.directions), len(system.facing.weights), len(statics.resultant)
+        m, n, r = len(system.motion.phases), len(system.facing.weights), len(statics.resultant)
         self.m, self.n, self.r = m, n, r
+        self.wear = system.phases_wear
         self.p_scale = statics.mean_pressure
         self.gap_scale = self.p_scale * interface.elastic_length
-        self.wear_scale = float(system.wear.depth(np.array(self.p_scale)))
-        self.lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
+        self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
+        self.lengths = system.mode_lengths
+        self.moment = self.lengths[:, None] * self.p_scale * statics.facing.weights.sum()
         shape = statics.rigid_normal / self.lengths
-        moment = self.lengths[:, None] * self.p_scale * statics.facing.weights.sum()
-        friction = system.case.contact.friction
         size = m * n + n + m * r
         self.matrix = np.zeros((size, size))
         self.offset = np.zeros(size)
         omega = slice(m * n, m * n + n)
         last = m * n + n
-        for k, d in enumerate(self.directions):
+        for k, own in enumerate(system.interfaces):
             rows = slice(k * n, (k + 1) * n)
-            self.matrix[rows, rows] = interface.compliance(d, friction) * (self.p_scale / self.gap_scale)
             self.matrix[rows, omega] = np.eye(n)
             if k > 0:
                 self.matrix[rows, last + (k - 1) * r : last + k * r] = shape
-            self.offset[rows] = interface.load_gap / self.gap_scale
-            balance = slice(last + k * r, last + (k + 1) * r)
-            self.matrix[balance, rows] = statics.equilibrium(d, friction) * self.p_scale / moment
-            self.offset[balance] = statics.resultant / moment[:, 0]
+            moved = own.facing.initial_gap - system.facing.initial_gap
+            self.offset[rows] = (own.load_gap + moved) / self.gap_scale
+            self.offset[last + k * r : last + (k + 1) * r] = own.statics.resultant / self.moment[:, 0]
+        self._slide(system.slips())
         # At its upper bound a variational inequality wants F <= 0: the wear balance with its sign turned.
         self.matrix[omega, size - r :] = shape
         self.omega = omega
@@ -119,19 +124,34 @@ class _SteadyInequality:
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
 
+    def _slide(self, slips: Sequence[Array]) -> None:
+        """Fill in what friction changes."""
+        n, r, last = self.n, self.r, self.m * self.n + self.n
+        for k, (own, slip) in enumerate(zip(self.system.interfaces, slips, strict=True)):
+            rows, balance = slice(k * n, (k + 1) * n), slice(last + k * r, last + (k + 1) * r)
+            self.matrix[rows, rows] = own.compliance(slip) * (self.p_scale / self.gap_scale)
+            self.matrix[balance, rows] = own.statics.equilibrium(slip) * self.p_scale / self.moment
+        self.slips = list(slips)
+
+    def take(self, conditions: Sequence[ContactConditions]) -> None:
+        """Take friction and wear at the conditions of the phases."""
+        self.wear = self.system.wear.phases(conditions)
+        self.matrix[:], self.offset[:] = self._without_heat
+        self._slide(self.system.slips(conditions))
+        self._without_heat = (self.matrix.copy(), self.offset.copy())
+
     def _residual(self, x: Array, f: Array) -> None:
         m, n = self.m, self.n
         f[:] = self.matrix @ x + self.offset
         pressure = x[: m * n].reshape(m, n) * self.p_scale
-        f[self.omega] -= self.system.wear.depth(pressure).sum(axis=0) / self.wear_scale
+        f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
 
     def _jacobian(self, x: Array, jacobian: Array) -> None:
         m, n = self.m, self.n
         jacobian[:] = self.matrix
-        slope = WornLayer(self.system.wear).slope(x[: m * n].reshape(m, n) * self.p_scale) * self.p_scale
-        rows = np.arange(n)
+        left, right = self.wear.border(x[: m * n].reshape(m, n) * self.p_scale)
         for k in range(m):
-            jacobian[m * n + rows, k * n + rows] -= slope[k] / self.wear_scale
+            jacobian[self.omega, k * n : (k + 1) * n] -= (left[0] @ right[k]) * (self.p_scale / self.wear_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
         opened = m * n + np.flatnonzero(x[: m * n].reshape(m, n).max(axis=0) <= 0)
         jacobian[opened, opened] += DRIVE
@@ -162,10 +182,10 @@ class _SteadyInequality:
         m, n, r = self.m, self.n, self.r
         x = np.zeros(len(self.offset))
         if m == 1:
-            optimum = self.system.optimum(self.directions[0])
+            optimum = self.system.optimum(self.system.motion.directions[0])
             x[:n] = optimum.pressure / self.p_scale
             velocity = np.array([optimum.velocity[name] for name in self.system.statics.mode_names])
-            x[n + n :] = velocity * self.system.motion.duration * self.lengths / self.wear_scale
+            x[n + n :] = velocity * self.system.motion.period * self.lengths / self.wear_scale
         else:
             x[: m * n] = 1.0
             if r:
@@ -192,51 +212,103 @@ def steady(system: System) -> Steady:
         CaseError: with heat, a body that loses heat nowhere.
         ConvergenceError: the inequality did not converge, or not with the nodes that conduct.
     """
-    interface = system.interface
-    heat = cycle_heat(system)
+    _check_exists(system)
     begin = time.perf_counter()
     problem = _SteadyInequality(system)
+    for body in system.heat_bodies or ():
+        body.check_heat_sink()
+    contact, heat, temperature = _solve(problem, cycle_heat(system))
+    for _ in range(0 if system.constant_coefficients else MAX_ITERATIONS):
+        before = contact.pressure
+        conditions = _conditions(system, before, heat, temperature)
+        problem.take(conditions)
+        if heat is not None and not system.friction.constant:
+            mu = np.array([system.friction.values(state) for state in conditions])
+            heat = CycleHeat(heat.exchange.with_friction(mu))
+        contact, heat, temperature = _solve(problem, heat)
+        if np.abs(contact.pressure - before).max() < CLOSE * system.statics.mean_pressure:
+            break
+    else:
+        if not system.constant_coefficients:
+            raise ConvergenceError("the coefficients and the steady state they depend on did not come together")
+    return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
+
+
+def _check_exists(system: System) -> None:
+    """Raise where the strip's wear never comes to a shape that stays."""
+    motion = system.case.motion
+    if system.case.wear.strip is not None and motion.axis == "x" and not isinstance(motion, OneWay):
+        raise ConvergenceError(
+            "no cyclic steady state exists: the strip wears, and under a punch that goes to and fro its track deepens "
+            "for ever, most where every position touches it. Follow the wear by `run` with run.integration = "
+            '"jump", or take wear.strip away'
+        )
+
+
+def _solve(problem: _SteadyInequality, heat: CycleHeat | None) -> tuple[ContactState, CycleHeat | None, Array | None]:
+    """Return the contact of all phases, and with heat the temperature."""
+    system = problem.system
     try:
         contact = problem.solve()
     except ConvergenceError as error:
-        if _uniform_wear_exists(system):
+        if system.case.wear.strip is not None or _uniform_wear_exists(system):
             raise
         raise ConvergenceError(
             f"{error}; friction tips the punch so far that no pressures wear the whole contact by a rigid motion: "
             "it goes on changing its shape. Expected less friction, a lower pin or a wider contact"
         ) from error
-    temperature: Array | None = None
-    if heat is not None:
-        for body in system.heat_bodies or ():
-            body.check_heat_sink()
-        contact, temperature = solve_with_heat(
-            heat,
-            heat.initial(),
-            np.inf,
-            contact,
-            lambda thermal, coupling, _: problem.solve(thermal, coupling),
-            system.statics.mean_pressure,
-        )
-    weights = system.facing.weights
+    if heat is None:
+        return contact, None, None
+    contact, temperature = solve_with_heat(
+        heat,
+        heat.initial(),
+        np.inf,
+        contact,
+        lambda thermal, coupling, _: problem.solve(thermal, coupling),
+        system.statics.mean_pressure,
+    )
+    return contact, heat, temperature
+
+
+def _conditions(
+    system: System, pressure: Array, heat: CycleHeat | None, temperature: Array | None
+) -> list[ContactConditions]:
+    """Return what coefficients depend on in each phase: the temperatures at its start."""
+    phases = range(len(pressure))
+    if heat is None or temperature is None:
+        return [system.conditions(k, pressure[k]) for k in phases]
+    conditions, parts = [], heat.parts(temperature)
+    for k in phases:
+        conditions.append(system.conditions(k, pressure[k], heat.exchange.contact_temperatures(parts)))
+        parts, _ = heat.exchange.half_cycle(parts, k, pressure[k], heat.exchange.conductance(pressure[k]))
+    return conditions
+
+
+def _result(
+    problem: _SteadyInequality, contact: ContactState, heat: CycleHeat | None, temperature: Array | None, seconds: float
+) -> Steady:
+    system = problem.system
+    weights, motion = system.facing.weights, system.motion
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
     shape = np.where(touched, omega - _rigid_part(system, omega - system.facing.initial_gap, touched), np.nan)
-    velocity = problem.x[len(problem.x) - problem.r :] * problem.wear_scale / problem.lengths
+    velocity: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale / problem.lengths
+    middle = slice(motion.positions // 2, None, motion.positions)
     return Steady(
-        problem.directions,
-        contact.pressure,
-        contact.gap,
+        motion.stroke_directions,
+        contact.pressure[middle],
+        contact.gap[middle],
         shape - system.facing.initial_gap,
-        (contact.pressure > 0) @ weights,
-        system.wear.depth(contact.pressure).sum(axis=0),
-        dict(zip(interface.statics.mode_names, velocity.tolist(), strict=True)),
+        (contact.pressure[middle] > 0) @ weights,
+        problem.wear.opening(contact.pressure)[0],
+        {name: float(value) for name, value in zip(system.statics.mode_names, velocity, strict=True)},
         contact.iterations,
-        time.perf_counter() - begin,
-        None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure),
+        seconds,
+        None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure, middle),
     )
 
 
-def _steady_heat(heat: CycleHeat, state: Array, pressure: Array) -> SteadyHeat:
+def _steady_heat(heat: CycleHeat, state: Array, pressure: Array, middle: slice) -> SteadyHeat:
     """Follow the temperatures through one cycle of the steady state."""
     exchange, parts = heat.exchange, heat.parts(state)
     punch, strip, means = [], [], np.zeros_like(state)
@@ -247,23 +319,23 @@ def _steady_heat(heat: CycleHeat, state: Array, pressure: Array) -> SteadyHeat:
         strip.append(temperatures[1])
         means += np.concatenate(parts) / len(pressure)
     fields = [side.field.temperature(s) for side, s in zip(exchange.sides, heat.parts(means), strict=True)]
-    return SteadyHeat(np.array(punch), np.array(strip), (fields[0], fields[1]))
+    ends = slice(middle.step - 1, None, middle.step)  # the last phase of each half-cycle
+    return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends], (fields[0], fields[1]))
 
 
 def _uniform_wear_exists(system: System) -> bool:
     """Return whether any pressures of the phases wear the whole contact by a rigid motion (b = 1)."""
-    statics, friction = system.statics, system.case.contact.friction
-    directions, (n, r) = system.motion.directions, statics.rigid_normal.shape
-    m = len(directions)
-    lengths = np.abs(statics.rigid_normal).max(axis=0, initial=1e-300)
+    n, r = system.statics.rigid_normal.shape
+    m = len(system.motion.phases)
+    lengths = system.mode_lengths
     equality = np.zeros((n + m * r, m * n + r))
     target = np.zeros(n + m * r)
-    equality[:n, m * n :] = -statics.rigid_normal / lengths
-    for k, d in enumerate(directions):
+    equality[:n, m * n :] = -system.statics.rigid_normal / lengths
+    for k, (own, slip) in enumerate(zip(system.interfaces, system.slips(), strict=True)):
         equality[:n, k * n : (k + 1) * n] = np.eye(n)
         rows = slice(n + k * r, n + (k + 1) * r)
-        equality[rows, k * n : (k + 1) * n] = statics.equilibrium(d, friction) / lengths[:, None]
-        target[rows] = -statics.resultant / lengths
+        equality[rows, k * n : (k + 1) * n] = own.statics.equilibrium(slip) / lengths[:, None]
+        target[rows] = -own.statics.resultant / lengths
     bounds = [(0, None)] * (m * n) + [(None, None)] * r
     return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=target, bounds=bounds).status != 2)
 

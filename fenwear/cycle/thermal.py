@@ -1,4 +1,4 @@
-"""One half-cycle with heat: contact and conduction, coupled.
+"""One phase with heat: contact and conduction, coupled.
 
 The pressure heats, the heat opens or closes the gap, the gap makes the pressure. Implicitly: the
 thermal gap at the end of the half-cycle is linear in its pressure as long as the same nodes conduct,
@@ -43,14 +43,21 @@ class ThermalContact:
         system: The assembled problem, with heat.
         exchange: The bodies' temperatures.
         phase: Which phase.
+        contact: Its contact.
     """
 
-    def __init__(self, system: System, exchange: HeatExchange, phase: int) -> None:
+    def __init__(self, system: System, exchange: HeatExchange, phase: int, contact: ContactSolver) -> None:
         self.system, self.exchange, self.phase = system, exchange, phase
-        self.direction = system.motion.directions[phase]
-        self._contact: ContactSolver = system.contact((self.direction,))
+        self._contact = contact
         self._response: _Response | None = None
         self._asked, self._repeats = b"", 0  # conductances asked for last, and how often in a row
+
+    def slide(self, mu: Array) -> None:
+        """Set the friction coefficient (n,)."""
+        friction = self.exchange.friction.copy()
+        if not np.array_equal(friction[self.phase], mu):
+            friction[self.phase] = mu
+            self.exchange, self._response = self.exchange.with_friction(friction), None
 
     def solve(
         self, temperature: State, gap: Array, start: ContactState | None, layer: Layer | None

@@ -92,7 +92,7 @@ class HeatExchange:
         sides: The punch and the strip.
         plans: The steps of each phase.
         duration: Of a step, s.
-        friction: mu.
+        friction: mu of the interface nodes in each phase (phases, n).
         weights: Quadrature weights of the interface (n,), mm.
         thickness: Of the plane model, mm.
     """
@@ -103,7 +103,7 @@ class HeatExchange:
         sides: tuple[Side, Side],
         plans: list[list[StepPlan]],
         duration: float,
-        friction: float,
+        friction: Array,
         weights: Array,
         thickness: float,
     ) -> None:
@@ -113,7 +113,13 @@ class HeatExchange:
         self._contact_responses = [[side.contact_change(r) for r in side.field.responses] for side in sides]
         self._flux_maps: dict[tuple[int, int, bytes], _FluxMap] = {}
 
-    def varied(self, heat: Heat, friction: float) -> HeatExchange:
+    def with_friction(self, friction: Array) -> HeatExchange:
+        """Return the exchange at another mu (phases, n) with all else the same."""
+        other = copy.copy(self)
+        other.friction = friction
+        return other
+
+    def varied(self, heat: Heat, friction: Array) -> HeatExchange:
         """Return the exchange of another friction, partition or conductance with the same prepared bodies."""
         other = copy.copy(self)
         other.heat, other.friction, other._flux_maps = heat, friction, {}
@@ -171,7 +177,7 @@ class HeatExchange:
             kinds = (plan.punch, plan.strip)
             free = [side.field.advance(k, s) for side, k, s in zip(self.sides, kinds, state, strict=True)]
             bare = [side.contact(f) for side, f in zip(self.sides, free, strict=True)]
-            heat = self.friction * plan.speed * pressure
+            heat = self.friction[phase] * plan.speed * pressure
             fluxes = self._fluxes(kinds, bare, heat, conductance, self.heat.ambient)
             state = self._with_fluxes(kinds, free, fluxes)
             after = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
@@ -197,7 +203,7 @@ class HeatExchange:
             kinds = (plan.punch, plan.strip)
             free = [side.field.advance_linear(k, s) for side, k, s in zip(self.sides, kinds, states, strict=True)]
             bare = [side.contact_change(f) for side, f in zip(self.sides, free, strict=True)]
-            heat = self.friction * plan.speed * pressure
+            heat = (self.friction[phase] * plan.speed * pressure.T).T  # pressure (n, k)
             fluxes = self._fluxes(kinds, bare, heat, conductance, 0.0)
             states = self._with_fluxes(kinds, free, fluxes)
             after = [side.balance_change(s) for side, s in zip(self.sides, states, strict=True)]

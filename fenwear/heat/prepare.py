@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.errors import CaseError, Problem
 from fenwear.heat.conduction import HeatBody, HeatStep
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
@@ -24,6 +25,7 @@ def prepare_exchange(
     facing: Facing,
     gap_rows: tuple[Array, Array],
     motion: Motion,
+    friction: Array,
     *,
     reduced: bool,
 ) -> HeatExchange:
@@ -35,16 +37,24 @@ def prepare_exchange(
         facing: The interface.
         gap_rows: Gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K.
         motion: The sliding motion.
+        friction: mu of the interface nodes (n,), in all phases.
         reduced: Whether the temperatures are projected onto a small basis.
+
+    Raises:
+        CaseError: the half-cycles of the motion last unequally long.
     """
     heat = case.heat
     assert heat is not None
-    duration = motion.duration / heat.steps
-    speeds = motion.mean_speeds(heat.steps)
-    velocities = sorted({d * v for d in motion.directions for v in speeds})
+    if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
+        raise CaseError(Problem("motion", "expected half-cycles of equal duration with heat"))
+    count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
+    duration = motion.phases[0].duration / count
+    speeds = motion.mean_speeds(count)
+    signed = [[d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
+    every = [velocity for row in signed for velocity in row]
+    velocities = sorted(set(every))
     of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
-    plans = [[StepPlan(0, of_strip[d * v], float(v)) for v in speeds] for d in motion.directions]
-    every = [d * v for d in motion.directions for v in speeds]
+    plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]
     sides = []
     for body, inflow, rows, own in zip(bodies, inflows(bodies, facing), gap_rows, ([0.0], velocities), strict=True):
         steps = [body.step(velocity, duration) for velocity in own]
@@ -55,7 +65,7 @@ def prepare_exchange(
         else:
             field = FullField(body, steps, inflow)
         sides.append(_side(field, steps, facing, rows))
-    return _exchange(case, (sides[0], sides[1]), plans, duration, facing)
+    return _exchange(case, (sides[0], sides[1]), plans, duration, facing, friction)
 
 
 def prepare_steady(
@@ -64,6 +74,7 @@ def prepare_steady(
     facing: Facing,
     gap_rows: tuple[Array, Array],
     velocities: Sequence[float],
+    friction: Array,
 ) -> HeatExchange:
     """Return the exchange whose phase k is the steady state of the strip moving at velocity k; collective.
 
@@ -75,7 +86,7 @@ def prepare_steady(
     for body, inflow, rows, own in zip(bodies, inflows(bodies, facing), gap_rows, ([0.0], velocities), strict=True):
         steps = [body.step(velocity, np.inf) for velocity in own]
         sides.append(_side(FullField(body, steps, inflow), steps, facing, rows))
-    return _exchange(case, (sides[0], sides[1]), plans, np.inf, facing)
+    return _exchange(case, (sides[0], sides[1]), plans, np.inf, facing, friction)
 
 
 def inflows(bodies: tuple[HeatBody, HeatBody], facing: Facing) -> tuple[Array, Array]:
@@ -85,10 +96,17 @@ def inflows(bodies: tuple[HeatBody, HeatBody], facing: Facing) -> tuple[Array, A
 
 
 def _exchange(
-    case: Case, sides: tuple[Side, Side], plans: list[list[StepPlan]], duration: float, facing: Facing
+    case: Case,
+    sides: tuple[Side, Side],
+    plans: list[list[StepPlan]],
+    duration: float,
+    facing: Facing,
+    friction: Array,
 ) -> HeatExchange:
     assert case.heat is not None
-    return HeatExchange(case.heat, sides, plans, duration, case.contact.friction, facing.weights, case.model.thickness)
+    return HeatExchange(
+        case.heat, sides, plans, duration, np.tile(friction, (len(plans), 1)), facing.weights, case.model.thickness
+    )
 
 
 def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], facing: Facing, gap_rows: Array) -> Side:

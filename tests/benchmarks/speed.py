@@ -28,11 +28,10 @@ def timed(function: Callable[[], Any]) -> tuple[float, Any]:
 
 def full_against_condensed(system: System, half_cycles: int = 100) -> None:
     """Both inequalities on the same gaps, half-cycle by half-cycle."""
-    friction = system.case.contact.friction
     solvers = [
         (
-            CondensedContact(system.interface, friction, (d,)),
-            FullContact(system.punch, system.strip, system.interface, friction, d),
+            system.contact((d,)),
+            FullContact(system.punch, system.strip, system.interface, system.slip(d)),
         )
         for d in (1, -1)
     ]
@@ -50,7 +49,7 @@ def full_against_condensed(system: System, half_cycles: int = 100) -> None:
                 times[kind].append(seconds)
         condensed, full = (state.pressure[0] for state in states[phase])
         difference = max(difference, float(np.abs(condensed - full).max() / condensed.max()))
-        wear = wear + system.wear.depth(condensed)
+        wear = wear + system.phases_wear.depth(np.tile(condensed, (2, 1)))[0]
     medians = [1e3 * statistics.median(t) for t in times]
     print(f"a contact, condensed | {medians[0]:.3f} ms (median of {len(times[0])})")
     print(f"a contact, full      | {medians[1]:.1f} ms, {medians[1] / medians[0]:.0f} times as long")

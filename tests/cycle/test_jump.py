@@ -41,9 +41,9 @@ def test_error_follows_the_tolerance(assemble: Callable[..., System]) -> None:
     contact = system.contact((1, -1))
     wear, state = np.zeros_like(system.facing.x), None
     for _ in range(2 * cycles):  # steps of half a cycle, as accurate as the shortest jump
-        layer = WornLayer(system.wear, 0.5)
+        layer = WornLayer(system.phases_wear, 0.5)
         state = contact.solve(system.facing.initial_gap + wear, state, layer)
-        wear = wear + layer.opening(state.pressure)
+        wear = wear + layer.opening(state.pressure)[0]
     assert isinstance(state, ContactState)
     errors = [np.abs(end(system, 2 * cycles, t)[0] - state.pressure).max() / MEAN for t in (1e-2, 1e-3, 1e-4)]
     assert errors[2] < errors[1] < errors[0] < 0.1

@@ -169,7 +169,7 @@ def check_balance(block: Block) -> None:
     assert block.heat.balance_error.max() < 1e-8
     # The friction heat is mu F0 times the sliding distance, whatever the pressure; mJ.
     system = block.system
-    np.testing.assert_allclose(friction, 0.25 * 1e4 * system.motion.sliding(), rtol=1e-9)
+    np.testing.assert_allclose(friction, 0.25 * 1e4 * system.motion.sliding()[0], rtol=1e-9)
     np.testing.assert_allclose(rest[0], system.case.heat.debris * friction, rtol=1e-12)
 
 

@@ -1,0 +1,93 @@
+"""Coefficients that depend on the state of the contact: expressions and tables of a case file.
+
+An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa) and v (sliding
+speed, mm/s). It is parsed, checked node by node and then computed with numpy: no other name, call or
+operation than those below exists for it, so that a case file cannot run code.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from fenwear.arrays import Array
+
+VARIABLES = ("T", "p", "v")
+LONGEST = 500  # characters of an expression
+DEEPEST = 30  # levels of its operations
+FUNCTIONS: Mapping[str, Callable[..., Any]] = {
+    "exp": np.exp,
+    "log": np.log,
+    "sqrt": np.sqrt,
+    "tanh": np.tanh,
+    "abs": np.abs,
+    "min": np.minimum,
+    "max": np.maximum,
+}
+OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+KNOWN = f"numbers, T, p, v, + - * / **, {', '.join(FUNCTIONS)}"
+
+State = Mapping[str, Array]
+Function = Callable[[State], Any]
+
+
+@lru_cache(maxsize=100)
+def parse_expression(text: str) -> Function:
+    """Return the function of the state that an expression stands for.
+
+    Raises:
+        ValueError: not an expression, or one that uses more than is allowed; says what.
+    """
+    if len(text) > LONGEST:
+        raise ValueError(f"expected at most {LONGEST} characters, got {len(text)}")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        raise ValueError(f"expected an expression of {KNOWN}, got {text!r}") from None
+    return _build(tree.body, text, DEEPEST)
+
+
+def _build(node: ast.AST, text: str, depth: int) -> Function:
+    if depth == 0:
+        raise ValueError(f"expected at most {DEEPEST} nested operations in {text!r}")
+    match node:
+        case ast.Constant(value=bool()):
+            pass
+        case ast.Constant(value=int() | float() as value):
+            number = np.float64(value)
+            return lambda _: number
+        case ast.Name(id=name) if name in VARIABLES:
+            return lambda state: state[name]
+        case ast.UnaryOp(op=op, operand=operand) if type(op) in OPERATIONS:
+            apply, inner = OPERATIONS[type(op)], _build(operand, text, depth - 1)
+            return lambda state: apply(inner(state))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATIONS:
+            apply = OPERATIONS[type(op)]
+            first, second = _build(left, text, depth - 1), _build(right, text, depth - 1)
+            return lambda state: apply(first(state), second(state))
+        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in FUNCTIONS:
+            if len(args) != (2 if name in ("min", "max") else 1):
+                raise ValueError(f"wrong number of arguments of {name} in {text!r}")
+            function, inners = FUNCTIONS[name], [_build(argument, text, depth - 1) for argument in args]
+            return lambda state: function(*(inner(state) for inner in inners))
+    found = ast.unparse(node) if hasattr(node, "lineno") else type(node).__name__
+    raise ValueError(f"expected an expression of {KNOWN}; {found!r} is not known in {text!r}")
+
+
+def evaluate(function: Function, state: State, shape: tuple[int, ...]) -> Array:
+    """Return the values (shape) of a parsed expression; NaN and infinities are left to the caller."""
+    with np.errstate(all="ignore"):
+        return np.broadcast_to(np.asarray(function(state), dtype=float), shape).copy()

@@ -1,0 +1,113 @@
+"""One phase of the motion: contact, with or without heat, and its wear, at coefficients of its own state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
+from fenwear.cycle.thermal import ThermalContact
+from fenwear.errors import ConvergenceError
+from fenwear.heat.exchange import State
+from fenwear.system import System
+from fenwear.wear import PhasesWear, Worn, WornLayer
+
+MAX_ITERATIONS = 60  # of coefficients and the pressure they depend on
+CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
+
+
+@dataclass(frozen=True)
+class PhaseEnd:
+    """The end of a phase: its record, temperature and heat (None without), and the depths worn in it."""
+
+    record: PhaseRecord
+    temperature: State | None
+    heat: HalfCycleHeat | None
+    worn: Worn
+
+
+class PhaseStep:
+    """Steps through one phase of the motion, again and again.
+
+    Args:
+        system: The assembled problem.
+        phase: Its number in the cycle.
+        implicit: Whether the pressure is that on the shape at the end of the phase.
+    """
+
+    def __init__(self, system: System, phase: int, *, implicit: bool) -> None:
+        self.system, self.phase, self.implicit = system, phase, implicit
+        exchange = system.exchange
+        self._initial = None if exchange is None else exchange.initial()
+        self._contact = system.phase_contact((phase,))
+        self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
+        conditions = system.conditions(phase)
+        self._slip = system.friction.slip(system.motion.phases[phase].direction, system.friction.values(conditions))
+        self._wear = system.wear.phases([conditions], [phase])
+
+    def solve(self, temperature: State | None, worn: Worn, before: ContactState | None) -> PhaseEnd:
+        """Return the end of the phase.
+
+        Args:
+            temperature: At its start; None without heat, or for the initial one.
+            worn: Depths at its start.
+            before: The same phase one cycle ago.
+
+        Raises:
+            ConvergenceError: contact, heat or the coefficients did not converge.
+        """
+        temperature = temperature or self._initial
+        gap = self.system.gap(self.phase, worn)
+        if self.system.constant_coefficients:
+            return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
+        pressure = None if before is None else before.pressure[0]
+        for _ in range(MAX_ITERATIONS):
+            wear = self._update(pressure, temperature)
+            contact, after, heat = self._solve(temperature, gap, before, wear)
+            change = np.inf if pressure is None else np.abs(contact.pressure[0] - pressure).max()
+            pressure = contact.pressure[0]
+            if change < CLOSE * self.system.statics.mean_pressure:
+                return self._end(contact, after, heat, before, wear)
+        raise ConvergenceError(
+            f"the coefficients of friction and wear and the pressure they depend on did not come together in "
+            f"{MAX_ITERATIONS} iterations: a weaker dependence on p, or a smoother table may help"
+        )
+
+    def _update(self, pressure: Array | None, temperature: State | None) -> PhasesWear:
+        """Take friction and wear at this pressure and at the temperature at the start of the phase."""
+        system = self.system
+        surfaces = None
+        if self._thermal is not None and temperature is not None:
+            surfaces = self._thermal.exchange.contact_temperatures(temperature)
+        conditions = system.conditions(self.phase, pressure, surfaces)
+        if not system.friction.constant and isinstance(self._contact, CondensedContact):
+            mu = system.friction.values(conditions)
+            self._slip = system.friction.slip(system.motion.phases[self.phase].direction, mu)
+            self._contact.slide([self._slip])
+            if self._thermal is not None:
+                self._thermal.slide(mu)
+        return system.wear.phases([conditions], [self.phase])
+
+    def _solve(
+        self, temperature: State | None, gap: Array, start: ContactState | None, wear: PhasesWear
+    ) -> tuple[ContactState, State | None, HalfCycleHeat | None]:
+        layer = WornLayer(wear) if self.implicit else None
+        if self._thermal is None or temperature is None:
+            return self._contact.solve(gap, start, layer), None, None
+        return self._thermal.solve(temperature, gap, start, layer)
+
+    def _end(
+        self,
+        contact: ContactState,
+        temperature: State | None,
+        heat: HalfCycleHeat | None,
+        before: ContactState | None,
+        wear: PhasesWear,
+    ) -> PhaseEnd:
+        previous = None if before is None else before.pressure[0]
+        areas = wear.worn_area(contact.pressure)
+        record = PhaseRecord(self.phase, contact, previous, areas, self._slip)
+        return PhaseEnd(record, temperature, heat, wear.worn(contact.pressure))

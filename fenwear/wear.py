@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -112,17 +113,25 @@ class PhasesWear:
         Worn depths are the q quantities between: R of what pressure wears, L of what worn depth opens.
         """
         m, n = pressure.shape
-        left: list[list[Array]] = [[] for _ in range(m)]
-        right: list[list[Array]] = [[] for _ in range(m)]
+        right = np.zeros((m, self._left.shape[2], n))
+        strip = 0
         if self.punch is not None:
-            for k, slope in enumerate(self.punch.slope(pressure)):
-                left[k].append(np.eye(n))
-                right[k].append(np.diag(slope))
+            nodes, strip = np.arange(n), n
+            right[:, nodes, nodes] = self.punch.slope(pressure)
         if self.strip is not None:
             for k, slope in enumerate(self.strip.slope(pressure)):
-                left[k].append(self.facings[k].transfer)
-                right[k].append(self._on_strip(self.facings[k]) * slope)
-        return np.array([np.hstack(part) for part in left]), np.array([np.vstack(part) for part in right])
+                right[k, strip:] = self._on_strip(self.facings[k]) * slope
+        return self._left, right
+
+    @cached_property
+    def _left(self) -> Array:
+        parts = []
+        if self.punch is not None:
+            n = len(self.facings[0].weights)
+            parts.append(np.broadcast_to(np.eye(n), (len(self.facings), n, n)))
+        if self.strip is not None:
+            parts.append(np.array([facing.material for facing in self.facings]))
+        return np.concatenate(parts, axis=2)
 
     def _on_strip(self, facing: Facing) -> Array:
         """Return what puts depths of the interface nodes on the strip's nodes (n_strip, n), areas kept."""

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from fenwear import ConvergenceError, System
 from fenwear.arrays import Array
-from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact import ContactState
 from fenwear.contact.full import FullContact
 
 FINE = ("geometry.parameters.elements_along_contact=32", "geometry.parameters.edge_grading=64")
@@ -201,7 +201,6 @@ def one_iteration() -> Iterator[None]:
 def test_no_convergence_is_said(assemble: Callable[..., System], one_iteration: None, solver: str) -> None:
     """Stopped by PETSc's options after one iteration: a typed error with the reason and the options' prefix."""
     system = assemble("example1", *OPENING)
-    friction = system.case.contact.friction
     contact = (
         system.contact((1,))
         if solver == "condensed"

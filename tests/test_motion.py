@@ -1,5 +1,7 @@
 """The exact integrals of the speed."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -67,8 +69,8 @@ def test_phases_against_quadrature(profile: str, positions: int) -> None:
     edges = np.linspace(0, 2, 2 * positions + 1)
     for a in (1.0, 1.7):
         exact = [
-            quad(lambda t: speed(profile, t) ** a, low, high, points=[0.25, 0.75, 1.25, 1.75], limit=200)[0]
-            for low, high in zip(edges, edges[1:], strict=False)
+            quad(lambda t, a=a: speed(profile, t) ** a, low, high, points=[0.25, 0.75, 1.25, 1.75], limit=200)[0]
+            for low, high in itertools.pairwise(edges)
         ]
         np.testing.assert_allclose(motion.sliding(a), exact, rtol=1e-7)
     assert motion.sliding().sum() == pytest.approx(6.0, rel=1e-14)

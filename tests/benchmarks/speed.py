@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from fenwear import System, load_case, march, steady
-from fenwear.contact import CondensedContact
 from fenwear.contact.full import FullContact
 from fenwear.cycle import jump
 

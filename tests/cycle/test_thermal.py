@@ -16,6 +16,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle import Block, growth_rate
 from fenwear.cycle.jump import cycle_heat
 from fenwear.cycle.moment import Moment
+from fenwear.wear import Worn
 
 Assemble = Callable[..., System]
 MEAN = 1e4 / 600
@@ -142,7 +143,7 @@ def from_steady(system: System, bulge: float = 0.0) -> tuple[Moment, Any]:
     modes = np.zeros((1, 2))
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.facing.x / 30) ** 2
-    return Moment(0, shape, contacts, heat.parts(periodic)), state
+    return Moment(0, Worn(shape, 0 * system.facing.strip.weights), contacts, heat.parts(periodic)), state
 
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])

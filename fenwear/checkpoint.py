@@ -55,12 +55,29 @@ def _begin(new: Path, system: System, moment: Moment) -> None:
             half_cycle=moment.half_cycle,
             wear=moment.worn.punch,
             wear_strip=moment.worn.strip,
+            **({} if system.followed is None else _followed_arrays(system.followed)),
             jump_length=moment.jump_length,
             periodic_phases=moment.periodic_phases,
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in ("pressure", "gap", "rigid")},
         )
         file.flush()
         os.fsync(file.fileno())
+
+
+def _followed_arrays(worn: Worn) -> dict[str, Any]:
+    return {"followed_punch": worn.punch, "followed_strip": worn.strip}
+
+
+def followed(directory: Path, system: System) -> Worn | None:
+    """Return the worn depths that the meshes of a checkpoint follow, None where they are as made; collective.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is of another case.
+    """
+    arrays = on_root(system.comm, lambda: _read(_find(directory), system))
+    if "followed_punch" not in arrays:
+        return None
+    return Worn(arrays["followed_punch"], arrays["followed_strip"])
 
 
 def _swap(directory: Path) -> None:

@@ -34,3 +34,7 @@ class ConvergenceError(FenwearError):
 
 class InterruptedRunError(FenwearError):
     """A signal ended a run; its checkpoint allows to go on."""
+
+
+class MeshQualityError(ConvergenceError):
+    """A mesh that follows the wear has an element that is no longer good enough to compute on."""

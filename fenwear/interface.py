@@ -128,11 +128,20 @@ def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
         weights=punch.weights * facing,
     )
     gap = np.einsum("ic,ic->i", normal, punch.x - transfer @ strip.x)
-    closest = float(gap.min())
+    return Facing(common, strip, transfer, transfer, gap)
+
+
+def check_distance(facing: Facing) -> None:
+    """Make sure that the surfaces touch, or nearly so, before anything deforms or wears.
+
+    Raises:
+        CaseError: they are apart, or one inside the other.
+    """
+    x = facing.x
+    closest = float(facing.initial_gap.min())
     if abs(closest) > 0.01 * (x[-1] - x[0]):
         way = "above" if closest > 0 else "inside"
         _not_facing(f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest")
-    return Facing(common, strip, transfer, transfer, gap)
 
 
 def _not_facing(reason: str) -> None:

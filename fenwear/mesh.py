@@ -179,6 +179,11 @@ def _check_parameters(geometry: Geometry, path: Path) -> None:
     if path.suffix != ".geo":
         return
     text = re.sub(r"//.*", "", path.read_text("utf-8"))
+    if re.search(r"^\s*(Macro|Function)\b", text, re.MULTILINE):
+        message = (
+            f"{path.name} defines a Macro, which gmsh reads safely only once in a process: write it out, or give a .msh"
+        )
+        raise CaseError(Problem("geometry.file", message))
     blocks = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", text, re.DOTALL)
     known = sorted({name for block in blocks for name in re.findall(r"(\w+)\s*=", block)})
     unknown = [name for name in geometry.parameters if name not in known]

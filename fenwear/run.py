@@ -16,10 +16,11 @@ from tqdm import tqdm
 
 from fenwear import checkpoint
 from fenwear.case import Case
-from fenwear.cycle import Block, growth_rate, jump, march, stability_number
+from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, Problem
 from fenwear.fields import body_fields, write_fields
+from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.report import try_report
 from fenwear.results import HistoryWriter, free_directory, make_directory, summarise, write_case, write_summary
@@ -88,18 +89,21 @@ class _Run:
     """A run in its folder: takes the blocks, keeps history and checkpoints."""
 
     def __init__(self, system: System, directory: Path, log: Log, *, resume: bool) -> None:
-        self.system, self.directory, self.log = system, directory, log
+        self.directory, self.log = directory, log
         self.comm, self.case = system.comm, system.case
-        jumps = self.case.run.integration == "jump"
-        self.exchange = system.reduced_exchange if jumps else system.exchange
         start: Moment | None = None
         if resume:
-            start = checkpoint.load(directory, system, self.exchange)
+            followed = checkpoint.followed(directory, system)
+            if followed is not None:
+                system = System(self.case, self.comm, followed)
+                system.prepare()
+            start = checkpoint.load(directory, system, self._exchange(system))
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
                 raise CaseError(Problem("run.half_cycles", message))
         else:
             on_root(self.comm, lambda: make_directory(directory))
+        self.system = system
         on_root(self.comm, lambda: write_case(directory, self.case))
         self.start = start
         self.moment = start or Moment(0, system.unworn(), (), None)
@@ -129,27 +133,24 @@ class _Run:
                 if interrupted:
                     raise InterruptedRunError(f"interrupted after half-cycle {self.moment.half_cycle}")
 
+    def _exchange(self, system: System) -> HeatExchange | None:
+        """Return the heat exchange that the run integrates."""
+        return system.reduced_exchange if self.case.run.integration == "jump" else system.exchange
+
     def _blocks(self) -> Iterator[Block]:
+        return follow(self.system, self._integrate, self._exchange, self.start)
+
+    def _integrate(self, system: System, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         run = self.case.run
+        shared: dict[str, Any] = {"periodic_within": run.periodic_within, "start": start, "stops": self._fields_at}
         if run.integration == "jump":
-            return jump(
-                self.system,
-                run.half_cycles,
-                tolerance=run.jump_tolerance,
-                periodic_within=run.periodic_within,
-                start=self.start,
-                stops=self._fields_at,
-            )
-        return march(
-            self.system,
-            run.half_cycles,
-            implicit=run.integration == "implicit",
-            periodic_within=run.periodic_within,
-            start=self.start,
-            stops=self._fields_at,
-        )
+            return jump(system, run.half_cycles, tolerance=run.jump_tolerance, leave=leave, **shared)
+        return march(system, run.half_cycles, implicit=run.integration == "implicit", leave=leave, **shared)
 
     def _take(self, block: Block) -> None:
+        if block.system is not self.system:
+            self.log(f"after half-cycle {self.moment.half_cycle:,} the meshes follow the worn shape")
+            self.system = block.system
         self.last, self.moment = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
@@ -165,8 +166,9 @@ class _Run:
     def _write_fields(self, block: Block) -> None:
         temperature = block.end.temperature
         temperatures = None
-        if self.exchange is not None and temperature is not None:
-            temperatures = self.exchange.temperatures(temperature)
+        exchange = self._exchange(self.system)
+        if exchange is not None and temperature is not None:
+            temperatures = exchange.temperatures(temperature)
         half_cycle, motion = int(block.half_cycle[-1]), self.system.motion
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
@@ -177,7 +179,7 @@ class _Run:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
         if self.writer is not None:
             self.writer.flush()
-        checkpoint.save(self.directory, self.system, self.exchange, self.moment)
+        checkpoint.save(self.directory, self.system, self._exchange(self.system), self.moment)
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
 
     def finish(self, how: dict[str, Any]) -> dict[str, Any]:

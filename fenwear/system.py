@@ -21,10 +21,11 @@ from fenwear.friction import ContactConditions, Friction
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
-from fenwear.interface import Facing, Interface, Statics, face, join, statics
+from fenwear.interface import Facing, Interface, Statics, check_distance, face, join, statics
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
 from fenwear.optimum import Optimum, check_equilibrium, optimum
+from fenwear.shape import element_height, follow_wear
 from fenwear.surface import Surface, condense, respond_to_load, surface_nodes
 from fenwear.wear import PhasesWear, Wear, Worn
 
@@ -36,18 +37,51 @@ class System:
     collective at first use: every rank must reach them.
     """
 
-    def __init__(self, case: Case, comm: MPI.Comm = MPI.COMM_WORLD) -> None:
+    def __init__(self, case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None) -> None:
         """Build the meshes and the bodies of `case`; collective.
+
+        Args:
+            case: The problem.
+            comm: The ranks.
+            followed: Worn depths that the meshes follow; by default they are as they were made.
 
         Raises:
             CaseError: what only the geometry can tell is wrong, such as a missing group.
+            MeshQualityError: an element does not survive the motion.
         """
-        self.case, self.comm = case, comm
+        self.case, self.comm, self.followed = case, comm, followed
         meshes = build_meshes(case.geometry, case.folder, comm)
+        self.moved: Worn | None = None if followed is None else self._move(meshes, followed)
         self.punch, self.strip = (self._body(m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
         self.statics: Statics = statics(self.facing, self.punch, self.strip)
         self.heat_bodies  # noqa: B018  (finds missing groups before anything costly)
         self._check_equilibrium()
+
+    def _move(self, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Worn:
+        """Let the meshes follow the wear; return how far their contact nodes have moved into the bodies."""
+        moved, degree = [], self.case.geometry.degree
+        for mesh, depth, description in zip(
+            meshes, (followed.punch, followed.strip), (self.case.punch, self.case.strip), strict=True
+        ):
+            pins = [np.array(support.at) for support in description.supports if support.at is not None]
+            groups = [point for points in mesh.points.values() for point in points]
+            moved.append(follow_wear(mesh, depth, degree, [*pins, *groups]))
+        return Worn(moved[0], moved[1])
+
+    def outworn(self, worn: Worn) -> bool:
+        """Return whether the wear since the meshes were moved is large against the elements at the contact."""
+        limit = self.case.geometry.follow_wear
+        if limit is None:
+            return False
+        rest = worn if self.followed is None else worn - self.followed
+        heights = self.element_heights.times(limit)
+        return bool((np.abs(rest.punch) > heights.punch).any() or (np.abs(rest.strip) > heights.strip).any())
+
+    @cached_property
+    def element_heights(self) -> Worn:
+        """Height of the elements at the contact nodes of both bodies, mm."""
+        degree = self.case.geometry.degree
+        return Worn(element_height(self.punch.body, degree), element_height(self.strip.body, degree))
 
     def _check_equilibrium(self) -> None:
         for phase, one, slip in zip(self.motion.phases, self._phase_statics, self.slips(), strict=True):
@@ -70,7 +104,7 @@ class System:
     def with_case(self, case: Case) -> System:
         """Return the system of another case, as `vary`; collective."""
         if not _same_bodies(self.case, case):
-            return System(case, self.comm)
+            return System(case, self.comm, self.followed)
         self.prepare()  # what is not made yet would be made anew in every variant
         other = copy.copy(self)
         kept = {"facing", "punch", "strip", "statics", "comm"}
@@ -127,7 +161,10 @@ class System:
     @cached_property
     def facing(self) -> Facing:
         """The contact nodes of the two bodies, opposite each other in the middle position of the strip."""
-        return face(surface_nodes(self.punch), surface_nodes(self.strip))
+        facing = face(surface_nodes(self.punch), surface_nodes(self.strip))
+        if self.followed is None:
+            check_distance(facing)
+        return facing
 
     @cached_property
     def interface(self) -> Interface:
@@ -280,6 +317,9 @@ class System:
     def gap(self, phase: int, worn: Worn) -> Array:
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm."""
         facing = self.facings[phase]
+        if self.moved is not None:
+            worn = worn - self.moved
+            return facing.initial_gap + facing.opening(worn.punch, worn.strip)
         if self.case.wear.strip is None:
             return facing.initial_gap + worn.punch
         return facing.initial_gap + facing.opening(worn.punch, worn.strip)

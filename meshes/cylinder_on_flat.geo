@@ -32,19 +32,18 @@ half_count = elements_along_contact / 2;
 size = half_width / half_count;
 top_z = strip_height + radius;
 
-// A line of the given length whose elements grow from the size at its start: Count in the progression Ratio.
-Macro Grow
-  Ratio = 1 + growth * span / size;
-  Count = Ceil(Log(Ratio) / Log(1 + growth));
-  Ratio = Ratio ^ (1 / Count);
-Return
+// A line of length span whose elements grow from the size at its start gets Count elements in the progression Ratio:
+//   Ratio = 1 + growth span / size over the whole line, Count = log Ratio / log(1 + growth), Ratio^(1 / Count) from one
+//   element to the next.
 
 // ---- Cylinder: columns of the contact and beside it, from the circle up to the axis ------------
 axis = newp; Point(axis) = {0, top_z, 0};
 punch[] = {}; punch_contact[] = {}; punch_sides[] = {}; punch_free[] = {}; punch_top[] = {};
 low = newp; Point(low) = {0, strip_height, 0}; low_middle = low;
 up = newl; Line(up) = {low, axis}; up_middle = up;
-span = radius; Call Grow;
+Ratio = 1 + growth * radius / size;
+Count = Ceil(Log(Ratio) / Log(1 + growth));
+Ratio = Ratio ^ (1 / Count);
 Transfinite Curve{up} = Count + 1 Using Progression Ratio;
 rows = Count;
 For side In {0 : 1}
@@ -62,7 +61,10 @@ For side In {0 : 1}
       Transfinite Curve{a, b} = half_count + 1;
       punch_contact[] += a;
     Else
-      span = punch_width / 2 - half_width; row_ratio = Ratio; Call Grow;
+      row_ratio = Ratio;
+      Ratio = 1 + growth * (punch_width / 2 - half_width) / size;
+      Count = Ceil(Log(Ratio) / Log(1 + growth));
+      Ratio = Ratio ^ (1 / Count);
       Transfinite Curve{a, b} = Count + 1 Using Progression Ratio;
       Ratio = row_ratio;
       punch_free[] += a;
@@ -85,7 +87,9 @@ strip[] = {}; strip_contact[] = {}; strip_free[] = {}; strip_ends[] = {}; strip_
 p = newp; Point(p) = {0, strip_height, 0}; middle_top = p;
 p = newp; Point(p) = {0, 0, 0}; middle_bottom = p;
 l = newl; Line(l) = {middle_top, middle_bottom}; middle_line = l;
-span = strip_height; Call Grow; deep_count = Count; deep_ratio = Ratio;
+Ratio = 1 + growth * strip_height / size;
+deep_count = Ceil(Log(Ratio) / Log(1 + growth));
+deep_ratio = Ratio ^ (1 / deep_count);
 Transfinite Curve{l} = deep_count + 1 Using Progression deep_ratio;
 For side In {0 : 1}
   top = middle_top; bottom = middle_bottom; inner = middle_line;
@@ -104,7 +108,9 @@ For side In {0 : 1}
       Transfinite Curve{a, b} = Ceil(overlap / size) + 1;
     EndIf
     If(i == #reaches[] - 1)
-      span = reaches[i] - reaches[i - 1]; Call Grow;
+      Ratio = 1 + growth * (reaches[i] - reaches[i - 1]) / size;
+      Count = Ceil(Log(Ratio) / Log(1 + growth));
+      Ratio = Ratio ^ (1 / Count);
       Transfinite Curve{a, b} = Count + 1 Using Progression Ratio;
       strip_free[] += a;
       strip_ends[] += l;

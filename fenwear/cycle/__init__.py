@@ -4,6 +4,7 @@
 """
 
 from fenwear.cycle.block import Block
+from fenwear.cycle.follow import follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
@@ -16,6 +17,7 @@ __all__ = [
     "Steady",
     "critical_speed",
     "cycles_to_reach",
+    "follow",
     "growth_rate",
     "jump",
     "march",

@@ -43,6 +43,7 @@ def jump(
     block: int = 200,
     start: Moment | None = None,
     stops: frozenset[int] = frozenset(),
+    leave: Callable[[Moment], bool] = lambda _: False,
 ) -> Iterator[Block]:
     """Yield the last cycle of every jump, in blocks; collective.
 
@@ -55,6 +56,7 @@ def jump(
         block: Half-cycles in a block.
         start: Where to go on from, such as the end of a block; by default the beginning.
         stops: Half-cycles at which a jump and a block end in any case.
+        leave: Ends the run at the first moment for which it is true.
 
     Raises:
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
@@ -89,7 +91,7 @@ def jump(
         end = replace(end, half_cycle=done * strokes, jump_length=length)
         change = stepper.record(recorder, moment, end, tried)
         moment = end
-        finished = periodic_within is not None and change < periodic_within
+        finished = (periodic_within is not None and change < periodic_within) or leave(moment)
         if recorder.full or finished or done in ends:
             yield recorder.take(moment)
         if finished:

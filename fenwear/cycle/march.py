@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 
 from fenwear.contact import ContactState
@@ -26,6 +26,7 @@ def march(
     block: int = BLOCK,
     start: Moment | None = None,
     stops: frozenset[int] = frozenset(),
+    leave: Callable[[Moment], bool] = lambda _: False,
 ) -> Iterator[Block]:
     """Yield all half-cycles, in blocks; collective.
 
@@ -41,6 +42,7 @@ def march(
         block: Half-cycles in a block.
         start: Where to go on from, such as the end of a block; by default the beginning.
         stops: Half-cycles at which a block ends in any case.
+        leave: Ends the run at the first moment for which it is true.
 
     Raises:
         ConvergenceError: a half-cycle, which it names, did not converge; all before it are yielded.
@@ -61,8 +63,8 @@ def march(
         change = recorder.add(half_cycle, [end.record for end in ends], worn, heat)
         repeats = periodic_within is not None and change < periodic_within
         periodic = moment.periodic_phases + 1 if repeats else 0
-        finished = periodic >= motion.half_cycles
         moment = Moment(half_cycle, worn, contacts, ends[-1].temperature, periodic_phases=periodic)
+        finished = periodic >= motion.half_cycles or leave(moment)
         if recorder.full or finished or half_cycle == half_cycles or half_cycle in stops:
             yield recorder.take(moment)
         if finished:

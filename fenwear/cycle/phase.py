@@ -63,12 +63,17 @@ class PhaseStep:
         gap = self.system.gap(self.phase, worn)
         if self.system.constant_coefficients:
             return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
-        pressure = None if before is None else before.pressure[0]
+        start, pressure = before, None if before is None else before.pressure[0]
         for _ in range(MAX_ITERATIONS):
             wear = self._update(pressure, temperature)
-            contact, after, heat = self._solve(temperature, gap, before, wear)
-            change = np.inf if pressure is None else np.abs(contact.pressure[0] - pressure).max()
-            pressure = contact.pressure[0]
+            try:
+                contact, after, heat = self._solve(temperature, gap, start, wear)
+            except ConvergenceError as error:
+                largest = float(np.abs(self._slip).max())
+                raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
+            start, found = contact, contact.pressure[0]
+            change = np.inf if pressure is None else np.abs(found - pressure).max()
+            pressure = found if pressure is None else (pressure + found) / 2  # a coefficient of p would go to and fro
             if change < CLOSE * self.system.statics.mean_pressure:
                 return self._end(contact, after, heat, before, wear)
         raise ConvergenceError(

@@ -50,9 +50,10 @@ def growth_rate(system: System, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. The strip does not wear. The cycle's map of temperature and
-    worn depth is linearised around the given pressures with the same nodes in contact and implicit wear, and its eigenvalue
-    largest in size taken: ln |lambda| over the duration of a cycle. A rigid motion of the worn shape changes
-    nothing, nor does the shape where nothing touches; these disturbances (lambda = 1) do not count.
+    worn depth is linearised around the given pressures with the same nodes in contact and implicit wear,
+    and its eigenvalue largest in size taken: ln |lambda| over the duration of a cycle. A rigid motion of
+    the worn shape changes nothing, nor does the shape where nothing touches; these disturbances
+    (lambda = 1) do not count.
 
     Args:
         system: The assembled problem.

@@ -218,15 +218,17 @@ def steady(system: System) -> Steady:
     for body in system.heat_bodies or ():
         body.check_heat_sink()
     contact, heat, temperature = _solve(problem, cycle_heat(system))
+    pressure: Array | None = None
     for _ in range(0 if system.constant_coefficients else MAX_ITERATIONS):
         before = contact.pressure
-        conditions = _conditions(system, before, heat, temperature)
+        pressure = before if pressure is None else (pressure + before) / 2  # a coefficient of p would go to and fro
+        conditions = _conditions(system, pressure, heat, temperature)
         problem.take(conditions)
         if heat is not None and not system.friction.constant:
             mu = np.array([system.friction.values(state) for state in conditions])
             heat = CycleHeat(heat.exchange.with_friction(mu))
         contact, heat, temperature = _solve(problem, heat)
-        if np.abs(contact.pressure - before).max() < CLOSE * system.statics.mean_pressure:
+        if np.abs(contact.pressure - pressure).max() < CLOSE * system.statics.mean_pressure:
             break
     else:
         if not system.constant_coefficients:

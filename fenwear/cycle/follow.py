@@ -1,0 +1,89 @@
+"""Large wear: the run goes on with meshes that follow the worn shape.
+
+Small wear is an offset of the gap. When it grows past a share of the elements' height at the contact,
+both meshes move by the depths worn so far, all operators are made anew, and temperatures keep their
+place in space: theta(x + s) = theta + grad theta . s at a node that moves by s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import dolfinx
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.compat import interpolation_points
+from fenwear.cycle.block import Block
+from fenwear.cycle.moment import Moment
+from fenwear.heat.exchange import HeatExchange, State
+from fenwear.system import System
+
+# Runs a system from a moment, or the beginning, and leaves at the first moment for which it is told to.
+Integrate = Callable[[System, Moment | None, Callable[[Moment], bool]], Iterator[Block]]
+Exchange = Callable[[System], HeatExchange | None]
+
+
+def follow(system: System, integrate: Integrate, exchange: Exchange, start: Moment | None = None) -> Iterator[Block]:
+    """Yield the blocks of a run whose meshes follow large wear; collective. Each block knows its system.
+
+    Args:
+        system: The assembled problem.
+        integrate: Yields the blocks on one system, such as `march` with its arguments.
+        exchange: The heat exchange whose state the moments hold.
+        start: Where to go on from; by default the beginning.
+
+    Raises:
+        ConvergenceError: as `integrate`.
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    moment = start
+    while True:
+        for block in integrate(system, moment, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
+            yield block
+            moment = block.end
+        if moment is None or not system.outworn(moment.worn):
+            return
+        moved = System(system.case, system.comm, moment.worn)
+        moved.prepare()
+        moment = replace(moment, temperature=_carried(moment.temperature, (system, moved), exchange))
+        system = moved
+
+
+def _carried(state: State | None, systems: tuple[System, System], exchange: Exchange) -> State | None:
+    """Return the state of the same temperatures on the moved meshes."""
+    before, after = (exchange(system) for system in systems)
+    if state is None or before is None or after is None:
+        return None
+    temperatures = before.temperatures(state)
+    bodies = [system.heat_bodies or () for system in systems]
+    first, second = (
+        _in_place(old.function(theta), new.function(theta))
+        for theta, old, new in zip(temperatures, *bodies, strict=True)
+    )
+    return after.state((first, second))
+
+
+def _in_place(old: fem.Function, new: fem.Function) -> Array:
+    """Return theta + grad theta . s on this rank's own nodes, s how far they have moved."""
+    space, mesh = old.function_space, old.function_space.mesh
+    shift = new.function_space.tabulate_dof_coordinates() - space.tabulate_dof_coordinates()
+    largest = mesh.comm.allreduce(float(np.abs(shift).max(initial=0.0)), MPI.MAX)
+    broken = fem.functionspace(mesh, ("DG", space.ufl_element().degree, (mesh.geometry.dim,)))
+    gradient = fem.Function(broken)
+    gradient.interpolate(fem.Expression(ufl.grad(old), interpolation_points(broken)))
+    sums, counts = fem.Function(space), fem.Function(space)
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
+    to, from_ = space.dofmap.list[:cells].ravel(), broken.dofmap.list[:cells].ravel()
+    slopes = gradient.x.array.reshape(-1, mesh.geometry.dim)[from_]
+    np.add.at(sums.x.array, to, (slopes * shift[to, : mesh.geometry.dim]).sum(axis=1))
+    np.add.at(counts.x.array, to, 1.0)
+    for function in (sums, counts):
+        function.x.scatter_reverse(dolfinx.la.InsertMode.add)
+    change = sums.x.array / np.maximum(counts.x.array, 1.0) if largest > 0 else 0 * sums.x.array
+    owned = space.dofmap.index_map.size_local * space.dofmap.bs
+    return (old.x.array + change)[:owned]

@@ -1,0 +1,183 @@
+"""Several positions of the strip in a half-cycle, both bodies worn, coefficients that depend on the state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, ConvergenceError, System, jump, march, steady
+
+COARSE = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
+MOVING = (*COARSE, "geometry.parameters.overlap=3", "motion.positions=5")
+BOTH = (*MOVING, "wear.strip.coefficient=2e-8")
+AREAS = (1.25e-8 * np.pi * 1e4 * 3 / 10, 2e-8 * 1e4 * 3 / 10)  # beta~ F0 2 u0 / t
+MEAN = 1e4 / 600
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("implicit", [False, True])
+def test_worn_areas_of_both_bodies(assemble: Callable[..., System], implicit: bool) -> None:
+    """Verification 8 for both bodies, whatever the pressure and the offsets."""
+    for block in march(assemble("example1", *BOTH), 40, implicit=implicit):
+        system = block.system
+        np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
+        np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
+        strip = block.wear_strip @ system.facing.strip.weights
+        np.testing.assert_allclose(strip, AREAS[1] * block.half_cycle, rtol=1e-11)
+        assert block.equilibrium_error.max() < 1e-12
+
+
+def test_jumps_follow_the_march(assemble: Callable[..., System]) -> None:
+    """Cycle jumps with both bodies worn end near the implicit march, and wear exactly as much."""
+    fast = (*MOVING, "wear.punch.coefficient=4e-7", "wear.strip.coefficient=2e-7")
+    system = assemble("example1", *fast)
+    *_, slow = march(system, 400, implicit=True)
+    *_, last = jump(system, 400, tolerance=1e-3)
+    inner = np.abs(system.facing.x) < 29
+    np.testing.assert_allclose(last.pressure[-2:, inner], slow.pressure[-2:, inner], atol=0.02 * MEAN)
+    np.testing.assert_allclose(last.wear_strip[-1], slow.wear_strip[-1], atol=0.01 * slow.wear_strip[-1].max())
+    assert system.facing.strip.weights @ last.wear_strip[-1] == pytest.approx(200 / 3 * 3 * 2 * 2e-7 * 1e4 * 3 / 10)
+
+
+def test_many_small_eliminations_equal_a_large_one(
+    assemble: Callable[..., System], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The bordered inequality solves the same as the dense one."""
+    system = assemble("example1", *BOTH)
+    results = []
+    for limit in (0, 10**6):
+        monkeypatch.setattr("fenwear.contact.condensed.DENSE", limit)
+        *_, last = jump(system, 2000, tolerance=1e-2)
+        results.append((last.pressure[-1], last.wear_strip[-1]))
+    np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-9 * MEAN)
+    np.testing.assert_allclose(results[0][1], results[1][1], rtol=1e-9, atol=1e-15)
+
+
+@pytest.mark.mpi
+def test_mirrored_strokes_of_a_symmetric_punch(assemble: Callable[..., System]) -> None:
+    """Example 2, moved positions: p of position k rightward is the mirror image of p of position k leftward."""
+    system = assemble("example2", *BOTH)
+    *_, block = jump(system, 2000, tolerance=1e-2)
+    contacts = [contact.pressure[0] for contact in block.end.contacts if contact is not None]
+    for k in range(5):
+        np.testing.assert_allclose(contacts[k], contacts[5 + k][::-1], atol=1e-7 * MEAN)
+
+
+def test_without_strip_wear_positions_change_little(assemble: Callable[..., System]) -> None:
+    """A uniform strip is the same anywhere below the punch: a moved one gives the pressures of the one that stays."""
+    one = steady(assemble("example1", *COARSE, "geometry.parameters.overlap=3"))
+    other = steady(assemble("example1", *MOVING))
+    inner = slice(1, -1)
+    np.testing.assert_allclose(other.pressure[:, inner], one.pressure[:, inner], atol=0.02 * MEAN)
+
+
+def test_no_steady_state_where_the_track_deepens(assemble: Callable[..., System]) -> None:
+    """To and fro over a strip that wears: said in so many words."""
+    with pytest.raises(ConvergenceError, match="no cyclic steady state exists: the strip wears"):
+        steady(assemble("example1", *BOTH))
+
+
+def test_steady_on_a_closed_track(assemble: Callable[..., System]) -> None:
+    """The strip of a closed track wears evenly: the punch's pressure is the optimum, the punch sinks by both."""
+    track = "motion={kind='one-way', direction='leftward', speed=200, duration=0.1, track=600}"
+    plain = steady(assemble("monotonic-lz20", *COARSE))
+    both = steady(assemble("monotonic-lz20", *COARSE, track, "wear.strip.coefficient=5e-6"))
+    np.testing.assert_allclose(both.pressure, plain.pressure, atol=1e-7 * MEAN)
+    recession = 5e-6 * 20 * 1000 / 600  # beta~ S F0 / t over the track's length
+    assert both.velocity["lambda_F"] - plain.velocity["lambda_F"] == pytest.approx(recession, rel=1e-7)
+    *_, block = march(assemble("monotonic-lz20", *COARSE, track, "wear.strip.coefficient=5e-6"), 3, implicit=True)
+    np.testing.assert_allclose(block.wear_strip[-1], 3 * recession, rtol=1e-10)
+
+
+def test_sliding_out_of_the_plane(assemble: Callable[..., System]) -> None:
+    """Friction across the plane leaves the plane's contact without friction; mu_d pulls along it, both ways alike."""
+    plain = assemble("example1", *COARSE, "contact.friction=0")
+    across = assemble("example1", *COARSE, "motion.axis=y")
+    np.testing.assert_allclose(steady(across).pressure, steady(plain).pressure, atol=1e-9 * MEAN)
+    np.testing.assert_allclose(across.friction.cross(-1, np.array([0.25])), -0.25)
+    pulled = assemble("example1", *COARSE, "motion.axis=y", "contact.transverse_friction=0.1")
+    leftward = assemble("example1", *COARSE, "contact.friction=0.1")
+    for direction in (1, -1):
+        np.testing.assert_allclose(pulled.optimum(direction).pressure, leftward.optimum(-1).pressure, rtol=1e-12)
+    both = assemble("example1", *COARSE, "motion.axis=y", "wear.strip.coefficient=3.926990816987242e-8")
+    assert steady(both).velocity["lambda_F"] == pytest.approx(2 * steady(across).velocity["lambda_F"], rel=1e-9)
+
+
+def test_angle_of_the_wear_velocity(assemble: Callable[..., System]) -> None:
+    """tan chi = w_t / w_n (4): the pin at height 20 mm turns the punch by lambda_M, so that w_t = -20 lambda_M."""
+    system = assemble("monotonic-lz20", *COARSE)
+    found = system.optimum(-1)
+    normal = found.velocity["lambda_F"] - found.velocity["lambda_M"] * (system.facing.x - 30)
+    np.testing.assert_allclose(np.tan(found.tilt), -20 * found.velocity["lambda_M"] / normal, rtol=1e-9)
+
+
+def test_load_over_the_cycle(assemble: Callable[..., System]) -> None:
+    """A load twice as high in the first half of the cycle: the wear and the balance of each half-cycle follow it."""
+    table = "punch.loads.0.over_cycle=[[0, 1.5], [0.499, 1.5], [0.501, 0.5], [1, 0.5]]"
+    system = assemble("example1", *COARSE, table)
+    assert system.statics.mean_pressure == pytest.approx(MEAN, rel=1e-6)
+    *_, block = march(system, 10)
+    np.testing.assert_allclose(block.worn_area[::2], 1.5 * AREAS[0], rtol=1e-9)
+    np.testing.assert_allclose(block.worn_area[1::2], 0.5 * AREAS[0], rtol=1e-9)
+    assert block.equilibrium_error.max() < 1e-12
+
+
+@pytest.mark.parametrize("integration", ["march", "jump", "steady"])
+def test_coefficients_that_do_not_vary_are_constants(assemble: Callable[..., System], integration: str) -> None:
+    """Expressions and tables with one value give what the constants give."""
+    dependent = (
+        "contact.friction={expression='0.25 + 0 * p'}",
+        "wear.punch={coefficient={table=[[0, 3.926990816987242e-8], [1, 3.926990816987242e-8]], of='v'}}",
+    )
+    found = []
+    for system in (assemble("example1", *COARSE), assemble("example1", *COARSE, *dependent)):
+        if integration == "steady":
+            found.append(steady(system).pressure)
+        else:
+            blocks = march(system, 30) if integration == "march" else jump(system, 2000, tolerance=3e-3)
+            found.append(list(blocks)[-1].pressure)
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-8, atol=1e-8)
+
+
+def test_wear_coefficient_of_pressure_is_an_exponent(assemble: Callable[..., System]) -> None:
+    """beta~ proportional to p is b = 2: the same steady state, and the same wear of a half-cycle."""
+    law = "wear.punch={coefficient={expression='2e-9 * p'}}"
+    power = "wear.punch={coefficient=2e-9, pressure_exponent=2.0}"
+    varying, square = (assemble("example1", *COARSE, setting) for setting in (law, power))
+    one, other = (list(march(system, 6))[-1] for system in (varying, square))
+    np.testing.assert_allclose(one.wear, other.wear, rtol=1e-9)
+    np.testing.assert_allclose(steady(varying).pressure, steady(square).pressure, atol=1e-5 * MEAN)
+
+
+def test_friction_of_pressure_balances(assemble: Callable[..., System]) -> None:
+    """With mu = 0.1 + 0.002 p the moments balance at the friction of the pressure found, node by node."""
+    system = assemble("example1", *COARSE, "contact.friction={expression='0.1 + 0.002 * p'}")
+    *_, block = march(system, 4)
+    p = block.pressure[-1]
+    balance = system.statics.equilibrium(-(0.1 + 0.002 * p)) @ p + system.statics.resultant
+    assert np.abs(balance).max() < 1e-6 * 1000 * 30
+
+
+def test_temperature_dependent_wear(assemble: Callable[..., System]) -> None:
+    """Wear that grows by 10 % per kelvin: the first half-cycle wears as at the start, later ones more."""
+    law = "wear.punch={coefficient={expression='3.926990816987242e-8 * (1 + 0.1 * T)'}}"
+    system = assemble("example1-heat", *COARSE, law)
+    *_, block = march(system, 20)
+    assert block.worn_area[0] == pytest.approx(AREAS[0], rel=1e-12)
+    assert (np.diff(block.worn_area) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ("motion.amplitude=8", r"motion: the stroke runs off the meshed strip: moved by .* strip_contact spans"),
+        ("contact.friction={expression='0.3 - p'}", r"contact.friction: expected zero or more, got .* at T = 0, p = 1"),
+        ("wear.strip={coefficient={expression='log(T)'}}", "wear.strip.coefficient: expected zero or more, got -inf"),
+    ],
+)
+def test_bad_input(assemble: Callable[..., System], setting: str, message: str) -> None:
+    """A stroke off the mesh and coefficients without a meaning are named by their keys."""
+    with pytest.raises(CaseError, match=message):
+        list(march(assemble("example1", *MOVING, setting), 1))

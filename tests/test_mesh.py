@@ -149,7 +149,7 @@ def test_bad_geo(old: str, new: str, expected: str, tmp_path: Path) -> None:
 
 def test_bad_files(tmp_path: Path) -> None:
     """No file, no mesh, no parameters of a mesh."""
-    refuse(tmp_path / "nowhere.geo", f"no file 'nowhere.geo'; ready ones are {READY}")
+    refuse(tmp_path / "nowhere.geo", f"no file 'nowhere.geo'; ready ones are blocks.geo, {READY}")
     (tmp_path / "mesh.vtu").touch()
     refuse(tmp_path / "mesh.vtu", "expected a .geo or a .msh file")
     (tmp_path / "nonsense.msh").write_text("$Nonsense\n")

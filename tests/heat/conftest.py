@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -118,7 +117,7 @@ def blocks() -> Callable[..., System]:
 
     def blocks(case: dict[str, Any], **parameters: float) -> System:
         geometry = {"file": "blocks.geo", **case.pop("geometry", {}), "parameters": parameters}
-        made: Case = make_case({"geometry": geometry, **case}, Path(__file__).parent)
+        made: Case = make_case({"geometry": geometry, **case})
         return System(made)
 
     return blocks

@@ -14,6 +14,8 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.elasticity import ElasticBody
 from fenwear.errors import CaseError, Problem
+from fenwear.mortar import mortar_transfer
+from fenwear.polynomials import interpolation
 from fenwear.surface import Surface, SurfaceNodes, rigid_motion
 
 
@@ -24,7 +26,7 @@ class Facing:
     Attributes:
         punch: The punch's contact nodes; the interface takes their coordinates and weights.
         strip: The strip's contact nodes.
-        transfer: Takes values at the strip's nodes to the punch's (n, n_strip).
+        transfer: Takes values at the strip's nodes to the punch's (n, n_strip), by a dual mortar.
         initial_gap: Distance along e_n before any deformation (n,), mm.
     """
 
@@ -59,7 +61,7 @@ def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
     slack = 1e-6 * (x[-1] - x[0])
     if x[0] < low - slack or x[-1] > high + slack:
         _not_facing(f"punch_contact spans x = {x[0]:g} to {x[-1]:g} mm, strip_contact only {low:g} to {high:g} mm")
-    transfer = interpolation(strip.x[:, 0], strip.degree, x)
+    transfer = mortar_transfer(x, punch.degree, strip.x[:, 0], strip.degree)
     if (np.einsum("ic,ic->i", punch.normal, transfer @ strip.normal) < 0.5).any():
         _not_facing("the outward normals of punch_contact and strip_contact do not point at each other")
     gap = (z - transfer @ strip.x[:, 1]) * punch.normal[:, 1]
@@ -70,26 +72,6 @@ def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
 
 def _not_facing(reason: str) -> None:
     raise CaseError(Problem("geometry", f"the contact surfaces do not face each other: {reason}"))
-
-
-def interpolation(nodes: Array, degree: int, x: Array) -> Array:
-    """Return the matrix of piecewise Lagrange interpolation from `nodes` to `x`.
-
-    Args:
-        nodes: Ascending abscissae; every facet has degree + 1 of them, its ends shared.
-        x: Abscissae inside the nodes' range.
-    """
-    ends = nodes[::degree]
-    facet = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(ends) - 2)
-    columns = facet[:, None] * degree + np.arange(degree + 1)
-    local = nodes[columns]
-    difference = x[:, None, None] - local[:, None, :]  # point, shape function, factor
-    spacing = local[:, :, None] - local[:, None, :]
-    same = np.eye(degree + 1, dtype=bool)
-    factors = np.where(same, 1.0, difference) / np.where(same, 1.0, spacing)
-    matrix = np.zeros((len(x), len(nodes)))
-    np.put_along_axis(matrix, columns, factors.prod(axis=2), axis=1)
-    return matrix
 
 
 @dataclass(frozen=True)

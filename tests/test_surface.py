@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from fenwear import System, elasticity, load_case
 from fenwear.elasticity import ElasticBody
-from fenwear.interface import interpolation
+from fenwear.polynomials import interpolation
 from fenwear.surface import condense, surface_nodes
 
 SMALL = ("geometry.parameters.elements_along_contact=8",)

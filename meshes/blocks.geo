@@ -7,19 +7,24 @@ DefineConstant[
   width = 1,
   punch_height = 1,
   strip_height = 1,
-  across = 2,          // elements along the contact; even, so that a node lies at x = 0
+  core = 0,            // width of the evenly divided middle; 0: all of it
+  across = 2,          // elements over the core; even, so that a node lies at x = 0
   strip_across = 0,    // of the strip where it has others than the punch; 0: the same
+  outer = 1,           // elements on each side of the core
+  spread = 1,          // of such an element's width over that of its neighbour towards the core
   punch_layers = 2,    // elements over the height
   strip_layers = 2,
-  growth = 1,          // of an element's height over that of its neighbour towards the contact
-  spread = 1           // of an element's width over that of its neighbour towards the middle
+  growth = 1           // of an element's height over that of its neighbour towards the contact
 ];
 
-If(width <= 0 || punch_height <= 0 || strip_height <= 0)
-  Error("width, punch_height and strip_height must be positive");
+If(width <= 0 || punch_height <= 0 || strip_height <= 0 || core < 0 || core > width)
+  Error("width, punch_height and strip_height must be positive, core between 0 and width");
 EndIf
-If(across < 2 || across % 2 != 0 || strip_across < 0 || strip_across % 2 != 0 || punch_layers < 1 || strip_layers < 1)
-  Error("across and strip_across must be even, punch_layers and strip_layers at least 1");
+If(across < 2 || across % 2 != 0 || strip_across < 0 || strip_across % 2 != 0)
+  Error("across and strip_across must be even");
+EndIf
+If(punch_layers < 1 || strip_layers < 1 || outer < 1)
+  Error("punch_layers, strip_layers and outer must be at least 1");
 EndIf
 If(growth <= 0 || spread <= 0)
   Error("growth and spread must be positive");
@@ -28,24 +33,37 @@ EndIf
 heights[] = {punch_height, -strip_height};
 layers[] = {punch_layers, strip_layers};
 counts[] = {across, (strip_across > 0) ? strip_across : across};
+abscissae[] = {0, (core > 0) ? core / 2 : width / 2};
+If(core > 0 && core < width)
+  abscissae[] += {width / 2};
+EndIf
+last = #abscissae[] - 1;
 For body In {0 : 1}
-  near[] = {}; far[] = {}; sides[] = {}; contact[] = {}; ends[] = {}; parts~{body}[] = {};
-  For i In {-1 : 1}
-    p = newp; Point(p) = {i * width / 2, 0, 0}; near[] += p;
-    p = newp; Point(p) = {i * width / 2, heights[body], 0}; far[] += p;
-    l = newl; Line(l) = {near[i + 1], far[i + 1]}; sides[] += l;
-    Transfinite Curve{l} = layers[body] + 1 Using Progression growth;
+  a = newp; Point(a) = {0, 0, 0};
+  b = newp; Point(b) = {0, heights[body], 0};
+  middle = newl; Line(middle) = {a, b};
+  uprights[] = {middle}; contact~{body}[] = {}; ends~{body}[] = {}; sides~{body}[] = {}; parts~{body}[] = {};
+  For side In {-1 : 1 : 2}    // both halves from the middle outwards: mirror images to the last digit
+    near = a; far = b; upright = middle;
+    For i In {1 : last}
+      p = newp; Point(p) = {side * abscissae[i], 0, 0};
+      q = newp; Point(q) = {side * abscissae[i], heights[body], 0};
+      l = newl; Line(l) = {near, p};
+      m = newl; Line(m) = {far, q};
+      u = newl; Line(u) = {p, q};
+      If(i == 1)
+        Transfinite Curve{l, m} = counts[body] / 2 + 1;
+      Else
+        Transfinite Curve{l, m} = outer + 1 Using Progression spread;
+      EndIf
+      c = newll; Curve Loop(c) = {l, u, -m, -upright};
+      s = news; Plane Surface(s) = {c};
+      contact~{body}[] += l; ends~{body}[] += m; uprights[] += u; parts~{body}[] += s;
+      near = p; far = q; upright = u;
+    EndFor
+    sides~{body}[] += upright;
   EndFor
-  For i In {0 : 2 : 2}    // left and right half, both from the middle outwards: mirror images to the last digit
-    l = newl; Line(l) = {near[1], near[i]}; contact[] += l;
-    m = newl; Line(m) = {far[1], far[i]}; ends[] += m;
-    Transfinite Curve{l, m} = counts[body] / 2 + 1 Using Progression spread;
-    c = newll; Curve Loop(c) = {l, sides[i], -m, -sides[1]};
-    s = news; Plane Surface(s) = {c}; parts~{body}[] += s;
-  EndFor
-  contact~{body}[] = contact[];
-  ends~{body}[] = ends[];
-  sides~{body}[] = {sides[0], sides[2]};
+  Transfinite Curve{uprights[]} = layers[body] + 1 Using Progression growth;
 EndFor
 
 Transfinite Surface{:};

@@ -89,9 +89,7 @@ def hertz() -> Result:
         inside, outside = np.abs(x) < 0.9 * a, np.abs(x) > 1.05 * a
         rows.append(number(f"{case}: half-width a (mm)", a, measured_half_width(x, p), 1e-3))
         rows.append(number(f"{case}: largest pressure p0 (MPa)", peak, p.max(), 5e-4))
-        rows.append(
-            profile(f"{case}: pressure for |x| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3, scale=peak)
-        )
+        rows.append(profile(f"{case}: pressure for |x| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3, scale=peak))
         rows.append(profile(f"{case}: pressure for |x| > 1.05 a (MPa)", exact[outside], p[outside], 0, scale=peak))
         dense, shown = np.linspace(-1.3, 1.3, 400) * a, np.abs(x) < 1.3 * a
         lines.append(Line(f"Hertz, {case}", dense, semi_ellipse(dense, a, peak), reference=True))

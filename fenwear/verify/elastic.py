@@ -83,9 +83,7 @@ def patch() -> Result:
     The blocks' nodes face each other, or the strip has 6 or 22 elements opposite the punch's 4.
     """
     upper, lower, heights = {"young": 1e5, "poisson": 0.2}, {"young": 2e5, "poisson": 0.3}, (2.0, 3.0)
-    strains = [
-        -(1 + m["poisson"]) * (1 - 2 * m["poisson"]) / ((1 - m["poisson"]) * m["young"]) for m in (upper, lower)
-    ]
+    strains = [-(1 + m["poisson"]) * (1 - 2 * m["poisson"]) / ((1 - m["poisson"]) * m["young"]) for m in (upper, lower)]
     rows = []
     for degree in (1, 2, 4):
         for strip_across in (4, 6, 22):

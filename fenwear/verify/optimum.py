@@ -85,7 +85,7 @@ def optimum_power() -> Result:
             exact = by_quadrature(b, x) if name == "example1" else np.full_like(x, MEAN)
             found = system.optimum(1)
             case = f"{name}, b = {b:g}"
-            rows.append(profile(f"{case}: pressure (MPa)", exact, found.pressure, 2e-5, scale=MEAN))
+            rows.append(profile(f"{case}: pressure (MPa)", exact, found.pressure, 1e-9, scale=MEAN))
             rows.append(number(f"{case}: force (N/mm)", 1000, weights @ found.pressure, 1e-10))
             if name == "example1":
                 rows.append(number(f"{case}: moment about x = 0 (N)", -FRICTION * 20 * 1000,

@@ -22,7 +22,10 @@ def ranks() -> Result:
         for what, solve in (
             ("pressure of contact (MPa)", lambda s: s.contact((1,)).solve(s.facing.initial_gap).pressure[0]),
             ("wear after 30 half-cycles (mm)", lambda s: next(march(s, 30)).wear[-1]),
-            ("pressure after 2,000 half-cycles by jumps (MPa)", lambda s: list(jump(s, 2000))[-1].pressure),
+            (
+                "pressure after 2,000 half-cycles by jumps (MPa)",
+                lambda s: list(jump(s, 2000, tolerance=3e-3))[-1].pressure,
+            ),
             ("pressure of the steady state (MPa)", lambda s: steady(s).pressure),
         ):
             one, other = solve(alone), solve(together)

@@ -22,6 +22,8 @@ th, td { text-align: left; vertical-align: top; padding: .2rem .6rem .2rem 0;
 thead th { font-weight: 600; }
 thead th:nth-child(2) { text-align: right; }
 .places thead th:nth-child(2) { text-align: left; }
+.comparison thead th:not(:first-child):not(:last-child) { text-align: right; white-space: nowrap; }
+.comparison th[scope=row] { min-width: 18rem; }
 td.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.unit { width: 3.5rem; }
 .wide { overflow-x: auto; }

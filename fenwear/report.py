@@ -247,7 +247,9 @@ def _bodies(images: dict[str, Path]) -> str:
         ("history.gif", "pressure and worn shape over the run"),
         *((f"bodies_{field}.gif", f"the bodies over the run: {word}") for field, word in words.items()),
     ):
-        figure = _figure(images, name, text, f"Animation: {text}.")
-        if figure:
-            parts.append(f'<details class="animation"><summary>Animation: {escape(text)}</summary>\n{figure}</details>')
+        picture = _figure(images, name, text, f"Animation: {text}.")
+        if picture:
+            parts.append(
+                f'<details class="animation"><summary>Animation: {escape(text)}</summary>\n{picture}</details>'
+            )
     return "\n".join(parts)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,8 +26,14 @@ from fenwear.verify.manufactured import (
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 K, RHO_C, AMBIENT, CONVECTION, THICKNESS = 3.0, 2.0, 7.0, 4.0, 20.0
-MATERIAL = {"young": 130.0, "poisson": 0.3, "conductivity": K, "heat_capacity": RHO_C / 0.5, "density": 0.5,
-            "expansion": 1e-3}  # fmt: skip
+MATERIAL = {
+    "young": 130.0,
+    "poisson": 0.3,
+    "conductivity": K,
+    "heat_capacity": RHO_C / 0.5,
+    "density": 0.5,
+    "expansion": 1e-3,
+}
 HELD_SIDES = {"temperatures": [{"on": "strip_sides"}]}
 
 
@@ -35,8 +41,15 @@ HELD_SIDES = {"temperatures": [{"on": "strip_sides"}]}
 def conducting_square(elements: int, degree: int, *, free: bool = True) -> HeatBody:
     """Return conduction in the strip -1/2 < x < 1/2, -1 < z < 0, held at its sides, free to convect or insulated."""
     heat = {"convection": CONVECTION if free else 0.0, "ambient": AMBIENT}
-    system = two_blocks(MATERIAL, MATERIAL, unit_square(elements), degree=degree, strip={**clamped("strip"), **HELD_SIDES},
-                        model={"thickness": THICKNESS}, heat=heat)  # fmt: skip
+    system = two_blocks(
+        MATERIAL,
+        MATERIAL,
+        unit_square(elements),
+        degree=degree,
+        strip={**clamped("strip"), **HELD_SIDES},
+        model={"thickness": THICKNESS},
+        heat=heat,
+    )
     assert system.heat_bodies is not None
     return system.heat_bodies[1]
 
@@ -82,8 +95,11 @@ REGIMES = {
 }
 
 
-@verification("conduction", "Conduction: order of convergence with advection, convection and flux",
-              "exact waves of the heat equation and of its implicit Euler step, nothing added to the equations")  # fmt: skip
+@verification(
+    "conduction",
+    "Conduction: order of convergence with advection, convection and flux",
+    "exact waves of the heat equation and of its implicit Euler step, nothing added to the equations",
+)
 def conduction() -> Result:
     """L2 order degree + 1 and H1 order degree, at rest and at high Peclet numbers v L / a.
 
@@ -107,7 +123,7 @@ def conduction() -> Result:
             for count in counts:
                 body = conducting_square(int(count), degree)
                 theta = body.function(end_of_step(body, m, beta, factor, velocity, duration))
-                pairs.append(errors(theta, lambda x, z, b=beta, f=factor: wave(x, z, m, b, f)))
+                pairs.append(errors(theta, partial(wave, m=m, beta=beta, factor=factor)))
             in_l2, in_h1 = np.array(pairs).T
             rows.append(order(f"{name}, degree {degree}: order in L2", degree + 1, in_l2, tolerance))
             rows.append(order(f"{name}, degree {degree}: order in H1", degree, in_h1, tolerance))
@@ -120,8 +136,11 @@ def conduction() -> Result:
     return Result(rows, plots)
 
 
-@verification("time-steps", "Conduction: order of convergence in time",
-              "decay e^(-2 pi² a t) of sin pi X cos pi z; implicit Euler divides by 1 + rate dt")  # fmt: skip
+@verification(
+    "time-steps",
+    "Conduction: order of convergence in time",
+    "decay e^(-2 pi² a t) of sin pi X cos pi z; implicit Euler divides by 1 + rate dt",
+)
 def time_steps() -> Result:
     """A mode held on the sides and insulated elsewhere: exactly implicit Euler, and so of first order."""
     body = conducting_square(8, 4, free=False)
@@ -142,17 +161,27 @@ def time_steps() -> Result:
         rows.append(number(f"{steps} steps: what is left of the mode", (1 + rate * end / steps) ** -steps, left, 1e-6))
     rows.append(order("order in the time step, against e^(-rate t)", 1, differences, 0.1))
     durations = [end / n for n in (10, 20, 40, 80)]
-    plot = Plot("Conduction: error of implicit Euler", "time step (s)", "error of what is left of the mode",
-                [Line("fenwear", np.array(durations), np.array(differences))], ("log", "log"), (1.0,))  # fmt: skip
+    plot = Plot(
+        "Conduction: error of implicit Euler",
+        "time step (s)",
+        "error of what is left of the mode",
+        [Line("fenwear", np.array(durations), np.array(differences))],
+        ("log", "log"),
+        (1.0,),
+    )
     return Result(rows, [plot])
 
 
-@verification("thermal-strain", "Thermal strain: order of convergence of a manufactured solution",
-              "Goodier's potential; Timoshenko and Goodier, Theory of Elasticity, 1970, section 162")  # fmt: skip
+@verification(
+    "thermal-strain",
+    "Thermal strain: order of convergence of a manufactured solution",
+    "Goodier's potential; Timoshenko and Goodier, Theory of Elasticity, 1970, section 162",
+)
 def thermal_strain() -> Result:
-    """u = grad phi, phi = sin² pi X sin² pi z in a clamped square, for laplace phi = (1 + nu) alpha theta (plane stress)
+    """Displacement grad phi, phi = sin² pi X sin² pi z, in a clamped square.
 
-    or (1 + nu)/(1 - nu) alpha theta (plane strain): the thermal stress needs no further force.
+    For laplace phi = (1 + nu) alpha theta in plane stress, (1 + nu)/(1 - nu) alpha theta in plane strain, the
+    thermal stress needs no further force.
     """
     nu, alpha = MATERIAL["poisson"], MATERIAL["expansion"]
     pi = np.pi
@@ -166,8 +195,9 @@ def thermal_strain() -> Result:
         for degree in DEGREES[:3]:
             pairs = []
             for count in (10, 20):
-                system = two_blocks(MATERIAL, MATERIAL, unit_square(count), degree=degree, plane=plane,
-                                    strip=clamped("strip"), heat={})  # fmt: skip
+                system = two_blocks(
+                    MATERIAL, MATERIAL, unit_square(count), degree=degree, plane=plane, strip=clamped("strip"), heat={}
+                )
                 assert system.heat_bodies is not None
                 heat = system.heat_bodies[1]
                 x, z = owned_nodes(heat)
@@ -184,8 +214,11 @@ def thermal_strain() -> Result:
     return Result(rows)
 
 
-@verification("free-expansion", "Free thermal expansion of a bar",
-              "Timoshenko and Goodier, Theory of Elasticity, 1970: a linear temperature makes no stress")  # fmt: skip
+@verification(
+    "free-expansion",
+    "Free thermal expansion of a bar",
+    "Timoshenko and Goodier, Theory of Elasticity, 1970: a linear temperature makes no stress",
+)
 def free_expansion() -> Result:
     """The punch as a bar on two pins, its temperature linear in x and z: no stress, and the displacement by hand.
 
@@ -206,15 +239,16 @@ def free_expansion() -> Result:
         unloaded = system.vary("punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
         fields, _ = body_fields(unloaded, nothing, np.zeros(0), 1, (theta, strip))
         ours = fields.displacement.x.array[: 2 * len(x)].reshape(-1, 2)
-        s, scale = x + half, alpha if plane == "stress" else (1 + nu) * alpha
+        s, expansion = x + half, alpha if plane == "stress" else (1 + nu) * alpha
         start = t0 - half * tx  # the temperature at the first pin, from where s is counted
-        exact = scale * np.stack(
+        exact = expansion * np.stack(
             [start * s + tx * (s**2 - z**2) / 2 + tz * s * z, start * z + tz * (z**2 - s**2) / 2 + tx * s * z], axis=1
         )
-        turn = scale * tz * half  # the rotation that the second pin prevents
+        turn = expansion * tz * half  # the rotation that the second pin prevents
         exact += turn * np.stack([-z, s], axis=1)
-        both = [np.concatenate(system.comm.allgather(part)) for part in (exact, ours)]
-        rows.append(profile(f"plane {plane}: displacement (mm)", *both, 1e-9, scale=np.abs(both[0]).max()))
+        exact, ours = (np.concatenate(system.comm.allgather(part)) for part in (exact, ours))
+        scale = np.abs(exact).max()
+        rows.append(profile(f"plane {plane}: displacement (mm)", exact, ours, 1e-9, scale=scale))
         if plane == "stress":
             held = 2e5 * alpha * t0  # what a bar held at its ends would bear
             largest = system.comm.allreduce(float(np.abs(fields.von_mises.x.array).max()), max)
@@ -222,8 +256,9 @@ def free_expansion() -> Result:
     return Result(rows)
 
 
-@verification("bimetal", "A heated bimetal strip",
-              "S. Timoshenko, Analysis of bi-metal thermostats, J. Opt. Soc. Am. 11, 1925")  # fmt: skip
+@verification(
+    "bimetal", "A heated bimetal strip", "S. Timoshenko, Analysis of bi-metal thermostats, J. Opt. Soc. Am. 11, 1925"
+)
 def bimetal() -> Result:
     """Curvature 6 (a1 - a2) dT (1 + m)² / (h (3 (1 + m)² + (1 + m n)(m² + 1/(m n)))), m and n lower over upper layer.
 
@@ -233,8 +268,14 @@ def bimetal() -> Result:
     rows: list[Row] = []
     for m, n, poisson in ((1.0, 1.0, 0.3), (0.5, 4.0, 0.3), (3.0, 0.2, 0.1)):
         lower = height * m / (1 + m)
-        size = {"punch_width": length, "punch_height": height, "layer_height": lower, "pin_height_1": lower,
-                "strip_length": 2 * length, "strip_height": height}  # fmt: skip
+        size = {
+            "punch_width": length,
+            "punch_height": height,
+            "layer_height": lower,
+            "pin_height_1": lower,
+            "strip_length": 2 * length,
+            "strip_height": height,
+        }
         values = {**size, "elements_along_contact": 32, "edge_grading": 1, "growth": 0.2}
         parameters = ", ".join(f"{name}={value!r}" for name, value in values.items())
         thermal = "conductivity=1, heat_capacity=1, density=1"
@@ -265,12 +306,16 @@ def bimetal() -> Result:
     return Result(rows)
 
 
-@verification("periodic-flux", "Periodic heat flux on a half-space",
-              "Carslaw and Jaeger, Conduction of Heat in Solids, 1959, section 2.6")  # fmt: skip
+@verification(
+    "periodic-flux",
+    "Periodic heat flux on a half-space",
+    "Carslaw and Jaeger, Conduction of Heat in Solids, 1959, section 2.6",
+)
 def periodic_flux() -> Result:
-    """Amplitude q0 / sqrt(k rho c omega), lag 45 degrees; with implicit Euler's s = (1 - e^(-i omega dt))/dt for i omega.
+    """Amplitude q0 / sqrt(k rho c omega), lag 45 degrees.
 
-    The strip of ten penetration depths, insulated but for the flux.
+    Implicit Euler has s = (1 - e^(-i omega dt))/dt for i omega. The strip is ten penetration
+    depths deep and insulated but for the flux.
     """
     omega, flux, periods = 10.0, 2.0, 6
     depth = 10 * math.sqrt(2 * K / (RHO_C * omega))
@@ -294,20 +339,27 @@ def periodic_flux() -> Result:
         basis = np.stack([np.cos(omega * times), np.sin(omega * times), np.ones(steps), times], axis=1)
         (c, s, *_), *_ = np.linalg.lstsq(basis, last, rcond=None)
         discrete = flux / np.sqrt(K * RHO_C * (1 - np.exp(-1j * omega * dt)) / dt)
-        rows.append(number(f"{steps} steps a period: amplitude of implicit Euler (K)", abs(discrete), math.hypot(c, s),
-                           2e-3))  # fmt: skip
+        rows.append(
+            number(f"{steps} steps a period: amplitude of implicit Euler (K)", abs(discrete), math.hypot(c, s), 2e-3)
+        )
         amplitudes.append(math.hypot(c, s))
         lags.append(math.degrees(math.atan2(s, c)))
         if steps == 400:
             phase = np.degrees(omega * (times - times[0] + dt))
-            lines = [Line("fenwear", phase[::10], last[::10]),
-                     Line("exact", phase, unit * np.cos(omega * times - np.pi / 4), reference=True)]  # fmt: skip
+            lines = [
+                Line("fenwear", phase[::10], last[::10]),
+                Line("exact", phase, unit * np.cos(omega * times - np.pi / 4), reference=True),
+            ]
     # Of first order in the step: what two steps extrapolate to.
     rows.append(number("amplitude extrapolated to no step (K)", unit, 2 * amplitudes[-1] - amplitudes[-2], 2e-3))
     rows.append(number("lag extrapolated to no step (degrees)", 45, 2 * lags[-1] - lags[-2], 2e-3))
     rows.append(order("lag: order in the time step", 1, np.abs(np.array(lags) - 45).tolist(), 0.15))
-    plot = Plot("Periodic flux: surface temperature in the sixth period", "phase of the flux (degrees)",
-                "temperature (K)", lines)  # fmt: skip
+    plot = Plot(
+        "Periodic flux: surface temperature in the sixth period",
+        "phase of the flux (degrees)",
+        "temperature (K)",
+        lines,
+    )
     return Result(rows, [plot])
 
 
@@ -326,9 +378,12 @@ def jaeger(x: float, half_width: float, speed: float, diffusivity: float) -> flo
     return float(sum(quad(kernel, a, b, limit=200)[0] for a, b in pairwise(ends)) / (math.pi * scale))
 
 
-@verification("jaeger", "Jaeger: a moving band source of heat",
-              "J. C. Jaeger, Moving sources of heat and the temperature at sliding contacts, 1942; "
-              "Carslaw and Jaeger, 1959, section 10.7")  # fmt: skip
+@verification(
+    "jaeger",
+    "Jaeger: a moving band source of heat",
+    "J. C. Jaeger, Moving sources of heat and the temperature at sliding contacts, 1942; "
+    "Carslaw and Jaeger, 1959, section 10.7",
+)
 def moving_source() -> Result:
     """The profile of his integral; for Pe = v l / 2 a > 10 also his largest rise, 2 q/k sqrt(2 l a / (pi v)).
 
@@ -361,8 +416,14 @@ def moving_source() -> Result:
             if peclet > 10:
                 rows.append(number(f"{case}: largest rise, Jaeger's formula (mm)", published, rise.max(), 1e-2))
             if d > 0:
-                lines += [Line(f"fenwear, Pe = {peclet:g}", x, rise / published),
-                          Line(f"Jaeger, Pe = {peclet:g}", x, exact / published, reference=True)]  # fmt: skip
-    plot = Plot("Moving band source: rise over Jaeger's largest, rightward", "x (mm)",
-                "theta / (2 q/k sqrt(2 l a / pi v))", lines)  # fmt: skip
+                lines += [
+                    Line(f"fenwear, Pe = {peclet:g}", x, rise / published),
+                    Line(f"Jaeger, Pe = {peclet:g}", x, exact / published, reference=True),
+                ]
+    plot = Plot(
+        "Moving band source: rise over Jaeger's largest, rightward",
+        "x (mm)",
+        "theta / (2 q/k sqrt(2 l a / pi v))",
+        lines,
+    )
     return Result(rows, [plot])

@@ -9,7 +9,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.system import System
 from fenwear.verify.bodies import builtin, rigid_punch, two_blocks
-from fenwear.verify.suite import Line, Plot, Result, Row, number, observed_order, order, profile, verification
+from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 UPPER, LOWER = {"young": 7e4, "poisson": 0.1}, {"young": 2e5, "poisson": 0.35}
 RADIUS = 200.0  # of the cylinder, mm
@@ -74,10 +74,13 @@ def semi_ellipse(x: Array, a: float, peak: float) -> Array:
     return peak * np.sqrt(np.maximum(1 - (x / a) ** 2, 0))
 
 
-@verification("hertz", "Hertz: a cylinder on a half-plane, both elastic, without friction",
-              "K. L. Johnson, Contact Mechanics, 1985, section 4.2")  # fmt: skip
+@verification(
+    "hertz",
+    "Hertz: a cylinder on a half-plane, both elastic, without friction",
+    "K. L. Johnson, Contact Mechanics, 1985, section 4.2",
+)
 def hertz() -> Result:
-    """a = 2 sqrt(P R / (pi E*)), p0 = 2 P / (pi a), p = p0 sqrt(1 - x²/a²) for the gap x²/2R."""
+    """Half-width a = 2 sqrt(P R / (pi E*)), p0 = 2 P / (pi a), p = p0 sqrt(1 - x²/a²) for the gap x²/2R."""
     rows: list[Row] = []
     lines: list[Line] = []
     for load in LOADS:
@@ -99,7 +102,7 @@ def hertz() -> Result:
     plots = [
         Plot("Hertz: pressure", "x (mm)", "pressure (MPa)", lines),
         Plot(
-            "Hertz: error of the pressure; its slope is infinite at the edge, so that no element gives more than order 1",
+            "Hertz: error of the pressure, whose slope is infinite at the edge",
             "element size h (mm)",
             "L2 error over that of the pressure",
             [Line("mean of the loads", CORE / np.array(elements), np.array(found))],
@@ -110,11 +113,16 @@ def hertz() -> Result:
     return Result(rows, plots)
 
 
+def parabola(x: Array) -> Array:
+    """Return the cylinder's gap x²/2R, mm."""
+    return np.asarray(x**2 / (2 * RADIUS), dtype=np.float64)
+
+
 def pressed_cylinder(load: float, elements: int = 40) -> tuple[Array, Array]:
     """Return x and the pressure of the cylinder under a load, N/mm."""
     system = pressed(load, elements=elements)
     x = system.facing.x
-    return x, system.contact((1,)).solve(x**2 / (2 * RADIUS)).pressure[0]
+    return x, system.contact((1,)).solve(parabola(x)).pressure[0]
 
 
 def rms_error(elements: int) -> float:
@@ -128,11 +136,14 @@ def rms_error(elements: int) -> float:
     return float(np.mean(found))
 
 
-@verification("sliding-cylinder", "A cylinder that slides on a half-plane, both elastic, with friction",
-              "index -gamma of the singular integral equation, tan pi gamma = mu beta (Dundurs); "
-              "Hills, Nowell and Sackfield, Mechanics of Elastic Contacts, 1993, section 3.2")  # fmt: skip
+@verification(
+    "sliding-cylinder",
+    "A cylinder that slides on a half-plane, both elastic, with friction",
+    "index -gamma of the singular integral equation, tan pi gamma = mu beta (Dundurs); "
+    "Hills, Nowell and Sackfield, Mechanics of Elastic Contacts, 1993, section 3.2",
+)
 def sliding_cylinder() -> Result:
-    """p = C (a + s)^(1/2 + g) (a - s)^(1/2 - g), s = x - e, with tan pi g = -d mu beta.
+    """Pressure p = C (a + s)^(1/2 + g) (a - s)^(1/2 - g), s = x - e, with tan pi g = -d mu beta.
 
     From (1/pi) PV int p/(x - s) + tan(pi g) p = E* x / 2R by Plemelj's formulas: the contact's middle
     lies at e = 2 g a, C = E* cos(pi g) / 2R, and a² = 4 P R / (pi E* (1 - 4 g²)).
@@ -151,12 +162,13 @@ def sliding_cylinder() -> Result:
             left, right = np.maximum(a + s, 0), np.maximum(a - s, 0)
             return contact_modulus() * np.cos(np.pi * g) / (2 * RADIUS) * left ** (0.5 + g) * right ** (0.5 - g)
 
-        p = system.contact((d,)).solve(x**2 / (2 * RADIUS)).pressure[0]
+        p = system.contact((d,)).solve(parabola(x)).pressure[0]
         name = "rightward" if d > 0 else "leftward"
         inside = np.abs(x - 2 * g * a) < 0.9 * a
         exact = pressure(x)
-        rows.append(profile(f"{name}: pressure for |x - e| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3,
-                            scale=exact.max()))  # fmt: skip
+        rows.append(
+            profile(f"{name}: pressure for |x - e| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3, scale=exact.max())
+        )
         force = system.facing.weights * p
         rows.append(number(f"{name}: centre of pressure, 8 g a / 3 (mm)", 8 * g * a / 3, force @ x / force.sum(), 5e-3))
         dense = np.linspace(-1.3, 1.3, 400) * a
@@ -172,10 +184,13 @@ def standing(system: System, direction: int = 1) -> tuple[Array, Array]:
     return x[inside], p[inside]
 
 
-@verification("flat-punch", "A flat rigid punch on a half-plane, without friction",
-              "K. L. Johnson, Contact Mechanics, 1985, section 2.8(a)")  # fmt: skip
+@verification(
+    "flat-punch",
+    "A flat rigid punch on a half-plane, without friction",
+    "K. L. Johnson, Contact Mechanics, 1985, section 2.8(a)",
+)
 def flat_punch() -> Result:
-    """p = P / (pi sqrt(a² - x²)); the strip's depth H enters as (a/H)²."""
+    """Pressure P / (pi sqrt(a² - x²)); the strip's depth H enters as (a/H)²."""
     rows: list[Row] = []
     lines: list[Line] = []
     for plane in ("stress", "strain"):
@@ -192,22 +207,31 @@ def flat_punch() -> Result:
         centres.append(p[np.argmin(np.abs(x))])
     exact_centre = LOAD / (np.pi * HALF_WIDTH)
     deviations = np.abs(np.array(centres) / exact_centre - 1)
-    rows.append(order("depth H of the strip: order in a/H at the centre", 2, deviations.tolist(), 0.15))
+    rows.append(order("depth H of the strip: order in a/H at the centre", 2, deviations, 0.15))
     plots = [
         Plot("Flat punch: pressure", "x (mm)", "pressure (MPa)", lines),
-        Plot("Flat punch: pressure at the centre on a strip of depth H", "a/H", "relative difference to the half-plane",
-             [Line("fenwear", HALF_WIDTH / depths, deviations)], ("log", "log"), (2.0,)),
-    ]  # fmt: skip
+        Plot(
+            "Flat punch: pressure at the centre on a strip of depth H",
+            "a/H",
+            "relative difference to the half-plane",
+            [Line("fenwear", HALF_WIDTH / depths, deviations)],
+            ("log", "log"),
+            (2.0,),
+        ),
+    ]
     return Result(rows, plots)
 
 
-@verification("sliding-punch", "A flat rigid punch that slides on a half-plane, with friction",
-              "K. L. Johnson, Contact Mechanics, 1985, section 2.8(b)")  # fmt: skip
+@verification(
+    "sliding-punch",
+    "A flat rigid punch that slides on a half-plane, with friction",
+    "K. L. Johnson, Contact Mechanics, 1985, section 2.8(b)",
+)
 def sliding_punch() -> Result:
-    """p = P cos(pi g) / (pi sqrt(a² - x²)) ((a - x)/(a + x))^g with tan(pi g) = d mu beta, beta Dundurs' of a rigid punch.
+    """Pressure P cos(pi g) / (pi sqrt(a² - x²)) ((a - x)/(a + x))^g with tan(pi g) = d mu beta.
 
-    -beta = (1 - 2 nu)/(2 (1 - nu)) in plane strain; in plane stress with nu/(1 + nu) for nu. The exponent is
-    measured: the slope of ln(p sqrt(a² - x²)) over ln((a - x)/(a + x)).
+    Dundurs' beta under a rigid punch is -(1 - 2 nu)/(2 (1 - nu)) in plane strain; in plane stress nu/(1 + nu)
+    stands for nu. The exponent is measured: the slope of ln(p sqrt(a² - x²)) over ln((a - x)/(a + x)).
     """
     friction = 0.6
     rows: list[Row] = []
@@ -231,10 +255,13 @@ def sliding_punch() -> Result:
     return Result(rows, [Plot("Sliding flat punch, nu = 0: pressure", "x (mm)", "pressure (MPa)", lines)])
 
 
-@verification("equilibrium-of-contact", "Force and moment balance of contact with friction",
-              "statics by hand: friction mu p at the arm l_z of the pin")  # fmt: skip
+@verification(
+    "equilibrium-of-contact",
+    "Force and moment balance of contact with friction",
+    "statics by hand: friction mu p at the arm l_z of the pin",
+)
 def equilibrium_of_contact() -> Result:
-    """The punch of Example 1 with mu = 0.4 and the pin 40 mm high, where the rear edge lifts off; Example 2 likewise."""
+    """Examples 1 and 2 with mu = 0.4 and the pin 40 mm high, where Example 1's rear edge lifts off."""
     rows: list[Row] = []
     for name in ("example1", "example2"):
         system = builtin(name, "contact.friction=0.4", "geometry.parameters.pin_height_1=40")
@@ -245,6 +272,12 @@ def equilibrium_of_contact() -> Result:
             rows.append(number(f"{case}: force on the contact (N/mm)", LOAD, weights @ p, 1e-11))
             if name == "example1":
                 # About the pin at (30, 40) above the contact: friction d mu P pulls the centre of pressure by d mu l_z.
-                rows.append(number(f"{case}: moment of the pressure about x = 0 (N)", -d * 0.4 * 40 * LOAD,
-                                   weights @ (p * x), 1e-10))  # fmt: skip
+                rows.append(
+                    number(
+                        f"{case}: moment of the pressure about x = 0 (N)",
+                        -d * 0.4 * 40 * LOAD,
+                        weights @ (p * x),
+                        1e-10,
+                    )
+                )
     return Result(rows)

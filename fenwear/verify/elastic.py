@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy import cos, pi, sin
 
@@ -43,8 +45,11 @@ def force_of_waves(x: Array, z: Array, plane: str) -> Array:
     return stacked(own * u - cross * w_xz, own * w - cross * u_xz)
 
 
-@verification("elasticity", "Elasticity: order of convergence of a manufactured solution",
-              "force differentiated by hand; orders of Strang and Fix, An Analysis of the Finite Element Method, 1973")  # fmt: skip
+@verification(
+    "elasticity",
+    "Elasticity: order of convergence of a manufactured solution",
+    "force differentiated by hand; orders of Strang and Fix, An Analysis of the Finite Element Method, 1973",
+)
 def elasticity() -> Result:
     """A clamped square under the body force of known waves: L2 order degree + 1, H1 order degree."""
     material = {"young": YOUNG, "poisson": POISSON}
@@ -58,7 +63,7 @@ def elasticity() -> Result:
             for count in counts:
                 square = unit_square(count)
                 system = two_blocks(material, material, square, degree=degree, plane=plane, strip=clamped("strip"))
-                force = body_force(system.strip, lambda x, z, plane=plane: force_of_waves(x, z, plane))
+                force = body_force(system.strip, partial(force_of_waves, plane=plane))
                 pairs.append(errors(displacement(system.strip, force), waves))
             in_l2, in_h1 = np.array(pairs).T
             rows.append(order(f"plane {plane}, degree {degree}: order in L2", degree + 1, in_l2, 0.15))
@@ -75,8 +80,11 @@ def elasticity() -> Result:
 CONFINED = {"supports": [{"on": "strip_far", "fix": ["z"]}, {"on": "strip_sides", "fix": ["x"]}]}
 
 
-@verification("patch", "Contact patch test: a uniform pressure through two materials",
-              "uniaxial strain by hand; Taylor and Papadopoulos, On a patch test for contact problems, 1991")  # fmt: skip
+@verification(
+    "patch",
+    "Contact patch test: a uniform pressure through two materials",
+    "uniaxial strain by hand; Taylor and Papadopoulos, On a patch test for contact problems, 1991",
+)
 def patch() -> Result:
     """Two confined blocks under 1 MPa: pressure uniform, displacement linear, with facing nodes or without.
 
@@ -106,7 +114,7 @@ def patch() -> Result:
                 z = body.space.tabulate_dof_coordinates()[:owned, 1]
                 ours.append(field.displacement.x.array[: 2 * owned].reshape(-1, 2))
                 exact.append(np.stack([0 * z, strains[1] * heights[1] + strain * z], axis=1))
-            gathered = [np.concatenate(system.comm.allgather(np.concatenate(part))) for part in (exact, ours)]
-            scale = np.abs(gathered[0]).max()
-            rows.append(profile(f"{case}: displacement (mm)", *gathered, 1e-9, scale=scale))
+            expected, found = (np.concatenate(system.comm.allgather(np.concatenate(part))) for part in (exact, ours))
+            scale = np.abs(expected).max()
+            rows.append(profile(f"{case}: displacement (mm)", expected, found, 1e-9, scale=scale))
     return Result(rows)

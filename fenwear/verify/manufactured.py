@@ -65,8 +65,9 @@ def body_force(body: ElasticBody, density: Exact) -> PETSc.Vec:
     return vector
 
 
-def convergence_plot(title: str, sizes: Sequence[Array], found: Sequence[Array], names: Sequence[str],
-                     orders: Sequence[float]) -> Plot:  # fmt: skip
+def convergence_plot(
+    title: str, sizes: Sequence[Array], found: Sequence[Array], names: Sequence[str], orders: Sequence[float]
+) -> Plot:
     """Return the plot of errors over element sizes with the triangles of the theory's orders."""
     lines = [Line(name, h, e) for name, h, e in zip(names, sizes, found, strict=True)]
     return Plot(title, "element size h (mm)", "relative error", lines, ("log", "log"), tuple(orders))

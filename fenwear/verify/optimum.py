@@ -21,8 +21,11 @@ PUBLISHED = {  # lambda_F, lambda_M; the paper cuts digits off
 }
 
 
-@verification("optimum-table", "Optimum: the published wear velocities of Example 1",
-              "Paczelt and Mroz, Numerical Analysis of Thermo-Mechanical Wear Problems for Reciprocal Punch Sliding")  # fmt: skip
+@verification(
+    "optimum-table",
+    "Optimum: the published wear velocities of Example 1",
+    "Paczelt and Mroz, Numerical Analysis of Thermo-Mechanical Wear Problems for Reciprocal Punch Sliding",
+)
 def optimum_table() -> Result:
     """lambda_F and lambda_M to the digits printed: 1e-4 mm/s and 1e-6 rad/s."""
     rows: list[Row] = []
@@ -34,8 +37,11 @@ def optimum_table() -> Result:
     return Result(rows)
 
 
-@verification("optimum-linear", "Optimum for b = 1: a linear pressure",
-              "equilibrium by hand: p = p_m (1 - d c x / a), c = 6 mu l_z / L")  # fmt: skip
+@verification(
+    "optimum-linear",
+    "Optimum for b = 1: a linear pressure",
+    "equilibrium by hand: p = p_m (1 - d c x / a), c = 6 mu l_z / L",
+)
 def optimum_linear() -> Result:
     """The pressure and, from w_n = beta~ v p, lambda_F and lambda_M about the pin at x = a."""
     rows: list[Row] = []
@@ -47,10 +53,18 @@ def optimum_linear() -> Result:
             exact = MEAN * (1 - d * c * system.facing.x / HALF_WIDTH)
             case = f"pin {height} mm, {direction}"
             rows.append(profile(f"{case}: pressure (MPa)", exact, found.pressure, 1e-10, scale=MEAN))
-            rows.append(number(f"{case}: lambda_F (mm/s)", RATE * MEAN * (1 - d * c), found.velocity["lambda_F"],
-                               1e-10, scale=RATE * MEAN))  # fmt: skip
-            rows.append(number(f"{case}: lambda_M (rad/s)", RATE * MEAN * d * c / HALF_WIDTH,
-                               found.velocity["lambda_M"], 1e-10))  # fmt: skip
+            rows.append(
+                number(
+                    f"{case}: lambda_F (mm/s)",
+                    RATE * MEAN * (1 - d * c),
+                    found.velocity["lambda_F"],
+                    1e-10,
+                    scale=RATE * MEAN,
+                )
+            )
+            rows.append(
+                number(f"{case}: lambda_M (rad/s)", RATE * MEAN * d * c / HALF_WIDTH, found.velocity["lambda_M"], 1e-10)
+            )
     return Result(rows)
 
 
@@ -71,10 +85,13 @@ def by_quadrature(b: float, x: Array) -> Array:
     return MEAN * np.array([shape(at, f, g) for at in x])
 
 
-@verification("optimum-power", "Optimum for b = 1 and b = 2, Examples 1 and 2",
-              "force and moment by adaptive quadrature (QUADPACK) and Newton's method (MINPACK); statics")  # fmt: skip
+@verification(
+    "optimum-power",
+    "Optimum for b = 1 and b = 2, Examples 1 and 2",
+    "force and moment by adaptive quadrature (QUADPACK) and Newton's method (MINPACK); statics",
+)
 def optimum_power() -> Result:
-    """p = (w_n / K)^(1/b): Example 1 against quadrature, Example 2 uniform; residuals of the equilibrium below 1e-10."""
+    """Pressure (w_n / K)^(1/b): Example 1 against quadrature, Example 2 uniform; force and moment to 1e-10."""
     rows: list[Row] = []
     lines: list[Line] = []
     for b in (1.0, 2.0):
@@ -88,8 +105,13 @@ def optimum_power() -> Result:
             rows.append(profile(f"{case}: pressure (MPa)", exact, found.pressure, 1e-9, scale=MEAN))
             rows.append(number(f"{case}: force (N/mm)", 1000, weights @ found.pressure, 1e-10))
             if name == "example1":
-                rows.append(number(f"{case}: moment about x = 0 (N)", -FRICTION * 20 * 1000,
-                                   weights @ (found.pressure * x), 1e-10))  # fmt: skip
-                lines += [Line(f"quadrature, b = {b:g}", x, exact, reference=True),
-                          Line(f"fenwear, b = {b:g}", x, found.pressure)]  # fmt: skip
+                rows.append(
+                    number(
+                        f"{case}: moment about x = 0 (N)", -FRICTION * 20 * 1000, weights @ (found.pressure * x), 1e-10
+                    )
+                )
+                lines += [
+                    Line(f"quadrature, b = {b:g}", x, exact, reference=True),
+                    Line(f"fenwear, b = {b:g}", x, found.pressure),
+                ]
     return Result(rows, [Plot("Optimal pressure of Example 1, rightward", "x (mm)", "pressure (MPa)", lines)])

@@ -10,11 +10,11 @@ import difflib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, SupportsFloat
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fenwear.arrays import Array
 from fenwear.errors import CaseError, FenwearError, Problem
 
 Verdict = Literal["agrees", "differs", "not run"]
@@ -48,31 +48,35 @@ class Row:
 
 def number(
     what: str,
-    reference: float,
-    ours: float,
+    reference: SupportsFloat,
+    ours: SupportsFloat,
     tolerance: float,
     *,
     scale: float | None = None,
     order: float | None = None,
 ) -> Row:
     """Compare two numbers; the error is relative to `scale`, by default to the reference."""
-    error = abs(ours - reference) / (abs(reference) if scale is None else scale)
-    return Row(what, float(reference), float(ours), float(error), tolerance, order)
+    exact, found = float(reference), float(ours)
+    return Row(what, exact, found, abs(found - exact) / (abs(exact) if scale is None else scale), tolerance, order)
 
 
-def profile(what: str, reference: Array, ours: Array, tolerance: float, *, scale: float | Array = 1.0) -> Row:
+def profile(
+    what: str, reference: NDArray[Any], ours: NDArray[Any], tolerance: float, *, scale: float | NDArray[Any] = 1.0
+) -> Row:
     """Compare two fields; the row shows the place where they differ most, relative to `scale`."""
     errors = np.abs(ours - reference) / scale
     worst = np.unravel_index(np.argmax(np.nan_to_num(errors, nan=np.inf)), errors.shape)
     return Row(what, float(reference[worst]), float(ours[worst]), float(errors[worst]), tolerance)
 
 
-def observed_order(errors: Sequence[float], ratio: float = 2.0) -> float:
+def observed_order(errors: Sequence[float] | NDArray[Any], ratio: float = 2.0) -> float:
     """Return the order at which errors fall from the last refinement but one, by `ratio`, to the last."""
     return float(np.log(errors[-2] / errors[-1]) / np.log(ratio))
 
 
-def order(what: str, expected: float, errors: Sequence[float], tolerance: float, *, ratio: float = 2.0) -> Row:
+def order(
+    what: str, expected: float, errors: Sequence[float] | NDArray[Any], tolerance: float, *, ratio: float = 2.0
+) -> Row:
     """Compare the order at which errors fall with refinement with the theory's."""
     found = observed_order(errors, ratio)
     return Row(what, expected, found, abs(found - expected), tolerance, found)
@@ -83,8 +87,8 @@ class Line:
     """A line of a plot: markers for fenwear's own values, none for the reference's."""
 
     name: str
-    x: Array
-    y: Array
+    x: NDArray[Any]
+    y: NDArray[Any]
     reference: bool = False
 
 

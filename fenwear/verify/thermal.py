@@ -28,21 +28,24 @@ def series(conductance: float, friction_heat: float) -> tuple[float, float]:
     return FAR[0] + q1 * r1, FAR[1] + (friction_heat - q1) * r2
 
 
-@verification("conductance", "Two bodies with contact conductance and friction heat",
-              "thermal resistances in series, by hand")  # fmt: skip
+@verification(
+    "conductance", "Two bodies with contact conductance and friction heat", "thermal resistances in series, by hand"
+)
 def conductance() -> Result:
     """Two blocks of held far sides in the steady state, under 1 MPa: the temperatures of both surfaces."""
-    materials = [
+    first, second = (
         {"young": 1e5, "poisson": 0.3, "heat_capacity": 1e9, "density": 1e-9, "expansion": 1e-5, "conductivity": k}
         for k in CONDUCTIVITIES
-    ]
-    bodies = {
+    )
+    held = {
         body: {"temperatures": [{"on": f"{body}_far", "temperature": t}]}
         for body, t in zip(("punch", "strip"), FAR, strict=True)
     }
     sizes = dict(zip(("punch_height", "strip_height"), HEIGHTS, strict=True))
     shared = {"partition": PARTITION, "debris": DEBRIS}
-    system = two_blocks(*materials, sizes, contact={"friction": FRICTION}, heat=shared, **bodies)
+    system = two_blocks(
+        first, second, sizes, contact={"friction": FRICTION}, heat=shared, punch=held["punch"], strip=held["strip"]
+    )
     rows: list[Row] = []
     for text, value, heat in (
         ("none", 0.0, ("heat.conductance=0",)),
@@ -60,8 +63,11 @@ def conductance() -> Result:
             for name, t, found in zip(("punch", "strip"), exact, exchange.contact_temperatures(state), strict=True):
                 rows.append(profile(f"{case}: {name}'s surface (K)", np.full_like(found, t), found, 1e-9, scale=t))
             jumps = np.subtract(*exchange.contact_temperatures(state))
-            rows.append(profile(f"{case}: temperature jump (K)", np.full_like(jumps, exact[0] - exact[1]), jumps, 1e-9,
-                                scale=FAR[0]))  # fmt: skip
+            rows.append(
+                profile(
+                    f"{case}: temperature jump (K)", np.full_like(jumps, exact[0] - exact[1]), jumps, 1e-9, scale=FAR[0]
+                )
+            )
     return Result(rows)
 
 
@@ -89,12 +95,31 @@ def half_plane_rate(speed: float, m: float = WAVE) -> float:
 @cache
 def conductor(speed: float, duration: float = 0.05, partition: float = 1.0) -> System:
     """Return a good conductor, held in x and insulated at its sides, that slides on a rigid insulator; collective."""
-    rigid = {"young": 1e14, "poisson": 0.0, "conductivity": 1e-9, "heat_capacity": 1e9, "density": 1e-9,
-             "expansion": 0.0}  # fmt: skip
-    punch = {"young": YOUNG, "poisson": POISSON, "conductivity": K, "heat_capacity": RHO_C / 1e-9, "density": 1e-9,
-             "expansion": EXPANSION}  # fmt: skip
-    sizes = {"width": WIDTH, "punch_height": HEIGHT, "strip_height": WIDTH, "across": 8, "punch_layers": 8,
-             "strip_layers": 2, "growth": 1.3}  # fmt: skip
+    rigid = {
+        "young": 1e14,
+        "poisson": 0.0,
+        "conductivity": 1e-9,
+        "heat_capacity": 1e9,
+        "density": 1e-9,
+        "expansion": 0.0,
+    }
+    punch = {
+        "young": YOUNG,
+        "poisson": POISSON,
+        "conductivity": K,
+        "heat_capacity": RHO_C / 1e-9,
+        "density": 1e-9,
+        "expansion": EXPANSION,
+    }
+    sizes = {
+        "width": WIDTH,
+        "punch_height": HEIGHT,
+        "strip_height": WIDTH,
+        "across": 8,
+        "punch_layers": 8,
+        "strip_layers": 2,
+        "growth": 1.3,
+    }
     cold = {"temperatures": [{"on": "strip_far"}, {"on": "strip_sides"}]}  # what flows in is cold
     return two_blocks(
         punch,
@@ -114,8 +139,11 @@ def rate_of_steps(growth: float, duration: float) -> float:
     return -math.expm1(-growth * duration) / duration
 
 
-@verification("burton", "Thermo-elastic instability: a conductor slides on a rigid insulator",
-              "Burton, Nerlikar and Kilaparti, Thermoelastic instability in a seal-like configuration, Wear 24, 1973")  # fmt: skip
+@verification(
+    "burton",
+    "Thermo-elastic instability: a conductor slides on a rigid insulator",
+    "Burton, Nerlikar and Kilaparti, Thermoelastic instability in a seal-like configuration, Wear 24, 1973",
+)
 def instability() -> Result:
     """A wave of number m grows above V = 2 (1 - nu) k m / (mu E alpha) and decays below; the rate as on the half-plane.
 
@@ -141,14 +169,20 @@ def instability() -> Result:
         word = "grows" if exact[-1] > 0 else "decays"
         rows.append(number(f"V = {ratio:g} of the critical speed: {word} at (1/s)", exact[-1], rates[-1], 2e-3))
     dense = np.linspace(0.1, 3.0, 200)
-    curve = [max(max(half_plane_rate(v * burton(), j * WAVE) for j in (1, 2, 3, 4)), cooling) for v in dense]
-    lines = [Line("half-plane", dense, np.array(curve), reference=True),
-             Line("fenwear", np.array(ratios), np.array(rates))]  # fmt: skip
+    curve = [max(*(half_plane_rate(v * burton(), j * WAVE) for j in (1, 2, 3, 4)), cooling) for v in dense]
+    lines = [
+        Line("half-plane", dense, np.array(curve), reference=True),
+        Line("fenwear", np.array(ratios), np.array(rates)),
+    ]
     return Result(rows, [Plot("Growth of the fastest wave", "speed / critical speed", "growth rate (1/s)", lines)])
 
 
-COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2", "wear.punch.coefficient=4e-6",
-          "heat.partition=0.2")  # fmt: skip
+COARSE = (
+    "geometry.parameters.elements_along_contact=4",
+    "geometry.degree=2",
+    "wear.punch.coefficient=4e-6",
+    "heat.partition=0.2",
+)
 HELD = "strip.temperatures=[{on='strip_bottom', temperature=-30}, {on='strip_ends', temperature=12}]"
 EXCHANGES: dict[str, tuple[str, ...]] = {
     "Example 1": (),
@@ -168,8 +202,11 @@ EXCHANGES: dict[str, tuple[str, ...]] = {
 }
 
 
-@verification("energy", "Energy: friction power against heat in the bodies, losses and storage",
-              "first law: mu F0 times the sliding distance = debris + stored + convected + held + carried")  # fmt: skip
+@verification(
+    "energy",
+    "Energy: friction power against heat in the bodies, losses and storage",
+    "first law: mu F0 times the sliding distance = debris + stored + convected + held + carried",
+)
 def energy() -> Result:
     """Example 1 with heat, marched and by jumps: the balance of every half-cycle, and the work of friction."""
     rows: list[Row] = []
@@ -184,9 +221,17 @@ def energy() -> Result:
             terms = np.concatenate([block.heat.terms for block in run(system)])
             friction, rest = terms[:, 0], terms[:, 1:].sum(axis=1)
             largest = np.abs(terms).max(axis=1)
-            rows.append(profile(f"{name}, {kind}: friction against the other terms (mJ)", friction, rest, 1e-8,
-                                scale=largest))  # fmt: skip
+            rows.append(
+                profile(f"{name}, {kind}: friction against the other terms (mJ)", friction, rest, 1e-8, scale=largest)
+            )
             if kind == "march":
-                rows.append(profile(f"{name}, {kind}: friction work mu F0 2 u0 (mJ)", np.full_like(friction, work),
-                                    friction, 1e-9, scale=work))  # fmt: skip
+                rows.append(
+                    profile(
+                        f"{name}, {kind}: friction work mu F0 2 u0 (mJ)",
+                        np.full_like(friction, work),
+                        friction,
+                        1e-9,
+                        scale=work,
+                    )
+                )
     return Result(rows)

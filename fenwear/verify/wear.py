@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.cycle import growth_rate, jump, march, stability_number, steady
@@ -16,8 +19,11 @@ COEFFICIENT, STROKE = 1.25e-8 * np.pi, 3.0  # beta~ of the built-in cases, 1/MPa
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # the rear edge lifts off
 
 
-@verification("wear-volume", "Worn area of every half-cycle for a = b = 1",
-              "beta~ F0 2 u0 / t, whatever the pressure: the integral of p over the contact is F0 / t")  # fmt: skip
+@verification(
+    "wear-volume",
+    "Worn area of every half-cycle for a = b = 1",
+    "beta~ F0 2 u0 / t, whatever the pressure: the integral of p over the contact is F0 / t",
+)
 def wear_volume() -> Result:
     """Example 1 with full and with partial contact: explicit and implicit half-cycles, and jumps over 20,000."""
     exact = COEFFICIENT * 1e4 * STROKE / 10
@@ -31,16 +37,21 @@ def wear_volume() -> Result:
         }
         for name, run in blocks.items():
             area = np.concatenate([block.worn_area for block in run])
-            rows.append(profile(f"{contact}, {name}: per half-cycle (mm²)", np.full_like(area, exact), area, 1e-9,
-                                scale=exact))  # fmt: skip
+            rows.append(
+                profile(f"{contact}, {name}: per half-cycle (mm²)", np.full_like(area, exact), area, 1e-9, scale=exact)
+            )
             total = exact * run[-1].half_cycle[-1]
-            rows.append(number(f"{contact}, {name}: in all (mm²)", total,
-                               run[-1].wear[-1] @ system.facing.weights, 1e-9))  # fmt: skip
+            rows.append(
+                number(f"{contact}, {name}: in all (mm²)", total, run[-1].wear[-1] @ system.facing.weights, 1e-9)
+            )
     return Result(rows)
 
 
-@verification("equilibrium", "Force and moment balance in every half-cycle",
-              "statics by hand: F0 on the contact, no moment about the pin O")  # fmt: skip
+@verification(
+    "equilibrium",
+    "Force and moment balance in every half-cycle",
+    "statics by hand: F0 on the contact, no moment about the pin O",
+)
 def equilibrium() -> Result:
     """Example 1 with ten times its wear, recomputed from the pressure alone, over 200 half-cycles."""
     rows: list[Row] = []
@@ -53,8 +64,15 @@ def equilibrium() -> Result:
         total = force.sum(axis=1)
         arm = force @ (x - HALF_WIDTH) + block.direction * friction * height * total
         rows.append(profile(f"{contact}: force (N/mm)", np.full(200, 1000.0), total, 1e-8, scale=1000))
-        rows.append(profile(f"{contact}: moment of the contact about O (N)", np.full(200, -1000 * HALF_WIDTH), arm,
-                            1e-8, scale=1000 * HALF_WIDTH))  # fmt: skip
+        rows.append(
+            profile(
+                f"{contact}: moment of the contact about O (N)",
+                np.full(200, -1000 * HALF_WIDTH),
+                arm,
+                1e-8,
+                scale=1000 * HALF_WIDTH,
+            )
+        )
     return Result(rows)
 
 
@@ -65,12 +83,12 @@ def half_plane_rates(terms: int = 24) -> Array:
     In Legendre polynomials P_n on (-1, 1), -int P_n ln|x - s| ds = 2 (Q_(n-1) - Q_(n+1)) / (2 n + 1) + const and
     int P_m Q_k dx = (1 - (-1)^(m+k)) / ((m - k)(m + k + 1)) (Gradshteyn and Ryzhik 7.112, 8.825).
     """
-    n = np.arange(1, terms + 1)
+    n: NDArray[Any] = np.arange(1.0, terms + 1)
     m = n[:, None]
 
-    def integral(k: Array) -> Array:
+    def integral(k: NDArray[Any]) -> NDArray[Any]:
         odd = (m + k) % 2 == 1
-        return np.where(odd, 2 / np.where(odd, (m - k) * (m + k + 1), 1), 0.0)
+        return np.asarray(np.where(odd, 2 / np.where(odd, (m - k) * (m + k + 1), 1), 0.0))
 
     kernel = 2 / (2 * n + 1) * (integral(n - 1) - integral(n + 1))
     values = scipy.linalg.eigh(np.pi / 2 * np.diag(2 / (2 * n + 1)), (kernel + kernel.T) / 2, eigvals_only=True)
@@ -89,11 +107,14 @@ def stiffness_rates(system: System, effective: float) -> Array:
     return np.sort(values[values > 1e-6])
 
 
-@verification("galin", "A flat punch on a half-plane that wears at constant load: decay of the pressure",
-              "Galin and Goryacheva, Axisymmetric contact problem of the theory of elasticity in the presence of wear, "
-              "1977: 1.7267 and 3.3143; all rates by Legendre polynomials")  # fmt: skip
+@verification(
+    "galin",
+    "A flat punch on a half-plane that wears at constant load: decay of the pressure",
+    "Galin and Goryacheva, Axisymmetric contact problem of the theory of elasticity in the presence of wear, "
+    "1977: 1.7267 and 3.3143; all rates by Legendre polynomials",
+)
 def galin() -> Result:
-    """p tends to the mean as a sum of exponentials; the even modes' rates from a march and from eigenvalues.
+    """Pressure tends to the mean as a sum of exponentials; the even modes' rates from a march and from eigenvalues.
 
     An implicit step divides each mode by exactly 1 + rate k 2 u0. The factors of the three slowest are the
     roots of the recurrence that four late shapes of the pressure, ten half-cycles apart, satisfy.
@@ -101,8 +122,10 @@ def galin() -> Result:
     rows: list[Row] = []
     plots: list[Plot] = []
     exact = half_plane_rates()
-    rows += [number(f"even mode {k}: published against Legendre polynomials (E* k V/a)", p, exact[2 * k - 1], 1e-4)
-             for k, p in ((1, 1.7267), (2, 3.3143))]  # fmt: skip
+    rows += [
+        number(f"even mode {k}: published against Legendre polynomials (E* k V/a)", p, exact[2 * k - 1], 1e-4)
+        for k, p in ((1, 1.7267), (2, 3.3143))
+    ]
     fine = ("geometry.parameters.elements_along_contact=32", "geometry.degree=2", "geometry.parameters.edge_grading=8")
     step = 0.02  # E* k V dt / a of a half-cycle
     for plane, effective in (("stress", 2e5), ("strain", 2e5 / (1 - 0.3**2))):
@@ -126,9 +149,15 @@ def galin() -> Result:
             time = step * block.half_cycle
             size = np.sqrt((deviation**2) @ system.facing.weights) / (MEAN * np.sqrt(2 * HALF_WIDTH))
             slope = size[-1] * (1 + exact[1] * step) ** (100.0 - block.half_cycle)
-            plots.append(Plot("Galin: distance of the pressure from its mean", "time (a / E* k V)", "L2 norm / p_m",
-                              [Line("fenwear", time, size), Line("slowest even mode", time, slope, reference=True)],
-                              ("linear", "log")))  # fmt: skip
+            plots.append(
+                Plot(
+                    "Galin: distance of the pressure from its mean",
+                    "time (a / E* k V)",
+                    "L2 norm / p_m",
+                    [Line("fenwear", time, size), Line("slowest even mode", time, slope, reference=True)],
+                    ("linear", "log"),
+                )
+            )
     return Result(rows, plots)
 
 
@@ -137,8 +166,11 @@ def one_way(direction: str) -> str:
     return f"motion={{kind='one-way', direction='{direction}', speed=3, duration=1}}"
 
 
-@verification("one-way", "One-way sliding tends to the optimum",
-              "the minimum of the wear dissipation power, which knows no elasticity (Paczelt and Mroz)")  # fmt: skip
+@verification(
+    "one-way",
+    "One-way sliding tends to the optimum",
+    "the minimum of the wear dissipation power, which knows no elasticity (Paczelt and Mroz)",
+)
 def one_way_sliding() -> Result:
     """Example 1 marched over 1500 half-cycles of fast wear, b = 1 and b = 2, in both directions."""
     rows: list[Row] = []
@@ -161,9 +193,12 @@ def one_way_sliding() -> Result:
     return Result(rows, [Plot("One-way sliding, b = 1, leftward: pressure", "x (mm)", "pressure (MPa)", lines)])
 
 
-@verification("cyclic", "The cyclic steady state",
-              "p+ + p- = 2 p_m where the punch does not turn, linear where it does, from the periodicity of the wear; "
-              "largest pressure 33.33 MPa (Paczelt and Mroz)")  # fmt: skip
+@verification(
+    "cyclic",
+    "The cyclic steady state",
+    "p+ + p- = 2 p_m where the punch does not turn, linear where it does, from the periodicity of the wear; "
+    "largest pressure 33.33 MPa (Paczelt and Mroz)",
+)
 def cyclic() -> Result:
     """Solved for directly; reached by jumps over two million half-cycles, and by a march of faster and faster wear.
 
@@ -179,11 +214,15 @@ def cyclic() -> Result:
         rows.append(number(f"{name}: largest pressure (MPa)", 2 * MEAN, state.pressure.max(), 1e-9))
         if name == "example1":
             *_, last = jump(system, 2_000_000, tolerance=1e-2)
-            rows.append(profile(f"{name}: end of a run of jumps (MPa)", state.pressure, last.pressure[-2:], 1e-3,
-                                scale=MEAN))  # fmt: skip
+            rows.append(
+                profile(f"{name}: end of a run of jumps (MPa)", state.pressure, last.pressure[-2:], 1e-3, scale=MEAN)
+            )
             x = system.facing.x
-            for d, direct, reached in zip(("+", "-"), state.pressure, last.pressure[-2:], strict=True):
-                lines += [Line(f"p{d} direct", x, direct, reference=True), Line(f"p{d} by jumps", x, reached)]
+            for k, d in enumerate("+-"):
+                lines += [
+                    Line(f"p{d} direct", x, state.pressure[k], reference=True),
+                    Line(f"p{d} by jumps", x, last.pressure[k - 2]),
+                ]
     # 100 N/mm to the right, 30 mm above the pin, act as the load 3 mm off the centre.
     pushed = "[{on='punch_load', force=[0, -10000]}, {on='punch_free', force=[1000, 0]}]"
     system = builtin("example1").vary(f"punch.loads={pushed}")
@@ -215,8 +254,11 @@ def settles(ratio: float) -> bool:
     return bool(np.abs(np.diff(last.pressure[-2:], axis=0)).max() < 1e-4 * MEAN)
 
 
-@verification("explicit-limit", "The largest explicit wear step",
-              "k ds = 4 h / (pi E*): the wave from node to node on a half-plane, stiffness pi E* / 2 h; an estimate")  # fmt: skip
+@verification(
+    "explicit-limit",
+    "The largest explicit wear step",
+    "k ds = 4 h / (pi E*): the wave from node to node on a half-plane, stiffness pi E* / 2 h; an estimate",
+)
 def explicit_limit() -> Result:
     """Where explicit half-cycles cease to settle, by bisection; implicit ones settle far above."""
     low, high = 0.9, 1.1
@@ -229,8 +271,15 @@ def explicit_limit() -> Result:
         block = next(march(system, 200, implicit=True, block=200))
         deviation = np.sqrt((block.pressure - system.optimum(-1).pressure) ** 2 @ system.facing.weights)
         steps = np.diff(deviation[deviation > 1e-9 * deviation[0]])
-        rows.append(number(f"implicit at {ratio:g} of the limit: half-cycles that lead away from the optimum", 0,
-                           np.count_nonzero(steps >= 0), 0, scale=1))  # fmt: skip
+        rows.append(
+            number(
+                f"implicit at {ratio:g} of the limit: half-cycles that lead away from the optimum",
+                0,
+                np.count_nonzero(steps >= 0),
+                0,
+                scale=1,
+            )
+        )
     limits = []
     for count in (16, 32):
         even = (*EVEN, f"geometry.parameters.elements_along_contact={count}", "wear.punch.coefficient=1e-6")

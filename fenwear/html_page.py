@@ -24,6 +24,7 @@ thead th:nth-child(2) { text-align: right; }
 .places thead th:nth-child(2) { text-align: left; }
 .comparison thead th:not(:first-child):not(:last-child) { text-align: right; white-space: nowrap; }
 .comparison th[scope=row] { min-width: 18rem; }
+.verdict { white-space: nowrap; }
 td.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.unit { width: 3.5rem; }
 .wide { overflow-x: auto; }

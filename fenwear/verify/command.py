@@ -87,4 +87,4 @@ def _row(row: Row) -> str:
     order = "" if row.order is None else f", order {row.order:.2f}"
     mark = "" if row.agrees else "   <- DIFFERS"
     text = f"{row.what}: {row.ours:.6g}, reference {row.reference:.6g}"
-    return f"{text:100} error {row.error:.1e} of {row.tolerance:.0e}{order}{mark}"
+    return f"{text:100} error {row.error:.1e} of {row.tolerance:.2g}{order}{mark}"

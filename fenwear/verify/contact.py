@@ -139,8 +139,8 @@ def rms_error(elements: int) -> float:
 @verification(
     "sliding-cylinder",
     "A cylinder that slides on a half-plane, both elastic, with friction",
-    "index -gamma of the singular integral equation, tan pi gamma = mu beta (Dundurs); "
-    "Hills, Nowell and Sackfield, Mechanics of Elastic Contacts, 1993, section 3.2",
+    "singular integral equation with Dundurs' beta, solved by Plemelj's formulas; "
+    "Hills, Nowell and Sackfield, Mechanics of Elastic Contacts, 1993",
 )
 def sliding_cylinder() -> Result:
     """Pressure p = C (a + s)^(1/2 + g) (a - s)^(1/2 - g), s = x - e, with tan pi g = -d mu beta.
@@ -173,7 +173,10 @@ def sliding_cylinder() -> Result:
         rows.append(number(f"{name}: centre of pressure, 8 g a / 3 (mm)", 8 * g * a / 3, force @ x / force.sum(), 5e-3))
         dense = np.linspace(-1.3, 1.3, 400) * a
         shown = np.abs(x) < 1.3 * a
-        lines += [Line(f"exact, {name}", dense, pressure(dense), reference=True), Line("fenwear", x[shown], p[shown])]
+        lines += [
+            Line(f"exact, {name}", dense, pressure(dense), reference=True),
+            Line(f"fenwear, {name}", x[shown], p[shown]),
+        ]
     return Result(rows, [Plot("Sliding cylinder: pressure", "x (mm)", "pressure (MPa)", lines)])
 
 

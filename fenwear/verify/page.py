@@ -31,8 +31,8 @@ def page(outcomes: Sequence[Outcome], ranks: int, versions: dict[str, str]) -> s
     now = datetime.now().astimezone()
     head = (
         "<header>\n<h1>Verification of fenwear</h1>\n"
-        f"<p>{found['agrees']} of {len(outcomes)} cases agree with exact solutions and published results, "
-        f"{comparisons} comparisons in all. {sum(o.seconds for o in outcomes):.0f} s on "
+        f"<p>Of {len(outcomes)} cases {found['agrees']} agree with exact solutions and published results, "
+        f"{found['differs']} differ and {found['not run']} were not run; {comparisons} comparisons in all. {sum(o.seconds for o in outcomes):.0f} s on "
         f"{ranks} rank{'s' if ranks > 1 else ''}, "
         f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>.</p>\n</header>\n<main>'
     )
@@ -77,14 +77,15 @@ def _case(outcome: Outcome) -> str:
 
 def _row(row: Row) -> str:
     order = "" if row.order is None else f"{row.order:.2f}"
-    numbers = (f"{row.reference:.6g}", f"{row.ours:.6g}", f"{row.error:.1e}", f"{row.tolerance:.0e}", order)
+    numbers = (f"{row.reference:.6g}", f"{row.ours:.6g}", f"{row.error:.1e}", f"{row.tolerance:.2g}", order)
     cells = "".join(f'<td class="number">{text}</td>' for text in numbers)
     verdict = _verdict("agrees" if row.agrees else "differs")
     return f'<tr><th scope="row">{escape(row.what)}</th>{cells}{verdict}</tr>'
 
 
 def _verdict(word: str) -> str:
-    return f"<td><strong>{WORDS[word]}</strong></td>" if word == "differs" else f"<td>{WORDS[word]}</td>"
+    text = f"<strong>{WORDS[word]}</strong>" if word == "differs" else WORDS[word]
+    return f'<td class="verdict">{text}</td>'
 
 
 def _table(caption: str, columns: Sequence[str], rows: str) -> str:
@@ -109,8 +110,10 @@ def draw(plot: Plot) -> bytes:
             continue
         colour, marker = COLOURS[ours % len(COLOURS)], MARKERS[ours % len(MARKERS)]
         joined = DASHES[ours % len(DASHES)] if plot.orders else "none"
-        ax.plot(line.x, line.y, marker=marker, markersize=3.5, linestyle=joined, linewidth=0.9, color=colour,
-                label=line.name, zorder=2)  # fmt: skip
+        # Every other one hollow and larger, so that markers on the same spot both show.
+        size, face = (5.5, "none") if ours % 2 else (3.0, colour)
+        ax.plot(line.x, line.y, marker=marker, markersize=size, markerfacecolor=face, linestyle=joined, linewidth=0.9,
+                color=colour, label=line.name, zorder=2)  # fmt: skip
         ours += 1
     references = [line.name for line in plot.lines if line.reference]
     if references:

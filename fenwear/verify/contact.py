@@ -86,7 +86,7 @@ def hertz() -> Result:
     for load in LOADS:
         a = 2 * np.sqrt(load * RADIUS / (np.pi * contact_modulus()))
         peak = 2 * load / (np.pi * a)
-        x, p = pressed_cylinder(load)
+        x, p, gap = pressed_cylinder(load)
         exact = semi_ellipse(x, a, peak)
         case = f"P = {load / 1e3:g} kN/mm"
         inside, outside = np.abs(x) < 0.9 * a, np.abs(x) > 1.05 * a
@@ -94,6 +94,10 @@ def hertz() -> Result:
         rows.append(number(f"{case}: largest pressure p0 (MPa)", peak, p.max(), 5e-4))
         rows.append(profile(f"{case}: pressure for |x| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3, scale=peak))
         rows.append(profile(f"{case}: pressure for |x| > 1.05 a (MPa)", exact[outside], p[outside], 0, scale=peak))
+        beside = (np.abs(x) > a) & (np.abs(x) < 1.2 * CORE / 2)
+        ratio = np.abs(x[beside]) / a
+        opening = a**2 / (2 * RADIUS) * (ratio * np.sqrt(ratio**2 - 1) - np.arccosh(ratio))
+        rows.append(profile(f"{case}: gap beside the contact (mm)", opening, gap[beside], 5e-3, scale=opening.max()))
         dense, shown = np.linspace(-1.3, 1.3, 400) * a, np.abs(x) < 1.3 * a
         lines.append(Line(f"Hertz, {case}", dense, semi_ellipse(dense, a, peak), reference=True))
         lines.append(Line(f"fenwear, {case}", x[shown], p[shown]))
@@ -118,11 +122,12 @@ def parabola(x: Array) -> Array:
     return np.asarray(x**2 / (2 * RADIUS), dtype=np.float64)
 
 
-def pressed_cylinder(load: float, elements: int = 40) -> tuple[Array, Array]:
-    """Return x and the pressure of the cylinder under a load, N/mm."""
+def pressed_cylinder(load: float, elements: int = 40) -> tuple[Array, Array, Array]:
+    """Return x, the pressure and the gap of the cylinder under a load, N/mm."""
     system = pressed(load, elements=elements)
     x = system.facing.x
-    return x, system.contact((1,)).solve(parabola(x)).pressure[0]
+    state = system.contact((1,)).solve(parabola(x))
+    return x, state.pressure[0], state.gap[0]
 
 
 def rms_error(elements: int) -> float:
@@ -130,7 +135,7 @@ def rms_error(elements: int) -> float:
     found = []
     for load in LOADS:
         a = 2 * np.sqrt(load * RADIUS / (np.pi * contact_modulus()))
-        x, p = pressed_cylinder(load, elements)
+        x, p, _ = pressed_cylinder(load, elements)
         weights, exact = half_planes(0.0, elements).facing.weights, semi_ellipse(x, a, 2 * load / (np.pi * a))
         found.append(np.sqrt(weights @ (p - exact) ** 2 / (weights @ exact**2)))
     return float(np.mean(found))

@@ -29,11 +29,12 @@ def page(outcomes: Sequence[Outcome], ranks: int, versions: dict[str, str]) -> s
     comparisons = sum(len(o.result.rows) for o in outcomes)
     differing = [o for o in outcomes if o.verdict == "differs"]
     now = datetime.now().astimezone()
+    seconds = sum(o.seconds for o in outcomes)
     head = (
         "<header>\n<h1>Verification of fenwear</h1>\n"
         f"<p>Of {len(outcomes)} cases {found['agrees']} agree with exact solutions and published results, "
-        f"{found['differs']} differ and {found['not run']} were not run; {comparisons} comparisons in all. {sum(o.seconds for o in outcomes):.0f} s on "
-        f"{ranks} rank{'s' if ranks > 1 else ''}, "
+        f"{found['differs']} differ and {found['not run']} were not run; {comparisons} comparisons in all. "
+        f"{seconds:.0f} s on {ranks} rank{'s' if ranks > 1 else ''}, "
         f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>.</p>\n</header>\n<main>'
     )
     warning = "".join(

@@ -171,10 +171,10 @@ def one_way(direction: str) -> str:
     "the minimum of the wear dissipation power, which knows no elasticity (Paczelt and Mroz)",
 )
 def one_way_sliding() -> Result:
-    """Example 1 marched over 1500 half-cycles of fast wear, b = 1 and b = 2, in both directions."""
+    """Example 1 marched over 1500 half-cycles of fast wear, b = 1/2, 1 and 2, in both directions."""
     rows: list[Row] = []
     lines: list[Line] = []
-    for b in (1, 2):
+    for b in (0.5, 1, 2):
         for direction in ("leftward", "rightward"):
             coefficient = f"wear.punch.coefficient={1e-4 * MEAN ** (1 - b)!r}"
             exponent = f"wear.punch.pressure_exponent={b}"

@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 from fenwear import Case, System, make_case
 from fenwear.case import Body, Heat, Material, Model
-from fenwear.elasticity import ElasticBody
 from fenwear.heat.conduction import HeatBody
 from fenwear.mesh import BodyMesh
 
@@ -95,20 +94,6 @@ def conducting() -> Callable[..., HeatBody]:
         return HeatBody(body, _description(body, tables), _materials(materials), model, heat_table, degree)
 
     return conducting
-
-
-@pytest.fixture(scope="session")
-def elastic() -> Callable[..., tuple[ElasticBody, dict[str, Material]]]:
-    """Return elastic(mesh, degree, materials, plane, **body): elasticity of a rectangle, and its materials."""
-
-    def elastic(
-        body: BodyMesh, degree: int, materials: Sequence[dict[str, float]], plane: str, **tables: Any
-    ) -> tuple[ElasticBody, dict[str, Material]]:
-        known = _materials(materials)
-        model = Model.model_validate({"plane": plane})
-        return ElasticBody(body, _description(body, tables), known, model, degree), known
-
-    return elastic
 
 
 @pytest.fixture(scope="session")

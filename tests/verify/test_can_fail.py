@@ -86,6 +86,12 @@ def half_distance(patch: Patch) -> None:
     patch.setattr(Motion, "sliding", lambda self, exponent=1.0: right(self, exponent) / 2)
 
 
+def half_speed(patch: Patch) -> None:
+    """Heat of half the sliding speed."""
+    right = Motion.mean_speeds
+    patch.setattr(Motion, "mean_speeds", lambda self, steps: right(self, steps) / 2)
+
+
 def steeper_wear(patch: Patch) -> None:
     """Wear that grows a little faster than the pressure: b = 1.1."""
 
@@ -186,7 +192,7 @@ def forgotten_heat(patch: Patch) -> None:
         ("conductance", other_share),
         ("burton", thermal_modulus_without_poisson),
         ("burton", other_share),
-        ("energy", half_distance),
+        ("energy", half_speed),
         ("energy", forgotten_heat),
     ],
     ids=lambda value: value if isinstance(value, str) else value.__name__,

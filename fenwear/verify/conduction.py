@@ -99,6 +99,7 @@ REGIMES = {
     "conduction",
     "Conduction: order of convergence with advection, convection and flux",
     "exact waves of the heat equation and of its implicit Euler step, nothing added to the equations",
+    slow=True,
 )
 def conduction() -> Result:
     """L2 order degree + 1 and H1 order degree, at rest and at high Peclet numbers v L / a.

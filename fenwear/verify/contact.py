@@ -78,6 +78,7 @@ def semi_ellipse(x: Array, a: float, peak: float) -> Array:
     "hertz",
     "Hertz: a cylinder on a half-plane, both elastic, without friction",
     "K. L. Johnson, Contact Mechanics, 1985, section 4.2",
+    slow=True,
 )
 def hertz() -> Result:
     """Half-width a = 2 sqrt(P R / (pi E*)), p0 = 2 P / (pi a), p = p0 sqrt(1 - x²/a²) for the gap x²/2R."""
@@ -196,6 +197,7 @@ def standing(system: System, direction: int = 1) -> tuple[Array, Array]:
     "flat-punch",
     "A flat rigid punch on a half-plane, without friction",
     "K. L. Johnson, Contact Mechanics, 1985, section 2.8(a)",
+    slow=True,
 )
 def flat_punch() -> Result:
     """Pressure P / (pi sqrt(a² - x²)); the strip's depth H enters as (a/H)²."""
@@ -234,6 +236,7 @@ def flat_punch() -> Result:
     "sliding-punch",
     "A flat rigid punch that slides on a half-plane, with friction",
     "K. L. Johnson, Contact Mechanics, 1985, section 2.8(b)",
+    slow=True,
 )
 def sliding_punch() -> Result:
     """Pressure P cos(pi g) / (pi sqrt(a² - x²)) ((a - x)/(a + x))^g with tan(pi g) = d mu beta.

@@ -9,7 +9,10 @@ from fenwear import CaseError
 from fenwear.verify import VerificationCase, registered, run_cases
 
 
-@pytest.mark.parametrize("case", registered(), ids=lambda case: case.name)
+CASES = [pytest.param(c, id=c.name, marks=[pytest.mark.slow] if c.slow else []) for c in registered()]
+
+
+@pytest.mark.parametrize("case", CASES)
 @pytest.mark.mpi
 def test_case(case: VerificationCase) -> None:
     """On one rank and on two: every row within its tolerance."""

@@ -8,7 +8,6 @@ from mpi4py import MPI
 from fenwear import CaseError
 from fenwear.verify import VerificationCase, registered, run_cases
 
-
 CASES = [pytest.param(c, id=c.name, marks=[pytest.mark.slow] if c.slow else []) for c in registered()]
 
 

@@ -220,6 +220,33 @@ def compare_command(
     log(f"figure in {output}")
 
 
+@app.command("verify")
+def verify_command(
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    only: Annotated[
+        list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; may be repeated.")
+    ] = [],  # noqa: B006
+    list_cases: Annotated[bool, typer.Option("--list", help="Print the names of the cases and end.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Solve problems whose answer is known, and compare: a table, a page and an exit status of 1 where they differ."""
+    from fenwear.verify import registered
+    from fenwear.verify.command import verify
+
+    cases = registered(only)
+    if list_cases:
+        for case in cases:
+            print(f"{case.name:24} {case.title}")
+        return
+    found, directory = verify(cases, output, log if as_json else print)
+    if as_json:
+        _print_json(found)
+    log(f"page in {directory}/verification.html")
+    if not found["agree"]:
+        log(f"does not agree: {', '.join(found['differing'])}")
+        raise typer.Exit(1)
+
+
 @app.command("info")
 def info_command(as_json: JsonOption = False) -> None:
     """Print the versions of the stack and the built-in cases."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import html
 import math
 from collections.abc import Callable, Sequence
 from datetime import datetime
@@ -14,6 +12,7 @@ import xarray
 
 from fenwear.errors import CaseError
 from fenwear.figures import FOLDER, draw_figures, read_history
+from fenwear.html_page import document, escape, figure, section
 from fenwear.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.pictures import DrawingError, draw_pictures
 from fenwear.results import CASE, HISTORY
@@ -36,31 +35,6 @@ ALT = {
     "upper surface, at the last half-cycle with fields.",
     "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
 }
-STYLE = """
-:root { color-scheme: light; }
-body { font: 1rem/1.5 system-ui, sans-serif; color: #1a1a1a; background: #fff; margin: 0 auto; max-width: 56rem;
-  padding: 0 1rem 3rem; overflow-wrap: anywhere; }
-h1 { font-size: 1.5rem; line-height: 1.25; margin-bottom: .25rem; }
-h2 { font-size: 1.2rem; margin-top: 2.5rem; border-bottom: 1px solid #bbb; }
-h3 { font-size: 1rem; margin-top: 1.5rem; }
-figure { margin: 1.5rem 0; break-inside: avoid; }
-img { max-width: 100%; height: auto; display: block; }
-figcaption, .note { color: #555; }
-table { border-collapse: collapse; width: 100%; }
-caption { text-align: left; font-weight: 600; padding: .8rem 0 .3rem; }
-th, td { text-align: left; vertical-align: top; padding: .2rem .6rem .2rem 0;
-  border-bottom: 1px solid #ddd; font-weight: 400; }
-thead th { font-weight: 600; }
-thead th:nth-child(2) { text-align: right; }
-.places thead th:nth-child(2) { text-align: left; }
-td.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
-td.unit { width: 3.5rem; }
-.wide { overflow-x: auto; }
-.warning { border-left: .3rem solid #d55e00; padding: .3rem .8rem; background: #fdf1ea; }
-pre { white-space: pre-wrap; background: #f5f5f5; padding: .8rem; font-size: .85rem; }
-summary { cursor: pointer; }
-@media print { body { max-width: none; padding: 0; font-size: 10pt; } .animation { display: none; } }
-"""
 
 
 def write_report(
@@ -109,34 +83,17 @@ def page(directory: Path) -> str:
     parts = [
         _head(title, directory, summary, history),
         _warnings(summary),
-        _section("Key numbers", _key_numbers(summary, history)),
-        _section("Figures", "".join(_figure(images, name, text) for name, text in SECTIONS.items())),
-        _section("Bodies", _bodies(images)),
-        _section("Convergence", _convergence(summary) + _figure(images, "convergence", "Periodicity and optimum")),
-        _section("Energy balance", _energy(summary, history) + _figure(images, "heat_balance", "Heat balance")),
-        _section("Stability", _stability(summary, history)),
-        _section("Case", _details("the resolved case file, which runs again as it is",
+        section("Key numbers", _key_numbers(summary, history)),
+        section("Figures", "".join(_figure(images, name, text) for name, text in SECTIONS.items())),
+        section("Bodies", _bodies(images)),
+        section("Convergence", _convergence(summary) + _figure(images, "convergence", "Periodicity and optimum")),
+        section("Energy balance", _energy(summary, history) + _figure(images, "heat_balance", "Heat balance")),
+        section("Stability", _stability(summary, history)),
+        section("Case", _details("the resolved case file, which runs again as it is",
                                   (directory / CASE).read_text("utf-8"))),
-        _section("Versions", _versions(summary)),
+        section("Versions", _versions(summary)),
     ]  # fmt: skip
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        # Whatever a title or a case says, the page loads nothing and runs nothing.
-        '<meta http-equiv="Content-Security-Policy" '
-        "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">\n"
-        f'<link rel="icon" href="data:,">\n<title>{_e(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n'
-        + "\n".join(part for part in parts if part)
-        + "\n</main>\n</body>\n</html>\n"
-    )
-
-
-def _e(text: object) -> str:
-    return html.escape(str(text), quote=True)
-
-
-def _section(title: str, content: str) -> str:
-    return f"<section>\n<h2>{_e(title)}</h2>\n{content}\n</section>" if content else ""
+    return document(title, "\n".join(part for part in parts if part) + "\n</main>")
 
 
 def _head(title: str, directory: Path, summary: dict[str, Any], history: xarray.Dataset) -> str:
@@ -145,33 +102,33 @@ def _head(title: str, directory: Path, summary: dict[str, Any], history: xarray.
     written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
     stamp = f'<time datetime="{written.isoformat(timespec="seconds")}">{written:%d %B %Y, %H:%M %Z}</time>'
     return (
-        f"<header>\n<h1>{_e(title)}</h1>\n<p>Run <strong>{_e(directory.resolve().name)}</strong>: "
-        f"{last:,} half-cycles; {_e(stop)}. Results of {stamp}.</p>\n</header>\n<main>"
+        f"<header>\n<h1>{escape(title)}</h1>\n<p>Run <strong>{escape(directory.resolve().name)}</strong>: "
+        f"{last:,} half-cycles; {escape(stop)}. Results of {stamp}.</p>\n</header>\n<main>"
     )
 
 
 def _warnings(summary: dict[str, Any]) -> str:
-    found = [f'<p class="warning"><strong>Warning:</strong> {_e(text)}</p>' for text in summary.get("warnings", ())]
-    return _section("Warnings", "\n".join(found)) or "<p>No warnings.</p>"
+    found = [f'<p class="warning"><strong>Warning:</strong> {escape(text)}</p>' for text in summary.get("warnings", ())]
+    return section("Warnings", "\n".join(found)) or "<p>No warnings.</p>"
 
 
 def _data(path: str, value: Any) -> str:
-    return f'<data value="{_e(value)}" id="{_e(path)}">{_e(number_text(value))}</data>'
+    return f'<data value="{escape(value)}" id="{escape(path)}">{escape(number_text(value))}</data>'
 
 
 def _rows(values: dict[str, Any], *, cut: int = 0) -> str:
     return "\n".join(
-        f'<tr><th scope="row">{_e(label_of(path[cut:]))}</th><td class="number">{_data(path, value)}</td>'
-        f'<td class="unit">{_e(unit_of(path))}</td></tr>'
+        f'<tr><th scope="row">{escape(label_of(path[cut:]))}</th><td class="number">{_data(path, value)}</td>'
+        f'<td class="unit">{escape(unit_of(path))}</td></tr>'
         for path, value in values.items()
     )
 
 
 def _table(caption: str, rows: str, columns: Sequence[str] = ("quantity", "value", "unit"), kind: str = "wide") -> str:
-    head = "".join(f'<th scope="col">{_e(name)}</th>' for name in columns)
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
     return (
-        f'<div class="{kind}" role="region" aria-label="{_e(caption)}" tabindex="0">'
-        f"<table>\n<caption>{_e(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n"
+        f'<div class="{kind}" role="region" aria-label="{escape(caption)}" tabindex="0">'
+        f"<table>\n<caption>{escape(caption)}</caption>\n<thead><tr>{head}</tr></thead>\n"
         f"<tbody>\n{rows}\n</tbody>\n</table></div>"
     )
 
@@ -198,7 +155,7 @@ def _key_numbers(summary: dict[str, Any], history: xarray.Dataset) -> str:
         tables.append(_table(f"Last half-cycle with the strip moving {d}", _rows(inside, cut=len(d) + 1)))
     if listed and places:
         rows = "\n".join(
-            f'<tr><th scope="row">{_e(label_of(path))}</th><td>{_e(unit_of(path))}</td>'
+            f'<tr><th scope="row">{escape(label_of(path))}</th><td>{escape(unit_of(path))}</td>'
             + "".join(f'<td class="number">{_data(p, numbers[p])}</td>' for p in _indexed(path, numbers))
             + "</tr>"
             for path in listed
@@ -259,7 +216,7 @@ def _versions(summary: dict[str, Any]) -> str:
 
 
 def _details(title: str, text: str) -> str:
-    return f"<details><summary>{_e(title)}</summary>\n<pre>{_e(text)}</pre>\n</details>" if text else ""
+    return f"<details><summary>{escape(title)}</summary>\n<pre>{escape(text)}</pre>\n</details>" if text else ""
 
 
 def _images(directory: Path) -> dict[str, Path]:
@@ -273,12 +230,7 @@ def _figure(images: dict[str, Path], name: str, caption: str, alt: str = "", kin
     if name not in images:
         return ""
     path = images[name]
-    encoded = base64.b64encode(path.read_bytes()).decode("ascii")
-    source = f"data:image/{path.suffix[1:]};base64,{encoded}"
-    return (
-        f'<figure{kind}>\n<img src="{source}" alt="{_e(alt or ALT[name])}">\n<figcaption>{_e(caption)}</figcaption>\n'
-        "</figure>\n"
-    )
+    return figure(path.read_bytes(), path.suffix[1:], alt or ALT[name], caption, kind)
 
 
 def _bodies(images: dict[str, Path]) -> str:
@@ -295,7 +247,9 @@ def _bodies(images: dict[str, Path]) -> str:
         ("history.gif", "pressure and worn shape over the run"),
         *((f"bodies_{field}.gif", f"the bodies over the run: {word}") for field, word in words.items()),
     ):
-        figure = _figure(images, name, text, f"Animation: {text}.")
-        if figure:
-            parts.append(f'<details class="animation"><summary>Animation: {_e(text)}</summary>\n{figure}</details>')
+        picture = _figure(images, name, text, f"Animation: {text}.")
+        if picture:
+            parts.append(
+                f'<details class="animation"><summary>Animation: {escape(text)}</summary>\n{picture}</details>'
+            )
     return "\n".join(parts)

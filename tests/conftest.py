@@ -36,27 +36,6 @@ def assemble() -> Iterator[Callable[..., System]]:
 
 
 @pytest.fixture(scope="session")
-def rigid_punch(assemble: Callable[..., System]) -> Callable[..., System]:
-    """Return rigid_punch(*settings, depth=3000): a flat rigid punch of half-width 30 mm that only translates.
-
-    It stands on a strip so deep that it acts as an elastic half-plane, to (30 / depth)²; without friction.
-    """
-
-    def rigid_punch(*settings: str, depth: float = 3000) -> System:
-        return assemble(
-            "example2",
-            "materials.rigid={young=2e11, poisson=0.3}",
-            "punch.regions={punch_lower='rigid', punch_upper='rigid'}",
-            f"geometry.parameters.strip_height={depth}",
-            f"geometry.parameters.strip_length={4 * depth}",
-            "contact.friction=0",
-            *settings,
-        )
-
-    return rigid_punch
-
-
-@pytest.fixture(scope="session")
 def unmatched(tmp_path_factory: pytest.TempPathFactory) -> System:
     """Return Example 1 on meshes whose contact nodes do not match: the strip has two elements more on each half."""
     from fenwear.mesh import meshes_folder

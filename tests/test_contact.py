@@ -1,10 +1,8 @@
-"""Contact: closed-form solutions, balance, complementarity; the condensed and the full inequality."""
+"""Contact: balance, complementarity; the condensed and the full inequality."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -15,71 +13,12 @@ from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.contact.full import FullContact
 
-FINE = ("geometry.parameters.elements_along_contact=32", "geometry.parameters.edge_grading=64")
-A, P = 30.0, 1000.0  # half-width, mm; load per thickness, N/mm
+P = 1000.0  # load per thickness, N/mm
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # c = 1.6: the rear edge lifts off
 
 
 def solve(system: System, direction: int = 1) -> ContactState:
     return system.contact((direction,)).solve(system.facing.initial_gap)
-
-
-@pytest.mark.parametrize("plane", ["stress", "strain"])
-def test_flat_rigid_punch(rigid_punch: Callable[..., System], plane: Literal["stress", "strain"]) -> None:
-    """Verification 4: p = P / (pi sqrt(a² - x²)) on a half-plane, to 0.05 % for |x| < 0.8 a."""
-    system = rigid_punch(*FINE, f"model.plane='{plane}'")
-    x, p = system.facing.x, solve(system).pressure[0]
-    inside = np.abs(x) < 0.8 * A
-    np.testing.assert_allclose(p[inside], P / np.pi / np.sqrt(A**2 - x[inside] ** 2), rtol=5e-4)
-
-
-def test_a_deeper_strip_is_more_of_a_half_plane(rigid_punch: Callable[..., System]) -> None:
-    """The strip's depth H enters as (a / H)²: the centre's pressure converges so to the half-plane's."""
-    centre = [solve(rigid_punch(*FINE, depth=h)).pressure[0, 64] for h in (150, 300, 600, 1e4)]
-    errors = [abs(c - centre[-1]) for c in centre[:-1]]
-    assert [a / b for a, b in pairwise(errors)] == pytest.approx([4, 4], rel=0.15)
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize(("plane", "nu"), [("strain", 0.0), ("strain", 0.3), ("stress", 0.3)])
-def test_friction_shifts_the_edge_exponents(
-    rigid_punch: Callable[..., System], plane: Literal["stress", "strain"], nu: float, direction: int
-) -> None:
-    """Verification 5, sliding rigid punch with friction (Johnson, Contact Mechanics, 2.8b):
-
-    p = P cos(pi g) / (pi sqrt(a² - x²)) ((a - x) / (a + x))^g, tan(pi g) = -d mu (1 - 2 nu) / (2 (1 - nu))
-    in plane strain; in plane stress with nu / (1 + nu) for nu. The strip is dragged to -d by the punch.
-    """
-    mu = 0.6
-    settings = (*FINE, f"model.plane='{plane}'", f"contact.friction={mu}", f"materials.steel.poisson={nu}")
-    system = rigid_punch(*settings, depth=1e4)
-    x, p = system.facing.x, solve(system, direction).pressure[0]
-    effective = nu if plane == "strain" else nu / (1 + nu)
-    g = -direction * np.arctan(mu * (1 - 2 * effective) / (2 * (1 - effective))) / np.pi
-    inside = np.abs(x) < 0.8 * A
-    x, p = x[inside], p[inside]
-    exact = P * np.cos(np.pi * g) / (np.pi * np.sqrt(A**2 - x**2)) * ((A - x) / (A + x)) ** g
-    np.testing.assert_allclose(p, exact, rtol=2e-3)
-    assert abs(g) > 0.05  # 2e-3 would see it
-
-
-@pytest.mark.parametrize("a", [10.0, 15.0, 20.0])
-def test_hertz(rigid_punch: Callable[..., System], a: float) -> None:
-    """Verification 3: the gap x² / 2 R of a cylinder, R so that a = 2 sqrt(P R / (pi E*)); p0 = 2 P / (pi a)."""
-    even = ("geometry.parameters.elements_along_contact=48", "geometry.parameters.edge_grading=1")
-    system = rigid_punch(*even, "model.plane='strain'")
-    x, weights = system.facing.x, system.facing.weights
-    radius = a**2 * np.pi * (2e5 / (1 - 0.3**2)) / (4 * P)
-    state = system.contact((1,)).solve(x**2 / (2 * radius))
-    p = state.pressure[0]
-    exact = 2 * P / (np.pi * a) * np.sqrt(np.maximum(1 - (x / a) ** 2, 0))
-    assert p.max() == pytest.approx(exact.max(), rel=1e-4)
-    assert (p > 0) @ weights / 2 == pytest.approx(a, abs=weights.max())
-    np.testing.assert_allclose(p[np.abs(x) < 0.8 * a], exact[np.abs(x) < 0.8 * a], rtol=2e-3)
-    outside = np.abs(x) > a + 1
-    assert (p[outside] == 0).all()
-    gap = a**2 / (2 * radius) * (s := np.abs(x[outside]) / a) * np.sqrt(s**2 - 1) - a**2 / (2 * radius) * np.arccosh(s)
-    np.testing.assert_allclose(state.gap[0, outside], gap, rtol=0.02, atol=1e-2 * gap.max())
 
 
 @pytest.fixture(params=["full contact", "opening", "unmatched", "no pin"])
@@ -155,15 +94,15 @@ def test_condensed_equals_full_on_unmatched_nodes(unmatched: System) -> None:
 
 
 def test_unmatched_nodes_change_little(unmatched: System, assemble: Callable[..., System]) -> None:
-    """Another mesh of the strip is the same problem: the force on each element agrees to 5 % of the mean.
-
-    (Node by node the pressure oscillates there: collocation wants matching nodes.)
-    """
+    """Another mesh of the strip is the same problem: 1 % of the mean in the force on each element, 1e-4 inside."""
     matched = assemble("example1")
     x, ends = matched.facing.x, matched.facing.x[::4]
     element = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, 15)
-    one, other = (np.bincount(element, s.facing.weights * solve(s).pressure[0]) for s in (matched, unmatched))
-    np.testing.assert_allclose(other / np.diff(ends), one / np.diff(ends), rtol=0, atol=0.05 * P / 60)
+    pressures = [solve(s).pressure[0] for s in (matched, unmatched)]
+    one, other = (np.bincount(element, matched.facing.weights * p) for p in pressures)
+    np.testing.assert_allclose(other / np.diff(ends), one / np.diff(ends), rtol=0, atol=0.01 * P / 60)
+    inside = np.abs(x) < 20  # away from the edges, where the pressure has no bound
+    np.testing.assert_allclose(pressures[1][inside], pressures[0][inside], rtol=0, atol=1e-4 * P / 60)
 
 
 def test_several_phases_are_independent_without_a_layer(assemble: Callable[..., System]) -> None:

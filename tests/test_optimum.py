@@ -1,4 +1,4 @@
-"""The optimal pressure: the paper's table, closed forms, equilibrium."""
+"""The optimal pressure: closed forms, equilibrium, bad loads."""
 
 from __future__ import annotations
 
@@ -13,38 +13,6 @@ from fenwear import CaseError, System, load_case
 from fenwear.arrays import Array
 
 A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
-
-
-@pytest.mark.parametrize(
-    ("name", "direction", "lambda_F", "lambda_M"),
-    [
-        ("monotonic-lz20", -1, 0.05, -5.55e-4),
-        ("monotonic-lz20", 1, 0.0166, 5.55e-4),
-        ("monotonic-lz40", -1, 0.06666, -0.001111),
-        ("monotonic-lz40", 1, 0.0, 0.001111),
-    ],
-)
-@pytest.mark.mpi
-def test_table_of_the_paper(
-    assemble: Callable[..., System], name: str, direction: int, lambda_F: float, lambda_M: float
-) -> None:
-    """Verification 6: the eight values, to the digits printed (the paper cuts them off)."""
-    velocity = assemble(name).optimum(direction).velocity
-    assert velocity["lambda_F"] == pytest.approx(lambda_F, abs=1e-4)
-    assert velocity["lambda_M"] == pytest.approx(lambda_M, abs=1e-6)
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("height", [20, 40])
-def test_linear_for_b_1(assemble: Callable[..., System], height: int, direction: int) -> None:
-    """p = p_m (1 - d c x / a), c = 6 mu l_z / L; lambda_F and lambda_M from w = beta~ v p about O at x = 30."""
-    system = assemble(f"monotonic-lz{height}")
-    c, rate = 6 * 0.25 * height / 60, 1e-5 * 200
-    found = system.optimum(direction)
-    x = system.facing.x
-    np.testing.assert_allclose(found.pressure, MEAN * (1 - direction * c * x / A), atol=1e-10 * MEAN)
-    assert found.velocity["lambda_M"] == pytest.approx(rate * MEAN * direction * c / A, rel=1e-10)
-    assert found.velocity["lambda_F"] == pytest.approx(rate * MEAN * (1 - direction * c), abs=1e-12)
 
 
 @pytest.mark.parametrize("direction", [1, -1])

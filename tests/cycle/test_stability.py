@@ -38,29 +38,6 @@ def test_limit_is_where_explicit_steps_fail(assemble: Callable[..., System], set
     assert (change < -0.01 * MEAN).any()
 
 
-@pytest.mark.parametrize("number", [1.03, 100.0, 1e4])
-def test_implicit_steps_have_none(assemble: Callable[..., System], number: float) -> None:
-    """Far above the limit the implicit step comes nearer to the optimum with each half-cycle, without oscillation."""
-    system = at_number(assemble, number, *EVEN)
-    block = next(march(system, 200, implicit=True))
-    deviation = np.sqrt((block.pressure - system.optimum(-1).pressure) ** 2 @ system.facing.weights)
-    falling = deviation > 1e-9 * deviation[0]
-    assert (np.diff(deviation[falling]) < 0).all()
-    assert deviation[-1] < (1e-6 if number > 10 else 0.2) * deviation[0]
-
-
-def test_order_of_magnitude(rigid_punch: Callable[..., System]) -> None:
-    """Verification 17: the limit k ds = 4 h / (pi E*) of a half-plane with nodal spacing h, within a factor of 2."""
-    wear = 1e-6
-    numbers = []
-    for count in (16, 32):
-        even = (*EVEN, f"geometry.parameters.elements_along_contact={count}", f"wear.punch.coefficient={wear}")
-        numbers.append(stability_number(rigid_punch(*even)))
-        estimate = wear * 3 / (4 * (60 / count) / (np.pi * 2e5))
-        assert 0.5 < numbers[-1] / estimate < 2
-    assert numbers[1] / numbers[0] == pytest.approx(2, rel=0.05)
-
-
 def test_proportional_to_the_step(assemble: Callable[..., System]) -> None:
     """The number is linear in beta~ and u0; with b, it grows as b p_m^(b - 1)."""
     one = stability_number(assemble("example1"))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from mpi4py import MPI
 
 from fenwear import Case, System, make_case
 from fenwear.case import Body, Heat, Material, Model
-from fenwear.elasticity import ElasticBody
 from fenwear.heat.conduction import HeatBody
 from fenwear.mesh import BodyMesh
 
@@ -99,26 +97,12 @@ def conducting() -> Callable[..., HeatBody]:
 
 
 @pytest.fixture(scope="session")
-def elastic() -> Callable[..., tuple[ElasticBody, dict[str, Material]]]:
-    """Return elastic(mesh, degree, materials, plane, **body): elasticity of a rectangle, and its materials."""
-
-    def elastic(
-        body: BodyMesh, degree: int, materials: Sequence[dict[str, float]], plane: str, **tables: Any
-    ) -> tuple[ElasticBody, dict[str, Material]]:
-        known = _materials(materials)
-        model = Model.model_validate({"plane": plane})
-        return ElasticBody(body, _description(body, tables), known, model, degree), known
-
-    return elastic
-
-
-@pytest.fixture(scope="session")
 def blocks() -> Callable[..., System]:
     """Return blocks(case, **parameters): two rectangles of the same width on each other, from blocks.geo."""
 
     def blocks(case: dict[str, Any], **parameters: float) -> System:
         geometry = {"file": "blocks.geo", **case.pop("geometry", {}), "parameters": parameters}
-        made: Case = make_case({"geometry": geometry, **case}, Path(__file__).parent)
+        made: Case = make_case({"geometry": geometry, **case})
         return System(made)
 
     return blocks

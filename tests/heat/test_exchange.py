@@ -62,32 +62,6 @@ def in_series(conductance: float, friction_heat: float, partition: float) -> tup
     return FAR[0] + q1 * r1, FAR[1] + (friction_heat - q1) * r2
 
 
-@pytest.mark.parametrize("velocity", [0.0, SPEED, -SPEED])
-@pytest.mark.parametrize(
-    ("heat", "conductance"),
-    [
-        ({"conductance": 0.0}, 0.0),
-        ({"conductance": 0.7}, 0.7),
-        ({"conductance": "perfect"}, np.inf),
-        ({"conductance_per_pressure": [0.5, 0.125]}, PRESSURE * 0.1),
-    ],
-)
-@pytest.mark.parametrize("partition", [0.0, 0.3])
-@pytest.mark.mpi
-def test_two_blocks_in_series(
-    blocks: Make, heat: dict[str, Any], conductance: float, partition: float, velocity: float
-) -> None:
-    """Verification 14: the temperature jump of resistances in series; friction heat splits as (24)."""
-    debris = 0.2
-    system = blocks(
-        stack({**heat, "partition": partition, "debris": debris}), punch_height=HEIGHTS[0], strip_height=HEIGHTS[1]
-    )
-    found = steady_contact(system, velocity, np.full(len(system.facing.x), PRESSURE))
-    friction_heat = (1 - debris) * FRICTION * PRESSURE * abs(velocity)
-    for temperature, exact in zip(found, in_series(conductance, friction_heat, partition), strict=True):
-        np.testing.assert_allclose(temperature, exact, rtol=1e-9)
-
-
 def test_perfect_contact_is_the_limit(blocks: Make) -> None:
     """theta1 = theta2 to the last digit, and h_c = 1e8 is 1e-8 from it."""
     systems = [blocks(stack({"conductance": h})) for h in ("perfect", 1e8)]

@@ -1,0 +1,86 @@
+"""The bodies of the verification cases: two blocks on each other, and a rigid punch on a half-plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+from fenwear.case import load_case, make_case
+from fenwear.system import System
+
+STEEL = {"young": 2e5, "poisson": 0.3}
+
+
+def two_blocks(
+    punch_material: Mapping[str, float],
+    strip_material: Mapping[str, float],
+    sizes: Mapping[str, float],
+    *,
+    degree: int = 2,
+    plane: str = "strain",
+    punch: Mapping[str, Any] | None = None,
+    strip: Mapping[str, Any] | None = None,
+    **tables: Any,
+) -> System:
+    """Return two rectangles of the same width on each other; collective.
+
+    The punch is pressed down with 1 MPa, its sides held in x; the strip stands on its held far side.
+
+    Args:
+        punch_material, strip_material: Tables of a case file's `materials`.
+        sizes: Parameters of blocks.geo.
+        degree: Of the elements.
+        plane: "stress" or "strain".
+        punch, strip: Further keys of the bodies' tables.
+        tables: Further tables of the case.
+    """
+    case = {
+        "geometry": {"file": "blocks.geo", "degree": degree, "parameters": dict(sizes)},
+        "model": {"plane": plane},
+        "materials": {"of_punch": dict(punch_material), "of_strip": dict(strip_material)},
+        "punch": {
+            "regions": {"punch_body": "of_punch"},
+            "supports": [{"on": "punch_sides", "fix": ["x"]}],
+            "loads": [{"on": "punch_far", "traction": [0, -1]}],
+            **(punch or {}),
+        },
+        "strip": {
+            "regions": {"strip_body": "of_strip"},
+            "supports": [{"on": "strip_far", "fix": ["x", "z"]}],
+            **(strip or {}),
+        },
+        "wear": {"punch": {"coefficient": 0}},
+        "motion": {"kind": "one-way", "direction": "rightward", "speed": 1.0, "duration": 1.0},
+        "run": {"half_cycles": 1},
+        **tables,
+    }
+    return System(make_case(case))
+
+
+def clamped(body: str, groups: Sequence[str] = ("sides", "far", "contact")) -> dict[str, Any]:
+    """Return the supports that clamp these groups of a block."""
+    return {"supports": [{"on": f"{body}_{group}", "fix": ["x", "z"]} for group in groups]}
+
+
+@cache
+def builtin(name: str, *settings: str) -> System:
+    """Return a built-in case's system, prepared once for all cases that ask for it; collective."""
+    return System(load_case(name, settings))
+
+
+@cache
+def rigid_punch(depth: float, *settings: str) -> System:
+    """Return a flat rigid punch of half-width 30 mm, which only translates, on a strip of this depth; collective.
+
+    To (30 mm / depth)² the strip is an elastic half-plane. No friction but by the settings.
+    """
+    return builtin(
+        "example2",
+        "materials.rigid={young=2e11, poisson=0.3}",
+        "punch.regions={punch_lower='rigid', punch_upper='rigid'}",
+        f"geometry.parameters.strip_height={depth}",
+        f"geometry.parameters.strip_length={4 * depth}",
+        "contact.friction=0",
+        *settings,
+    )

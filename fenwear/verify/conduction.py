@@ -1,0 +1,430 @@
+"""Conduction and thermal strain in one body: manufactured solutions, free expansion, bimetal, Jaeger's source."""
+
+from __future__ import annotations
+
+import math
+from functools import cache, partial
+from itertools import pairwise
+
+import numpy as np
+from scipy.integrate import quad
+from scipy.special import k0e
+
+from fenwear.arrays import Array
+from fenwear.fields import body_fields
+from fenwear.heat.conduction import HeatBody
+from fenwear.parallel import total
+from fenwear.verify.bodies import builtin, clamped, two_blocks
+from fenwear.verify.manufactured import (
+    DEGREES,
+    convergence_plot,
+    displacement,
+    errors,
+    stacked,
+    unit_square,
+)
+from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
+
+K, RHO_C, AMBIENT, CONVECTION, THICKNESS = 3.0, 2.0, 7.0, 4.0, 20.0
+MATERIAL = {
+    "young": 130.0,
+    "poisson": 0.3,
+    "conductivity": K,
+    "heat_capacity": RHO_C / 0.5,
+    "density": 0.5,
+    "expansion": 1e-3,
+}
+HELD_SIDES = {"temperatures": [{"on": "strip_sides"}]}
+
+
+@cache
+def conducting_square(elements: int, degree: int, *, free: bool = True) -> HeatBody:
+    """Return conduction in the strip -1/2 < x < 1/2, -1 < z < 0, held at its sides, free to convect or insulated."""
+    heat = {"convection": CONVECTION if free else 0.0, "ambient": AMBIENT}
+    system = two_blocks(
+        MATERIAL,
+        MATERIAL,
+        unit_square(elements),
+        degree=degree,
+        strip={**clamped("strip"), **HELD_SIDES},
+        model={"thickness": THICKNESS},
+        heat=heat,
+    )
+    assert system.heat_bodies is not None
+    return system.heat_bodies[1]
+
+
+def owned_nodes(body: HeatBody) -> tuple[Array, Array]:
+    """Return x and z of this rank's nodes."""
+    points = body.space.tabulate_dof_coordinates()[: body.owned]
+    return points[:, 0], points[:, 1]
+
+
+def wave(x: Array, z: Array, m: float, beta: complex, factor: complex) -> Array:
+    """Return ambient + Re[factor e^{imx} (e^{beta z} + B e^{-beta (z + 2)})], which convects at z = -1."""
+    field = factor * np.exp(1j * m * x) * (np.exp(beta * z) + _reflected(beta) * np.exp(-beta * (z + 2)))
+    return AMBIENT + field.real
+
+
+def _reflected(beta: complex) -> complex:
+    return (K * beta - CONVECTION) / (K * beta + CONVECTION)
+
+
+def end_of_step(body: HeatBody, m: float, beta: complex, factor: complex, velocity: float, duration: float) -> Array:
+    """Return the end of a step from the wave of factor 1: held on its sides, with the wave's flux at z = 0."""
+    x, z = owned_nodes(body)
+    body.held_values = wave(x, z, m, beta, factor)[body.held]
+    step = body.step(velocity, duration)
+    slope = factor * beta * (1 - _reflected(beta) * np.exp(-2 * beta))
+    flux = K * (slope * np.exp(1j * m * contact_abscissae(body))).real
+    load = body.place(body.weights * flux)
+    return step.advance(wave(x, z, m, beta, 1.0)) + step.respond(load[:, None])[:, 0]
+
+
+def contact_abscissae(body: HeatBody) -> Array:
+    """Return x of the contact nodes of a body on every rank (n,), mm."""
+    x, _ = owned_nodes(body)
+    return total(body.body.mesh.comm, body.contact_rows @ x)
+
+
+REGIMES = {
+    "steady, at rest": (0.0, math.inf),
+    "steady, Pe = 100": (-150.0, math.inf),
+    "transient, at rest": (0.0, 0.1),
+    "transient, Pe = 100": (150.0, 0.02),
+}
+
+
+@verification(
+    "conduction",
+    "Conduction: order of convergence with advection, convection and flux",
+    "exact waves of the heat equation and of its implicit Euler step, nothing added to the equations",
+    slow=True,
+)
+def conduction() -> Result:
+    """L2 order degree + 1 and H1 order degree, at rest and at high Peclet numbers v L / a.
+
+    With i m v + (1 - 1/g)/dt = a (beta² - m²) - 2 h/(t rho c) the wave is an exact solution of an implicit
+    Euler step from factor 1 to g, and of the steady state.
+    """
+    m, diffusivity, loss = 3.0, K / RHO_C, 2 * CONVECTION / THICKNESS / RHO_C
+    rows: list[Row] = []
+    plots: list[Plot] = []
+    for name, (velocity, duration) in REGIMES.items():
+        if math.isinf(duration):
+            beta, factor = complex(np.sqrt(m**2 + (1j * m * velocity + loss) / diffusivity)), 1.0 + 0j
+        else:
+            beta = 2.0 + 1.5j
+            factor = 1 / (1 - duration * (diffusivity * (beta**2 - m**2) - loss - 1j * m * velocity))
+        tolerance = 0.1 if velocity == 0 else 0.3
+        sizes, found = [], []
+        for degree in DEGREES:
+            counts = np.array([96, 192] if degree == 1 else [16, 32])
+            pairs = []
+            for count in counts:
+                body = conducting_square(int(count), degree)
+                theta = body.function(end_of_step(body, m, beta, factor, velocity, duration))
+                pairs.append(errors(theta, partial(wave, m=m, beta=beta, factor=factor)))
+            in_l2, in_h1 = np.array(pairs).T
+            rows.append(order(f"{name}, degree {degree}: order in L2", degree + 1, in_l2, tolerance))
+            rows.append(order(f"{name}, degree {degree}: order in H1", degree, in_h1, tolerance))
+            sizes.append(1 / counts)
+            found.append(in_l2 / AMBIENT)
+        if name == "steady, Pe = 100":
+            names = [f"degree {k}" for k in DEGREES]
+            title = "Conduction with advection, Pe = 100: L2 error"
+            plots.append(convergence_plot(title, sizes, found, names, [k + 1 for k in DEGREES]))
+    return Result(rows, plots)
+
+
+@verification(
+    "time-steps",
+    "Conduction: order of convergence in time",
+    "decay e^(-2 pi² a t) of sin pi X cos pi z; implicit Euler divides by 1 + rate dt",
+)
+def time_steps() -> Result:
+    """A mode held on the sides and insulated elsewhere: exactly implicit Euler, and so of first order."""
+    body = conducting_square(8, 4, free=False)
+    comm = body.body.mesh.comm
+    x, z = owned_nodes(body)
+    body.held_values = np.zeros(len(body.held))
+    mode = np.sin(np.pi * (x + 0.5)) * np.cos(np.pi * z)
+    rate, end = 2 * np.pi**2 * K / RHO_C, 0.05
+    weight = body.store(mode)
+    rows: list[Row] = []
+    differences = []
+    for steps in (10, 20, 40, 80):
+        theta, step = mode, body.step(0.0, end / steps)
+        for _ in range(steps):
+            theta = step.advance(theta)
+        left = comm.allreduce(float(weight @ theta)) / comm.allreduce(float(weight @ mode))
+        differences.append(abs(left - math.exp(-rate * end)))
+        rows.append(number(f"{steps} steps: what is left of the mode", (1 + rate * end / steps) ** -steps, left, 1e-6))
+    rows.append(order("order in the time step, against e^(-rate t)", 1, differences, 0.1))
+    durations = [end / n for n in (10, 20, 40, 80)]
+    plot = Plot(
+        "Conduction: error of implicit Euler",
+        "time step (s)",
+        "error of what is left of the mode",
+        [Line("fenwear", np.array(durations), np.array(differences))],
+        ("log", "log"),
+        (1.0,),
+    )
+    return Result(rows, [plot])
+
+
+@verification(
+    "thermal-strain",
+    "Thermal strain: order of convergence of a manufactured solution",
+    "Goodier's potential; Timoshenko and Goodier, Theory of Elasticity, 1970",
+)
+def thermal_strain() -> Result:
+    """Displacement grad phi, phi = sin² pi X sin² pi z, in a clamped square.
+
+    For laplace phi = (1 + nu) alpha theta in plane stress, (1 + nu)/(1 - nu) alpha theta in plane strain, the
+    thermal stress needs no further force.
+    """
+    nu, alpha = MATERIAL["poisson"], MATERIAL["expansion"]
+    pi = np.pi
+
+    def exact(x: Array, z: Array) -> Array:
+        x = x + 0.5
+        return pi * stacked(np.sin(2 * pi * x) * np.sin(pi * z) ** 2, np.sin(pi * x) ** 2 * np.sin(2 * pi * z))
+
+    rows: list[Row] = []
+    for plane, factor in (("stress", (1 + nu) * alpha), ("strain", (1 + nu) / (1 - nu) * alpha)):
+        for degree in DEGREES[:3]:
+            pairs = []
+            for count in (10, 20):
+                system = two_blocks(
+                    MATERIAL, MATERIAL, unit_square(count), degree=degree, plane=plane, strip=clamped("strip"), heat={}
+                )
+                assert system.heat_bodies is not None
+                heat = system.heat_bodies[1]
+                x, z = owned_nodes(heat)
+                s, t = np.sin(pi * (x + 0.5)) ** 2, np.sin(pi * z) ** 2
+                c, d = np.cos(2 * pi * (x + 0.5)), np.cos(2 * pi * z)
+                theta = heat.function(2 * pi**2 * (c * t + s * d) / factor)
+                coupling = system.strip.thermal_coupling(heat.space, system.case.materials)
+                force = system.strip.load.duplicate()
+                coupling.mult(theta.x.petsc_vec, force)
+                pairs.append(errors(displacement(system.strip, force), exact))
+            in_l2, in_h1 = np.array(pairs).T
+            rows.append(order(f"plane {plane}, degree {degree}: order in L2", degree + 1, in_l2, 0.2))
+            rows.append(order(f"plane {plane}, degree {degree}: order in H1", degree, in_h1, 0.2))
+    return Result(rows)
+
+
+@verification(
+    "free-expansion",
+    "Free thermal expansion of a bar",
+    "Timoshenko and Goodier, Theory of Elasticity, 1970: a linear temperature makes no stress",
+)
+def free_expansion() -> Result:
+    """The punch as a bar on two pins, its temperature linear in x and z: no stress, and the displacement by hand.
+
+    u_x = a (t0 x + tx (x² - z²)/2 + tz x z) and its like along z, a = alpha, in plane strain (1 + nu) alpha.
+    """
+    alpha, nu, (t0, tx, tz), half = 1e-5, 0.3, (50.0, 3.0, -20.0), 4.0
+    bar = {**MATERIAL, "young": 2e5, "expansion": alpha}
+    pins = {"supports": [{"at": [-half, 0], "fix": ["x", "z"]}, {"at": [half, 0], "fix": ["z"]}]}
+    sizes = {"width": 2 * half, "across": 8, "punch_layers": 2, "strip_layers": 1}
+    rows: list[Row] = []
+    for plane in ("stress", "strain"):
+        system = two_blocks(bar, bar, sizes, plane=plane, punch=pins, heat={})
+        assert system.heat_bodies is not None
+        x, z = owned_nodes(system.heat_bodies[0])
+        theta = t0 + tx * x + tz * z
+        strip = np.zeros(system.heat_bodies[1].owned)
+        nothing = np.zeros(len(system.facing.x))
+        unloaded = system.vary("punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
+        fields, _ = body_fields(unloaded, nothing, np.zeros(0), 1, (theta, strip))
+        ours = fields.displacement.x.array[: 2 * len(x)].reshape(-1, 2)
+        s, expansion = x + half, alpha if plane == "stress" else (1 + nu) * alpha
+        start = t0 - half * tx  # the temperature at the first pin, from where s is counted
+        exact = expansion * np.stack(
+            [start * s + tx * (s**2 - z**2) / 2 + tz * s * z, start * z + tz * (z**2 - s**2) / 2 + tx * s * z], axis=1
+        )
+        turn = expansion * tz * half  # the rotation that the second pin prevents
+        exact += turn * np.stack([-z, s], axis=1)
+        exact, ours = (np.concatenate(system.comm.allgather(part)) for part in (exact, ours))
+        scale = np.abs(exact).max()
+        rows.append(profile(f"plane {plane}: displacement (mm)", exact, ours, 1e-9, scale=scale))
+        if plane == "stress":
+            held = 2e5 * alpha * t0  # what a bar held at its ends would bear
+            largest = system.comm.allreduce(float(np.abs(fields.von_mises.x.array).max()), max)
+            rows.append(number(f"plane {plane}: largest stress / E alpha t0", 0, largest / held, 1e-8, scale=1))
+    return Result(rows)
+
+
+@verification(
+    "bimetal", "A heated bimetal strip", "S. Timoshenko, Analysis of bi-metal thermostats, J. Opt. Soc. Am. 11, 1925"
+)
+def bimetal() -> Result:
+    """Curvature 6 (a1 - a2) dT (1 + m)² / (h (3 (1 + m)² + (1 + m n)(m² + 1/(m n)))), m and n lower over upper layer.
+
+    The punch of two layers on two pins, in plane stress, whose contact surface bends; the strip does not expand.
+    """
+    length, height, warming, (alpha1, alpha2) = 8.0, 1.0, 40.0, (3e-5, 1e-5)
+    rows: list[Row] = []
+    for m, n, poisson in ((1.0, 1.0, 0.3), (0.5, 4.0, 0.3), (3.0, 0.2, 0.1)):
+        lower = height * m / (1 + m)
+        size = {
+            "punch_width": length,
+            "punch_height": height,
+            "layer_height": lower,
+            "pin_height_1": lower,
+            "strip_length": 2 * length,
+            "strip_height": height,
+        }
+        values = {**size, "elements_along_contact": 32, "edge_grading": 1, "growth": 0.2}
+        parameters = ", ".join(f"{name}={value!r}" for name, value in values.items())
+        thermal = "conductivity=1, heat_capacity=1, density=1"
+        pins = ", ".join(f"{{at=[{x}, {height}], fix={fix}}}" for x, fix in ((-4, "['x', 'z']"), (4, "['z']")))
+        system = builtin(
+            "example1-heat",
+            f"geometry={{parameters={{{parameters}}}, degree=3}}",
+            f"materials.lower={{young={1e5 * n}, poisson=0.3, expansion={alpha1}, {thermal}}}",
+            f"materials.upper={{young=1e5, poisson={poisson}, expansion={alpha2}, {thermal}}}",
+            f"materials.still={{young=1e5, poisson=0.3, expansion=0, {thermal}}}",
+            "punch.regions={punch_lower='lower', punch_upper='upper'}",
+            "strip.regions={strip_body='still'}",
+            f"punch.supports=[{pins}]",
+            "heat={operator='full'}",
+            "strip.temperatures=[]",
+        )
+        assert system.heat_bodies is not None
+        assert system.exchange is not None
+        warm = (np.full(system.heat_bodies[0].owned, warming), np.zeros(system.heat_bodies[1].owned))
+        x, deflection = system.facing.x, system.exchange.gap(system.exchange.state(warm))
+        middle = np.abs(x) < 1
+        curvature = 2 * np.polyfit(x[middle], deflection[middle], 2)[0]
+        bending = 3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))
+        timoshenko = 6 * (alpha1 - alpha2) * warming * (1 + m) ** 2 / (height * bending)
+        # The lower layer expands more: the ends rise.
+        case = f"heights {m:g}, moduli {n:g}, Poisson's ratios 0.3 and {poisson:g}"
+        rows.append(number(f"{case}: curvature (1/mm)", timoshenko, curvature, 1e-5))
+    return Result(rows)
+
+
+@verification(
+    "periodic-flux",
+    "Periodic heat flux on a half-space",
+    "Carslaw and Jaeger, Conduction of Heat in Solids, 1959, section 2.6",
+)
+def periodic_flux() -> Result:
+    """Amplitude q0 / sqrt(k rho c omega), lag 45 degrees.
+
+    Implicit Euler has s = (1 - e^(-i omega dt))/dt for i omega. The strip is ten penetration
+    depths deep and insulated but for the flux.
+    """
+    omega, flux, periods = 10.0, 2.0, 6
+    depth = 10 * math.sqrt(2 * K / (RHO_C * omega))
+    sizes = {"width": 0.5, "strip_height": depth, "across": 2, "strip_layers": 20, "punch_layers": 1}
+    system = two_blocks(MATERIAL, MATERIAL, sizes, degree=4, heat={})
+    assert system.heat_bodies is not None
+    body = system.heat_bodies[1]
+    rows: list[Row] = []
+    lines: list[Line] = []
+    amplitudes, lags = [], []
+    unit = flux / math.sqrt(K * RHO_C * omega)
+    for steps in (50, 100, 200, 400):
+        dt = 2 * math.pi / omega / steps
+        step = body.step(0.0, dt)
+        response = step.respond(body.place(body.weights * flux)[:, None])[:, 0]
+        theta, surface = body.initial(), []
+        for n in range(1, periods * steps + 1):
+            theta = step.advance(theta) + response * math.cos(omega * n * dt)
+            surface.append(total(system.comm, body.contact_rows @ theta)[0])
+        times, last = dt * np.arange(1, len(surface) + 1)[-steps:], np.array(surface)[-steps:]
+        basis = np.stack([np.cos(omega * times), np.sin(omega * times), np.ones(steps), times], axis=1)
+        (c, s, *_), *_ = np.linalg.lstsq(basis, last, rcond=None)
+        discrete = flux / np.sqrt(K * RHO_C * (1 - np.exp(-1j * omega * dt)) / dt)
+        rows.append(
+            number(f"{steps} steps a period: amplitude of implicit Euler (K)", abs(discrete), math.hypot(c, s), 2e-3)
+        )
+        amplitudes.append(math.hypot(c, s))
+        lags.append(math.degrees(math.atan2(s, c)))
+        if steps == 400:
+            phase = np.degrees(omega * (times - times[0] + dt))
+            lines = [
+                Line("fenwear", phase[::10], last[::10]),
+                Line("exact", phase, unit * np.cos(omega * times - np.pi / 4), reference=True),
+            ]
+    # Of first order in the step: what two steps extrapolate to.
+    rows.append(number("amplitude extrapolated to no step (K)", unit, 2 * amplitudes[-1] - amplitudes[-2], 2e-3))
+    rows.append(number("lag extrapolated to no step (degrees)", 45, 2 * lags[-1] - lags[-2], 2e-3))
+    rows.append(order("lag: order in the time step", 1, np.abs(np.array(lags) - 45).tolist(), 0.15))
+    plot = Plot(
+        "Periodic flux: surface temperature in the sixth period",
+        "phase of the flux (degrees)",
+        "temperature (K)",
+        lines,
+    )
+    return Result(rows, [plot])
+
+
+def jaeger(x: float, half_width: float, speed: float, diffusivity: float) -> float:
+    """Return the surface rise k theta / q of a band source on a half-plane that moves to +x, by quadrature.
+
+    (1/pi) times the integral over the source of e^u K0(|u|), u = v (x - x') / (2 a).
+    """
+    scale = speed / (2 * diffusivity)
+
+    def kernel(u: float) -> float:
+        return float(k0e(abs(u)) * (1.0 if u > 0 else math.exp(2 * u)))
+
+    low, high = scale * (x - half_width), scale * (x + half_width)
+    ends = [low, *(p for p in (-1.0, 0.0, 1.0) if low < p < high), high]
+    return float(sum(quad(kernel, a, b, limit=200)[0] for a, b in pairwise(ends)) / (math.pi * scale))
+
+
+@verification(
+    "jaeger",
+    "Jaeger: a moving band source of heat",
+    "J. C. Jaeger, Moving sources of heat and the temperature at sliding contacts, 1942; "
+    "Carslaw and Jaeger, 1959, section 10.7",
+)
+def moving_source() -> Result:
+    """The profile of his integral; for Pe = v l / 2 a > 10 also his largest rise, 2 q/k sqrt(2 l a / (pi v)).
+
+    The strip of Example 1, 2 m deep and 20 m long, with cold ends and bottom.
+    """
+    system = builtin(
+        "example1-heat",
+        "heat.convection=0",
+        "geometry.parameters.growth=0.3",
+        "geometry.parameters.strip_height=2000",
+        "geometry.parameters.strip_length=20000",
+    )
+    assert system.heat_bodies is not None
+    body, half_width, conductivity = system.heat_bodies[1], 30.0, 55.0
+    diffusivity = conductivity / (7.8e-9 * 4.6e8)
+    x = system.facing.x
+    inner = np.abs(x) < 29.9
+    rows: list[Row] = []
+    lines: list[Line] = []
+    for peclet in (1.0, 10.0, 200.0):
+        speed = 2 * diffusivity * peclet / half_width
+        published = 2 * math.sqrt(2 * half_width * diffusivity / (math.pi * speed))
+        for d in (1, -1):
+            step = body.step(d * speed, math.inf)
+            rise = total(system.comm, body.contact_rows @ step.respond(body.place(body.weights)[:, None]))[:, 0]
+            rise *= conductivity
+            exact = np.array([jaeger(d * at, half_width, speed, diffusivity) for at in x])
+            case = f"Pe = {peclet:g}, {'rightward' if d > 0 else 'leftward'}"
+            rows.append(profile(f"{case}: rise k theta / q (mm)", exact[inner], rise[inner], 5e-3, scale=exact.max()))
+            if peclet > 10:
+                rows.append(number(f"{case}: largest rise, Jaeger's formula (mm)", published, rise.max(), 1e-2))
+            if d > 0:
+                lines += [
+                    Line(f"fenwear, Pe = {peclet:g}", x, rise / published),
+                    Line(f"Jaeger, Pe = {peclet:g}", x, exact / published, reference=True),
+                ]
+    plot = Plot(
+        "Moving band source: rise over Jaeger's largest, rightward",
+        "x (mm)",
+        "theta / (2 q/k sqrt(2 l a / pi v))",
+        lines,
+    )
+    return Result(rows, [plot])

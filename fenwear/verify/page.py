@@ -1,0 +1,146 @@
+"""verification.html: the table of all comparisons and their plots on one page that needs nothing else."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.html_page import document, escape, figure, section
+from fenwear.style import COLOURS, DASHES, panels
+from fenwear.verify.suite import Line, Outcome, Plot, Row
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLUMNS = ("what is compared", "reference", "fenwear", "error", "tolerance", "order", "")
+MARKERS = "os^Dvx+"
+WORDS = {"agrees": "agrees", "differs": "DIFFERS", "not run": "not run"}
+
+
+def page(outcomes: Sequence[Outcome], ranks: int, versions: dict[str, str]) -> str:
+    """Return the page of what the cases found."""
+    found = {word: sum(o.verdict == word for o in outcomes) for word in WORDS}
+    comparisons = sum(len(o.result.rows) for o in outcomes)
+    differing = [o for o in outcomes if o.verdict == "differs"]
+    now = datetime.now().astimezone()
+    seconds = sum(o.seconds for o in outcomes)
+    head = (
+        "<header>\n<h1>Verification of fenwear</h1>\n"
+        f"<p>Of {len(outcomes)} cases {found['agrees']} agree with exact solutions and published results, "
+        f"{found['differs']} differ and {found['not run']} were not run; {comparisons} comparisons in all. "
+        f"{seconds:.0f} s on {ranks} rank{'s' if ranks > 1 else ''}, "
+        f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>.</p>\n</header>\n<main>'
+    )
+    warning = "".join(
+        f'<p class="warning"><strong>Differs:</strong> <a href="#{o.case.name}">{escape(o.case.title)}</a></p>'
+        for o in differing
+    )
+    stack = ", ".join(f"{escape(name)} {escape(version)}" for name, version in versions.items())
+    parts = [
+        head,
+        warning,
+        section("Cases", _overview(outcomes)),
+        *(_case(outcome) for outcome in outcomes),
+        section("Versions", f"<p>{stack}</p>"),
+    ]
+    return document("Verification of fenwear", "\n".join(parts) + "\n</main>")
+
+
+def _overview(outcomes: Sequence[Outcome]) -> str:
+    rows = "\n".join(
+        f'<tr><th scope="row"><a href="#{o.case.name}">{escape(o.case.title)}</a></th>'
+        f'<td class="number">{_largest(o)}</td><td class="number">{o.seconds:.1f} s</td>{_verdict(o.verdict)}</tr>'
+        for o in outcomes
+    )
+    return _table("All cases", ("case", "largest error / tolerance", "time", ""), rows)
+
+
+def _largest(outcome: Outcome) -> str:
+    ratios = [row.error / row.tolerance if row.tolerance else row.error for row in outcome.result.rows]
+    return f"{max(ratios):.2g}" if ratios else "–"
+
+
+def _case(outcome: Outcome) -> str:
+    case, result = outcome.case, outcome.result
+    note = f'<p class="note">{escape(result.note)}</p>' if result.note else ""
+    rows = "\n".join(_row(row) for row in result.rows)
+    table = _table(case.title, COLUMNS, rows) if rows else ""
+    plots = "".join(figure(draw(plot), "png", _alt(plot), plot.title) for plot in result.plots)
+    content = f'<p>Reference: {escape(case.source)}. <span class="note">{case.name}</span></p>{note}{table}{plots}'
+    return section(case.title, content).replace("<section>", f'<section id="{case.name}">', 1)
+
+
+def _row(row: Row) -> str:
+    order = "" if row.order is None else f"{row.order:.2f}"
+    numbers = (f"{row.reference:.6g}", f"{row.ours:.6g}", f"{row.error:.1e}", f"{row.tolerance:.2g}", order)
+    cells = "".join(f'<td class="number">{text}</td>' for text in numbers)
+    verdict = _verdict("agrees" if row.agrees else "differs")
+    return f'<tr><th scope="row">{escape(row.what)}</th>{cells}{verdict}</tr>'
+
+
+def _verdict(word: str) -> str:
+    text = f"<strong>{WORDS[word]}</strong>" if word == "differs" else WORDS[word]
+    return f'<td class="verdict">{text}</td>'
+
+
+def _table(caption: str, columns: Sequence[str], rows: str) -> str:
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
+    return (
+        f'<div class="wide" role="region" aria-label="{escape(caption)}" tabindex="0"><table class="comparison">\n'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table></div>"
+    )
+
+
+def _alt(plot: Plot) -> str:
+    return f"{plot.title}: {plot.y_label} over {plot.x_label}, lines {', '.join(line.name for line in plot.lines)}."
+
+
+def draw(plot: Plot) -> bytes:
+    """Return a plot as a PNG: lines for references, markers for fenwear's values."""
+    canvas, (ax,) = panels(1, 3.6)
+    ours = 0
+    for line in plot.lines:
+        if line.reference:
+            ax.plot(line.x, line.y, color="0.45", linewidth=1.0, zorder=1)
+            continue
+        colour, marker = COLOURS[ours % len(COLOURS)], MARKERS[ours % len(MARKERS)]
+        joined = DASHES[ours % len(DASHES)] if plot.orders else "none"
+        # Every other one hollow and larger, so that markers on the same spot both show.
+        size, face = (5.5, "none") if ours % 2 else (3.0, colour)
+        ax.plot(line.x, line.y, marker=marker, markersize=size, markerfacecolor=face, linestyle=joined, linewidth=0.9,
+                color=colour, label=line.name, zorder=2)  # fmt: skip
+        ours += 1
+    references = [line.name for line in plot.lines if line.reference]
+    if references:
+        ax.plot([], [], color="0.45", linewidth=1.0, label=references[0] if len(references) == 1 else "reference")
+    ax.set(xlabel=plot.x_label, ylabel=plot.y_label, xscale=plot.scales[0], yscale=plot.scales[1])
+    measured = [line for line in plot.lines if not line.reference]
+    for line, order in zip(measured, plot.orders, strict=bool(plot.orders)):
+        _slope_triangle(ax, line, order)
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
+    buffer = io.BytesIO()
+    canvas.savefig(buffer, format="png", dpi=110)
+    return buffer.getvalue()
+
+
+def _slope_triangle(ax: Axes, line: Line, order: float) -> None:
+    """Draw the slope of the theory's order below the last refinement of a line."""
+    (x1, y1), (x0, y0) = _last_two(line.x, line.y)
+    width = (x1 / x0) ** 0.5
+    left, low = math.sqrt(x0 * x1) / math.sqrt(width), math.sqrt(y0 * y1) / width ** (order / 2) / 2.2
+    right, high = left * width, low * width**order
+    ax.plot([left, right, right, left], [low, low, high, low], color="0.6", linewidth=0.8, zorder=0)
+    ax.annotate(f"{order:g}", (right, math.sqrt(low * high)), xytext=(3, 0), textcoords="offset points", va="center",
+                color="0.4", fontsize="x-small")  # fmt: skip
+
+
+def _last_two(x: Array, y: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the two points of a line with the smallest x, the larger one first."""
+    small, next_one = np.argsort(x)[:2]
+    return (float(x[next_one]), float(y[next_one])), (float(x[small]), float(y[small]))

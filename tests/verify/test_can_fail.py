@@ -1,0 +1,218 @@
+"""A wrong sign, a lost factor: the verification cases find them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from fenwear.polynomials import interpolation
+from mpi4py import MPI
+
+from fenwear import System, elasticity, interface
+from fenwear.case import Model
+from fenwear.contact import CondensedContact
+from fenwear.elasticity import ElasticBody
+from fenwear.heat.conduction import HeatBody
+from fenwear.heat.exchange import TERMS, HeatExchange
+from fenwear.interface import Facing, Interface, Statics
+from fenwear.motion import Motion
+from fenwear.verify import registered, run_cases
+from fenwear.verify import wear as wear_cases
+from fenwear.verify.bodies import builtin, rigid_punch
+from fenwear.verify.conduction import conducting_square
+from fenwear.verify.contact import half_planes
+from fenwear.verify.thermal import conductor
+from fenwear.wear import Wear
+
+Patch = pytest.MonkeyPatch
+CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor)
+
+
+@pytest.fixture(autouse=True)
+def _nothing_kept() -> Iterator[None]:
+    """Keep no system from before the change, and none with it."""
+    for cache in CACHES:
+        cache.cache_clear()
+    yield
+    for cache in CACHES:
+        cache.cache_clear()
+
+
+def opposite_friction(patch: Patch) -> None:
+    """Tangential compliance with the other sign."""
+    right = Interface.compliance
+    patch.setattr(Interface, "compliance", lambda self, d, friction: right(self, -d, friction))
+
+
+def opposite_moment(patch: Patch) -> None:
+    """Moment of the friction with the other sign."""
+    right = Statics.equilibrium
+    patch.setattr(Statics, "equilibrium", lambda self, d, friction: right(self, -d, friction))
+
+
+def punch_without_poisson(patch: Patch) -> None:
+    """The punch in plane stress, so that E* lacks its 1 - nu²."""
+    right = ElasticBody.__init__
+
+    def init(self: ElasticBody, body: Any, description: Any, materials: Any, model: Model, degree: int) -> None:
+        flat = model.model_copy(update={"plane": "stress"}) if body.name == "punch" else model
+        right(self, body, description, materials, flat, degree)
+
+    patch.setattr(ElasticBody, "__init__", init)
+
+
+def lame_of_the_other_plane(patch: Patch) -> None:
+    """Plane stress for plane strain, and the other way round."""
+    right = elasticity.lame
+    other = {"stress": "strain", "strain": "stress"}
+    patch.setattr(elasticity, "lame", lambda young, poisson, plane: right(young, poisson, other[plane]))
+
+
+def even_weights(patch: Patch) -> None:
+    """Nodes that all stand for the same length."""
+    patch.setattr(Facing, "weights", property(lambda self: np.full_like(self.punch.weights, self.punch.weights.mean())))
+
+
+def collocated(patch: Patch) -> None:
+    """Values picked at the punch's nodes in place of the mortar."""
+    patch.setattr(interface, "mortar_transfer", lambda x, degree, other, own: interpolation(other, own, x))
+
+
+def half_distance(patch: Patch) -> None:
+    """A sliding distance of u0 in place of 2 u0."""
+    right = Motion.sliding
+    patch.setattr(Motion, "sliding", lambda self, exponent=1.0: right(self, exponent) / 2)
+
+
+def half_speed(patch: Patch) -> None:
+    """Heat of half the sliding speed."""
+    right = Motion.mean_speeds
+    patch.setattr(Motion, "mean_speeds", lambda self, steps: right(self, steps) / 2)
+
+
+def steeper_wear(patch: Patch) -> None:
+    """Wear that grows a little faster than the pressure: b = 1.1."""
+
+    def depth(self: Wear, pressure: Any) -> Any:
+        return self.per_power * np.maximum(pressure, 0) ** 1.1
+
+    def slope(self: Any, pressure: Any) -> Any:
+        return self.repeats * self.wear.per_power * 1.1 * np.maximum(pressure, 1e-9) ** 0.1
+
+    patch.setattr(Wear, "depth", depth)
+    patch.setattr("fenwear.wear.WornLayer.slope", slope)
+
+
+def half_limit(patch: Patch) -> None:
+    """A limit of explicit steps twice too high."""
+    right = wear_cases.stability_number
+    patch.setattr(wear_cases, "stability_number", lambda system: right(system) / 2)
+
+
+def other_share(patch: Patch) -> None:
+    """The strip's share of the heat for the punch."""
+    right = HeatExchange._make_flux_map
+
+    def make(self: HeatExchange, kinds: Any, conductance: Any) -> Any:
+        heat = self.heat
+        self.heat = heat.model_copy(update={"partition": 1 - heat.partition})
+        try:
+            return right(self, kinds, conductance)
+        finally:
+            self.heat = heat
+
+    patch.setattr(HeatExchange, "_make_flux_map", make)
+
+
+def thermal_modulus_without_poisson(patch: Patch) -> None:
+    """E alpha in place of E alpha / (1 - nu) and E alpha / (1 - 2 nu)."""
+
+    def modulus(self: ElasticBody, materials: Any) -> Any:
+        used = {region: materials[name] for region, name in self._regions.items()}
+        return elasticity.region_field(self.body, {r: m.young * (m.expansion or 0.0) for r, m in used.items()})
+
+    patch.setattr(ElasticBody, "thermal_modulus", modulus)
+
+
+def material_the_other_way(patch: Patch) -> None:
+    """The strip's material moves against the sliding direction."""
+    right = HeatBody.step
+    patch.setattr(HeatBody, "step", lambda self, velocity, duration: right(self, -velocity, duration))
+
+
+def longer_step(patch: Patch) -> None:
+    """Time steps one per cent too long."""
+    right = HeatBody.step
+    patch.setattr(HeatBody, "step", lambda self, velocity, duration: right(self, velocity, 1.01 * duration))
+
+
+def forgotten_heat(patch: Patch) -> None:
+    """What the strip's material carries away is left out of the balance."""
+    right = HeatExchange._account
+
+    def account(self: HeatExchange, *args: Any, **options: Any) -> Any:
+        terms = right(self, *args, **options)
+        terms[TERMS.index("carried")] = 0
+        return terms
+
+    patch.setattr(HeatExchange, "_account", account)
+
+
+@pytest.mark.parametrize(
+    ("name", "break_it"),
+    [
+        ("elasticity", lame_of_the_other_plane),
+        ("patch", collocated),
+        ("patch", punch_without_poisson),
+        ("hertz", punch_without_poisson),
+        ("hertz", even_weights),
+        ("sliding-cylinder", opposite_friction),
+        ("sliding-punch", opposite_friction),
+        ("flat-punch", even_weights),
+        ("equilibrium-of-contact", opposite_moment),
+        ("optimum-table", opposite_moment),
+        ("optimum-linear", opposite_moment),
+        ("optimum-power", opposite_moment),
+        ("wear-volume", half_distance),
+        ("equilibrium", opposite_moment),
+        ("galin", half_distance),
+        ("galin", lame_of_the_other_plane),
+        ("one-way", steeper_wear),
+        ("cyclic", steeper_wear),
+        ("explicit-limit", half_limit),
+        ("conduction", material_the_other_way),
+        ("time-steps", longer_step),
+        ("thermal-strain", thermal_modulus_without_poisson),
+        ("free-expansion", thermal_modulus_without_poisson),
+        ("bimetal", thermal_modulus_without_poisson),
+        ("periodic-flux", longer_step),
+        ("jaeger", material_the_other_way),
+        ("conductance", other_share),
+        ("burton", thermal_modulus_without_poisson),
+        ("burton", other_share),
+        ("energy", half_speed),
+        ("energy", forgotten_heat),
+    ],
+    ids=lambda value: value if isinstance(value, str) else value.__name__,
+)
+def test_it_is_found(monkeypatch: pytest.MonkeyPatch, name: str, break_it: Callable[[Patch], None]) -> None:
+    """The case computes to its end and says that it differs."""
+    break_it(monkeypatch)
+    (outcome,) = run_cases(registered([name]))
+    assert not outcome.failed, outcome.result.note
+    assert outcome.verdict == "differs"
+
+
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="needs several ranks")
+@pytest.mark.mpi
+def test_ranks_that_differ_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A friction that depends on the number of ranks, by a part in a million."""
+
+    def contact(self: System, directions: tuple[int, ...]) -> CondensedContact:
+        return CondensedContact(self.interface, self.case.contact.friction * (1 + 1e-6 * self.comm.size), directions)
+
+    monkeypatch.setattr(System, "contact", contact)
+    (outcome,) = run_cases(registered(["ranks"]))
+    assert outcome.verdict == "differs"

@@ -1,0 +1,29 @@
+"""Every verification case agrees with its reference."""
+
+from __future__ import annotations
+
+import pytest
+from mpi4py import MPI
+
+from fenwear import CaseError
+from fenwear.verify import VerificationCase, registered, run_cases
+
+CASES = [pytest.param(c, id=c.name, marks=[pytest.mark.slow] if c.slow else []) for c in registered()]
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.mpi
+def test_case(case: VerificationCase) -> None:
+    """On one rank and on two: every row within its tolerance."""
+    (outcome,) = run_cases([case])
+    differing = [row for row in outcome.result.rows if not row.agrees]
+    assert not differing
+    expected = "not run" if case.name == "ranks" and MPI.COMM_WORLD.size == 1 else "agrees"
+    assert outcome.verdict == expected, outcome.result.note
+
+
+def test_every_row_can_be_asked_for() -> None:
+    """By name, in the order asked for; another name is refused with the nearest one."""
+    assert [case.name for case in registered(["galin", "hertz"])] == ["galin", "hertz"]
+    with pytest.raises(CaseError, match="--only: no verification case 'herz'; did you mean 'hertz'"):
+        registered(["herz"])

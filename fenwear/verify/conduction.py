@@ -238,7 +238,7 @@ def free_expansion() -> Result:
         strip = np.zeros(system.heat_bodies[1].owned)
         nothing = np.zeros(len(system.facing.x))
         unloaded = system.vary("punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
-        fields, _ = body_fields(unloaded, nothing, np.zeros(0), 1, (theta, strip))
+        fields, _ = body_fields(unloaded, nothing, np.zeros(0), 0, (theta, strip))
         ours = fields.displacement.x.array[: 2 * len(x)].reshape(-1, 2)
         s, expansion = x + half, alpha if plane == "stress" else (1 + nu) * alpha
         start = t0 - half * tx  # the temperature at the first pin, from where s is counted

@@ -100,9 +100,9 @@ def stiffness_rates(system: System, effective: float) -> Array:
     statics = system.statics
     n, r = statics.rigid_normal.shape
     matrix = np.zeros((n + r, n + r))
-    matrix[:n, :n] = system.interface.compliance(1, 0.0) * effective
+    matrix[:n, :n] = system.interface.compliance(0.0) * effective
     matrix[:n, n:] = statics.rigid_normal
-    matrix[n:, :n] = statics.equilibrium(1, 0.0)
+    matrix[n:, :n] = statics.equilibrium(0.0)
     values = np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n]).real * HALF_WIDTH
     return np.sort(values[values > 1e-6])
 
@@ -134,7 +134,7 @@ def galin() -> Result:
             kind = ("odd", "even")[k % 2]
             rows.append(number(f"plane {plane}, eigenvalue, {kind} mode {k // 2 + 1} (E* k V/a)", exact[k], rate, 2e-3))
         growth = growth_rate(system, np.full((2, len(system.facing.x)), MEAN))
-        slowest = np.expm1(-growth * system.motion.duration) / step
+        slowest = np.expm1(-growth * system.motion.period / 2) / step
         rows.append(number(f"plane {plane}, growth rate of the slowest mode (E* k V/a)", exact[0], slowest, 2e-3))
         block = next(march(system, 100, block=100, implicit=True))
         deviation = block.pressure - MEAN

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from fenwear.polynomials import interpolation
 from mpi4py import MPI
 
 from fenwear import System, elasticity, interface
 from fenwear.case import Model
-from fenwear.contact import CondensedContact
+from fenwear.contact import CondensedContact, Sliding
 from fenwear.elasticity import ElasticBody
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
-from fenwear.interface import Facing, Interface, Statics
+from fenwear.interface import Facing, Interface, Statics, interpolation
 from fenwear.motion import Motion
 from fenwear.verify import registered, run_cases
 from fenwear.verify import wear as wear_cases
@@ -43,13 +43,13 @@ def _nothing_kept() -> Iterator[None]:
 def opposite_friction(patch: Patch) -> None:
     """Tangential compliance with the other sign."""
     right = Interface.compliance
-    patch.setattr(Interface, "compliance", lambda self, d, friction: right(self, -d, friction))
+    patch.setattr(Interface, "compliance", lambda self, slip: right(self, -slip))
 
 
 def opposite_moment(patch: Patch) -> None:
     """Moment of the friction with the other sign."""
     right = Statics.equilibrium
-    patch.setattr(Statics, "equilibrium", lambda self, d, friction: right(self, -d, friction))
+    patch.setattr(Statics, "equilibrium", lambda self, slip: right(self, -slip))
 
 
 def punch_without_poisson(patch: Patch) -> None:
@@ -77,7 +77,7 @@ def even_weights(patch: Patch) -> None:
 
 def collocated(patch: Patch) -> None:
     """Values picked at the punch's nodes in place of the mortar."""
-    patch.setattr(interface, "mortar_transfer", lambda x, degree, other, own: interpolation(other, own, x))
+    patch.setattr(interface, "transfer_matrix", lambda x, degree, other, own: interpolation(other, own, x))
 
 
 def half_distance(patch: Patch) -> None:
@@ -95,14 +95,13 @@ def half_speed(patch: Patch) -> None:
 def steeper_wear(patch: Patch) -> None:
     """Wear that grows a little faster than the pressure: b = 1.1."""
 
-    def depth(self: Wear, pressure: Any) -> Any:
-        return self.per_power * np.maximum(pressure, 0) ** 1.1
+    right = Wear.phases
 
-    def slope(self: Any, pressure: Any) -> Any:
-        return self.repeats * self.wear.per_power * 1.1 * np.maximum(pressure, 1e-9) ** 0.1
+    def phases(self: Wear, *arguments: Any) -> Any:
+        found = right(self, *arguments)
+        return replace(found, punch=replace(found.punch, exponent=1.1 * found.punch.exponent))
 
-    patch.setattr(Wear, "depth", depth)
-    patch.setattr("fenwear.wear.WornLayer.slope", slope)
+    patch.setattr(Wear, "phases", phases)
 
 
 def half_limit(patch: Patch) -> None:
@@ -211,7 +210,9 @@ def test_ranks_that_differ_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A friction that depends on the number of ranks, by a part in a million."""
 
     def contact(self: System, directions: tuple[int, ...]) -> CondensedContact:
-        return CondensedContact(self.interface, self.case.contact.friction * (1 + 1e-6 * self.comm.size), directions)
+        return CondensedContact(
+            [Sliding(self.interface, self.slip(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
+        )
 
     monkeypatch.setattr(System, "contact", contact)
     (outcome,) = run_cases(registered(["ranks"]))

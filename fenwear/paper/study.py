@@ -278,7 +278,7 @@ SUPPORTS = {
         "strip.supports=[{on='strip_bottom', fix=['z']}, {on='strip_ends', fix=['x']}]"
     ),
 }
-AS_BUILT_IN = "as in the built-in case"
+AS_BUILT_IN = "Example 1 as it is"
 
 
 @cache
@@ -295,7 +295,9 @@ def open_choices(scope: Scope = FULL) -> tuple[Variant, ...]:
         variants += _variants(base.vary(key), scope, "example 1", name)
     for name, key in {"plane strain": "model.plane=strain", **SUPPORTS}.items():
         variants += _variants(System(load_case("example1-heat", (*scope.settings, key))), scope, "example 1", name)
-    for low, high in HINGES:
+    built_in = _prepared("example2-heat", scope.settings)
+    variants += _variants(built_in, scope, "example 2", f"Example 2, hinges at {HINGES[0][0]} and {HINGES[0][1]} mm")
+    for low, high in HINGES[1:]:
         heights = (f"geometry.parameters.pin_height_1={low}", f"geometry.parameters.pin_height_2={high}")
         system = System(load_case("example2-heat", (*scope.settings, *heights)))
         variants += _variants(system, scope, "example 2", f"hinges at {low} and {high} mm")

@@ -56,7 +56,8 @@ class HeatParameters:
 class Parameters:
     """A punch on a strip. The lever is the arm of friction at the pin over half of the width: below 1 it cannot tip.
 
-    The explicit fraction is the wear step over the limit of explicit integration.
+    The load is the mean pressure over the stiffer body's modulus. The nodes' places are rounded to 1e-14 mm, which
+    is nothing beside the indentation only where the load is not too small.
     """
 
     example: int = 1
@@ -68,11 +69,16 @@ class Parameters:
     poisson: tuple[float, float] = (0.23, 0.3)
     pins: tuple[int, int] = (20, 80)
     lever: float = 0.2
-    force: float = 1e4
+    load: float = 1e-4
     amplitude: float = 1.5
     frequency: float = 10.0
     coefficient: float = 4e-8
     heat: HeatParameters | None = None
+
+    @property
+    def force(self) -> float:
+        """Force on the punch, N."""
+        return self.load * max(self.young) * 2 * HALF_WIDTH * self.thickness
 
     @property
     def friction(self) -> float:
@@ -142,18 +148,25 @@ def fractions(high: float) -> st.SearchStrategy[float]:
 
 
 HEIGHTS = st.integers(1, 19).map(lambda k: 5 * k)
-HEATS = st.builds(
-    HeatParameters,
-    partition=fractions(1.0),
-    debris=fractions(0.8),
-    conductance=st.one_of(st.just(0.0), floats(1e-3, 10), st.just("perfect")),
-    conducting=st.sampled_from(["closed", "nominal"]),
-    convection=st.one_of(st.just(0.0), floats(1e-3, 1)),
-    conductivity=floats(1, 100),
-    expansion=floats(1e-7, 3e-5),
-    steps=st.integers(1, 4),
-    operator=st.sampled_from(["full", "reduced"]),
-)
+
+
+def heats(*operators: str) -> st.SearchStrategy[HeatParameters]:
+    """Return heats; the reduced operator keeps balances, but its basis is exact to its own tolerance only."""
+    return st.builds(
+        HeatParameters,
+        partition=fractions(1.0),
+        debris=fractions(0.8),
+        conductance=st.one_of(st.just(0.0), floats(1e-3, 10), st.just("perfect")),
+        conducting=st.sampled_from(["closed", "nominal"]),
+        convection=st.one_of(st.just(0.0), floats(1e-3, 1)),
+        conductivity=floats(1, 100),
+        expansion=floats(1e-7, 3e-5),
+        steps=st.integers(1, 4),
+        operator=st.sampled_from(operators),
+    )
+
+
+HEATS, WITH_OR_WITHOUT = heats("full", "reduced"), st.one_of(st.none(), heats("full"))
 
 
 def problems(heat: st.SearchStrategy[Any] = st.none(), lever: float = 0.9) -> st.SearchStrategy[Parameters]:  # noqa: B008
@@ -169,10 +182,10 @@ def problems(heat: st.SearchStrategy[Any] = st.none(), lever: float = 0.9) -> st
         poisson=st.tuples(fractions(0.45), fractions(0.45)),
         pins=st.tuples(HEIGHTS, HEIGHTS),
         lever=fractions(lever),
-        force=floats(1, 1e5),
+        load=floats(1e-5, 1e-2),
         amplitude=floats(1e-2, 10),
         frequency=floats(0.1, 100),
-        coefficient=floats(1e-10, 1e-6),
+        coefficient=floats(1e-10, 1e-7),
         heat=heat,
     )
 
@@ -252,7 +265,7 @@ def test_steady_state(parameters: Parameters, one_way: bool) -> None:
         np.testing.assert_allclose(centre, arm, rtol=0, atol=1e-7 * HALF_WIDTH)
 
 
-@given(problems(st.one_of(st.none(), HEATS), lever=0.7))
+@given(problems(WITH_OR_WITHOUT, lever=0.7))
 def test_mirror_image(parameters: Parameters) -> None:
     """Pins on the other side and the strip moving the other way: the mirrored state in every half-cycle."""
     parameters = replace(parameters, example=1)
@@ -275,7 +288,7 @@ def test_mirror_image(parameters: Parameters) -> None:
 SCALES = floats(1e-3, 1e3)
 
 
-@given(problems(st.one_of(st.none(), HEATS), lever=0.7), st.builds(Units, SCALES, SCALES, SCALES, SCALES))
+@given(problems(WITH_OR_WITHOUT, lever=0.7), st.builds(Units, SCALES, SCALES, SCALES, SCALES))
 def test_units(parameters: Parameters, units: Units) -> None:
     """The same problem in other units of length, force, time and temperature has the same answer in those units."""
     system, other = parameters.system(), parameters.system(units=units)
@@ -300,7 +313,6 @@ def test_stiffer_and_more_loaded(parameters: Parameters, factor: float) -> None:
     stiff = replace(
         parameters,
         young=(parameters.young[0] * factor, parameters.young[1] * factor),
-        force=parameters.force * factor,
         coefficient=parameters.coefficient / factor,
     )
     one, two = (run(p.system(), 4, implicit=True) for p in (parameters, stiff))
@@ -310,7 +322,7 @@ def test_stiffer_and_more_loaded(parameters: Parameters, factor: float) -> None:
 
 @pytest.mark.mpi
 @settings(derandomize=True, max_examples=6)  # all ranks draw the same, whatever the profile
-@given(problems(st.one_of(st.none(), HEATS), lever=0.45))
+@given(problems(WITH_OR_WITHOUT, lever=0.45))
 def test_ranks(parameters: Parameters) -> None:
     """Verification 18: each rank on its own and all together give the same numbers to 1e-9."""
     alone, together = (parameters.system(comm=comm) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))

@@ -294,7 +294,8 @@ def test_units(parameters: Parameters, units: Units) -> None:
     system, other = parameters.system(), parameters.system(units=units)
     one, two = run(system, 3, implicit=True), run(other, 3, implicit=True)
     note(f"contact width {one.contact_width}")
-    np.testing.assert_allclose(other.facing.x / units.length, system.facing.x, rtol=0, atol=1e-9 * HALF_WIDTH)
+    # gmsh places the nodes of graded lines by an integral of its own tolerance, 2e-8 of the length.
+    np.testing.assert_allclose(other.facing.x / units.length, system.facing.x, rtol=0, atol=1e-7 * HALF_WIDTH)
 
     def same(found: Array, expected: Array, unit: float) -> None:
         np.testing.assert_allclose(found / unit, expected, rtol=0, atol=1e-6 * max(np.abs(expected).max(), 1e-300))

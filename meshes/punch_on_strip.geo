@@ -42,7 +42,7 @@ EndIf
 // From the middle of the contact to its edge: half the elements, shrinking in geometric progression.
 half_width = punch_width / 2;
 half_count = elements_along_contact / 2;
-contact_ratio = (half_count > 1) ? edge_grading ^ (-1 / (half_count - 1)) : 1;
+contact_ratio = edge_grading ^ (-1 / ((half_count > 1) ? half_count - 1 : 1)); // both branches are evaluated: no 1 / 0
 edge_size = 0;
 For i In {0 : half_count - 1}
   edge_size += contact_ratio ^ (-i);

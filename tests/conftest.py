@@ -15,10 +15,18 @@ from typing import Any
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
 
 import pytest
+from hypothesis import HealthCheck, settings
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear import Case, System, load_case, make_case
+
+# The same examples on every machine and every rank; --hypothesis-profile=search looks for others.
+settings.register_profile(
+    "same", derandomize=True, database=None, deadline=None, max_examples=12, suppress_health_check=list(HealthCheck)
+)
+settings.register_profile("search", settings.get_profile("same"), derandomize=False, max_examples=200)
+settings.load_profile("same")
 
 Edit = Callable[[dict[str, Any]], object]
 

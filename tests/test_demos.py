@@ -21,6 +21,7 @@ NAMES = [
     "03_heat_and_instability",
     "04_mpi_and_restart",
     "05_own_material_and_geometry",
+    "06_the_paper",
 ]
 SECONDS = 300
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 
@@ -30,6 +31,17 @@ class CaseError(FenwearError):
 
 class ConvergenceError(FenwearError):
     """A solver did not converge; names the solver, the reason and what may help."""
+
+
+class OutputError(FenwearError):
+    """A file of the results cannot be written: names it, the reason and, in a run, how to go on."""
+
+    def __init__(self, path: Path, reason: str, how_to_go_on: str = "") -> None:
+        self.path, self.reason, self.how_to_go_on = path, reason, how_to_go_on
+        super().__init__("\n".join(filter(None, (f"{path} cannot be written: {reason}", how_to_go_on))))
+
+    def __reduce__(self) -> tuple[type[OutputError], tuple[Path, str, str]]:
+        return type(self), (self.path, self.reason, self.how_to_go_on)  # crosses ranks by pickle
 
 
 class InterruptedRunError(FenwearError):

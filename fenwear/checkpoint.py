@@ -123,7 +123,7 @@ def _read_temperature(folder: Path, body: HeatBody) -> Array:
     readable = True
     try:
         adios4dolfinx.read_function(folder / f"temperature_{body.body.name}.bp", function)
-    except (OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
+    except (KeyError, OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
         readable = False
     values = function.x.array[: body.owned].copy()
     if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):

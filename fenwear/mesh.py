@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from fenwear import compat
 from fenwear.case import Geometry
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, OutputError, Problem
 from fenwear.parallel import on_root
 
 BODIES = ("punch", "strip")
@@ -108,6 +108,7 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
 
     Raises:
         CaseError: as `build_meshes`; or `path` cannot be written.
+        OutputError: there is no room for it.
     """
     with _gmsh() as gmsh:
         _load(gmsh, geometry, find_geometry(geometry, folder))
@@ -116,6 +117,9 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
         except OSError as error:
             raise CaseError(Problem(str(path), f"cannot be written: {error.strerror}")) from None
         gmsh.write(str(path))
+        if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
+            path.unlink()
+            raise OutputError(path, "gmsh wrote only a part of it; is there room?")
 
 
 @contextmanager

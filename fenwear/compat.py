@@ -32,3 +32,9 @@ def collapse(space: FunctionSpace) -> tuple[FunctionSpace, NDArray[np.int32]]:
     """Return a component's own space, and the degree of freedom of the whole for each of its; in 0.11 in a list."""
     collapsed, to_whole = space.collapse()
     return collapsed, np.asarray(to_whole, dtype=np.int32).reshape(-1)
+
+
+def geometry_dofmap(mesh: Mesh) -> NDArray[np.int32]:
+    """Return the geometry's nodes of every cell (cells, nodes); from 0.11 on one such array per cell type."""
+    maps = getattr(mesh.geometry, "dofmaps", None)
+    return mesh.geometry.dofmap if maps is None else maps[0]

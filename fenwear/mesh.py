@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from fenwear import compat
 from fenwear.case import Geometry
 from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.mesh_check import element_problems
 from fenwear.parallel import on_root
 
 BODIES = ("punch", "strip")
@@ -208,6 +209,9 @@ def _check_groups(gmsh: Any, path: Path) -> None:
                 problems.append(Problem("geometry.file", f"{path.name}: physical group {name} has no elements"))
             if len(types) > 1:
                 problems.append(Problem("geometry.file", f"{path.name}: physical group {name} mixes element types"))
+    if not problems:
+        groups = [{n: t for n, t in _groups(gmsh, dim).items() if n.startswith(BODIES)} for dim in range(3)]
+        problems = [Problem("geometry.file", f"{path.name}: {text}") for text in element_problems(gmsh, groups)]
     if problems:
         raise CaseError(problems)
 

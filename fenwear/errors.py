@@ -18,11 +18,17 @@ class Problem(NamedTuple):
     message: str
 
 
+def _shortened(text: str, length: int = 500) -> str:
+    """Return a text that may repeat what a file holds, however long that is, as long as people read."""
+    return text if len(text) <= length else f"{text[: length - 50]} ... ({len(text):,} characters)"
+
+
 class CaseError(FenwearError):
     """The case, its geometry or the usage is wrong; lists every problem found."""
 
     def __init__(self, problems: Sequence[Problem] | Problem) -> None:
-        self.problems = [problems] if isinstance(problems, Problem) else list(problems)
+        found = [problems] if isinstance(problems, Problem) else problems
+        self.problems = [Problem(_shortened(p.key), _shortened(p.message)) for p in found]
         super().__init__("\n".join(f"{p.key}: {p.message}" if p.key else p.message for p in self.problems))
 
     def __reduce__(self) -> tuple[type[CaseError], tuple[list[Problem]]]:

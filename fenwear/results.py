@@ -127,6 +127,7 @@ class HistoryWriter:
         self._pending: list[dict[str, NDArray[Any]]] = []
         self._last: dict[str, NDArray[Any]] | None = None
         self._due = time.monotonic() + SECONDS_BETWEEN_WRITES
+        self._seconds_of_copying = 0.0
         self.rows = self._twin_rows = 0
         with writing(self.path):
             for left_by_a_killed_run in (self._twin, self._spare):
@@ -212,7 +213,7 @@ class HistoryWriter:
         Raises:
             OutputError: as `add`.
         """
-        begin = time.monotonic()
+        self._seconds_of_copying = 0.0
         joined = {n: np.concatenate([rows[n] for rows in self._pending]) for n in self._variables if self._pending}
         if len(joined.get("half_cycle", ())):
             with writing(self.path):
@@ -222,8 +223,8 @@ class HistoryWriter:
                     self._twin.unlink(missing_ok=True)
                     raise
         self._pending = []
-        now = time.monotonic()
-        self._due = now + max(SECONDS_BETWEEN_WRITES, 20 * (now - begin))
+        # A copy grows with the file: let it cost a small share of the time only.
+        self._due = time.monotonic() + max(SECONDS_BETWEEN_WRITES, 20 * self._seconds_of_copying)
 
     def _write(self, values: dict[str, NDArray[Any]]) -> None:
         count = self.rows + len(values["half_cycle"])
@@ -249,8 +250,10 @@ class HistoryWriter:
             return h5netcdf.File(self._twin, "a")
 
     def _copy(self) -> None:
+        begin = time.monotonic()
         shutil.copyfile(self.path, self._twin)
         self._twin_rows = self.rows
+        self._seconds_of_copying = time.monotonic() - begin
 
     def _bytes(self, rows: int) -> int:
         """Return what so many more rows take at most: whole chunks, and for each variable some nodes of an index."""

@@ -9,6 +9,7 @@ resident memory of the process and the size of what it has written.
 from __future__ import annotations
 
 import argparse
+import resource
 import subprocess
 import sys
 import tempfile
@@ -66,7 +67,9 @@ def main() -> int:
                     rate = number / (time.monotonic() - begin)
                     row = f"{number:12,} {rate:9,.0f} {resident(process.pid):11.0f} {size(folder):10.1f}"
                     print(row, flush=True)
-        print(f"exit status {process.returncode}, {time.monotonic() - begin:.0f} s, files {size(folder):.1f} MiB")
+        peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        print(f"exit status {process.returncode}, {time.monotonic() - begin:.0f} s, files {size(folder):.1f} MiB, "
+              f"largest memory {peak:.0f} MiB")  # fmt: skip
     return process.returncode
 
 

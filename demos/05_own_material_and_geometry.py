@@ -28,6 +28,7 @@ import xarray
 from matplotlib.collections import PolyCollection
 
 from fenwear import CaseError, System, make_case, steady
+from fenwear.compat import geometry_dofmap
 from fenwear.cycle import growth_rate
 from fenwear.figures import read_history
 from fenwear.run import run_case
@@ -200,7 +201,7 @@ system.prepare()
 colours = {"punch_lining": "#E69F00", "punch_back": "#56B4E9", "strip_rail": "0.8"}
 figure, ax = plt.subplots(figsize=(7.5, 3.4), layout="constrained")
 for body in (system.punch.body, system.strip.body):
-    points, corners = body.mesh.geometry.x[:, :2], body.mesh.geometry.dofmap
+    points, corners = body.mesh.geometry.x[:, :2], geometry_dofmap(body.mesh)
     for region, tag in body.regions.items():
         cells = corners[body.cell_tags.find(tag)]
         ax.add_collection(PolyCollection(points[cells], facecolor=colours[region], edgecolor="0.3", linewidth=0.4))

@@ -41,11 +41,11 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
     return arguments[:at], arguments[at + 1 :]
 
 
-def _call(arguments: list[str], comm: MPI.Comm) -> int:  # noqa: PLR0911
+def _call(arguments: list[str], comm: MPI.Comm) -> int:
     import click
 
     from fenwear.cli import app
-    from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError
+    from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError
 
     try:
         result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
@@ -60,18 +60,18 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:  # noqa: PLR0911
     except ConvergenceError as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 3
-    except InterruptedRunError as error:
+    except (InterruptedRunError, OutputError) as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 1
     except (click.Abort, KeyboardInterrupt):
         print("fenwear: interrupted", file=sys.stderr)
-        return 1
     except Exception:
-        # Another rank may wait in a collective call for this one: end them all.
         traceback.print_exc(file=sys.__stderr__)
-        if comm.size > 1:
-            comm.Abort(1)
-        return 1
+    # Another rank may wait in a collective call for this one: end them all.
+    if comm.size > 1:
+        sys.stderr.flush()
+        comm.Abort(1)
+    return 1
 
 
 if __name__ == "__main__":

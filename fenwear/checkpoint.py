@@ -9,15 +9,21 @@ from __future__ import annotations
 import os
 import shutil
 import tomllib
+import zipfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import adios4dolfinx
 import numpy as np
+from mpi4py import MPI
 
+from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
-from fenwear.errors import CaseError, Problem
+from fenwear.disk import check_room, writing, writing_together
+from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.system import System
@@ -25,26 +31,53 @@ from fenwear.wear import Worn
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS = "case.toml", "moment.npz"
+NUMBERS, WEAR, STATES = (
+    ("half_cycle", "jump_length", "periodic_phases"),
+    ("wear", "wear_strip"),
+    ("pressure", "gap", "rigid"),
+)
+FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
+BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
 # A run may go on farther than it was meant to, and keep other things.
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "title")
 
 
 def save(directory: Path, system: System, exchange: HeatExchange | None, moment: Moment) -> None:
-    """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one."""
+    """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
+
+    Raises:
+        OutputError: it cannot be written; the old one stays.
+    """
+    try:
+        _save(directory, system, exchange, moment)
+    except OutputError:  # on all ranks
+        on_root(system.comm, lambda: shutil.rmtree(directory / NEW, ignore_errors=True))
+        raise
+
+
+def _save(directory: Path, system: System, exchange: HeatExchange | None, moment: Moment) -> None:
     comm, new = system.comm, directory / NEW
     on_root(comm, lambda: _begin(new, system, moment))
     if exchange is not None and moment.temperature is not None and system.heat_bodies is not None:
         temperatures = exchange.temperatures(moment.temperature)
         for body, values in zip(system.heat_bodies, temperatures, strict=True):
-            path = new / f"temperature_{body.body.name}.bp"
-            adios4dolfinx.write_function_on_input_mesh(path, body.function(values))
+            path, function = new / f"temperature_{body.body.name}.bp", body.function(values)
+            size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
+            on_root(comm, partial(check_room, new, size))
+            with writing_together(comm, path):
+                adios4dolfinx.write_function_on_input_mesh(path, function)
     comm.Barrier()
     on_root(comm, lambda: _swap(directory))
 
 
 def _begin(new: Path, system: System, moment: Moment) -> None:
-    shutil.rmtree(new, ignore_errors=True)
-    new.mkdir()
+    with writing(new):
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir()
+        _write(new, system, moment)
+
+
+def _write(new: Path, system: System, moment: Moment) -> None:
     (new / CASE).write_text(system.case.to_toml(), "utf-8")
     n, r = len(system.facing.weights), len(system.statics.resultant)
     empty = ContactState(np.full((1, n), np.nan), np.full((1, n), np.nan), np.full((1, r), np.nan), 0)
@@ -52,20 +85,17 @@ def _begin(new: Path, system: System, moment: Moment) -> None:
     with (new / ARRAYS).open("wb") as file:
         np.savez(
             file,
-            half_cycle=moment.half_cycle,
-            wear=moment.worn.punch,
-            wear_strip=moment.worn.strip,
-            **({} if system.followed is None else _followed_arrays(system.followed)),
-            jump_length=moment.jump_length,
-            periodic_phases=moment.periodic_phases,
-            **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in ("pressure", "gap", "rigid")},
+            **{name: getattr(moment, name) for name in NUMBERS},
+            **_depths(WEAR, moment.worn),
+            **({} if system.followed is None else _depths(FOLLOWED, system.followed)),
+            **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
         )
         file.flush()
         os.fsync(file.fileno())
 
 
-def _followed_arrays(worn: Worn) -> dict[str, Any]:
-    return {"followed_punch": worn.punch, "followed_strip": worn.strip}
+def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
+    return dict(zip(names, (worn.punch, worn.strip), strict=True))
 
 
 def followed(directory: Path, system: System) -> Worn | None:
@@ -75,44 +105,57 @@ def followed(directory: Path, system: System) -> Worn | None:
         CaseError: there is no checkpoint, or it is of another case.
     """
     arrays = on_root(system.comm, lambda: _read(_find(directory), system))
-    if "followed_punch" not in arrays:
-        return None
-    return Worn(arrays["followed_punch"], arrays["followed_strip"])
+    return Worn(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
 
 
 def _swap(directory: Path) -> None:
     new, current, old = (directory / name for name in (NEW, FOLDER, OLD))
-    shutil.rmtree(old, ignore_errors=True)
-    if current.exists():
-        current.rename(old)
-    new.rename(current)
-    shutil.rmtree(old, ignore_errors=True)
+    with writing(current):
+        shutil.rmtree(old, ignore_errors=True)
+        if current.exists():
+            current.rename(old)
+        new.rename(current)
+        shutil.rmtree(old, ignore_errors=True)
 
 
 def load(directory: Path, system: System, exchange: HeatExchange | None) -> Moment:
     """Return the moment of a run's checkpoint; collective.
 
     Raises:
-        CaseError: there is no checkpoint, or it is of another case; names the differences.
+        CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
     comm = system.comm
     folder = on_root(comm, lambda: _find(directory))
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if exchange is not None and system.heat_bodies is not None:
-        values = []
-        for body in system.heat_bodies:
-            function = body.function(body.initial())
-            adios4dolfinx.read_function(folder / f"temperature_{body.body.name}.bp", function)
-            values.append(function.x.array[: body.owned].copy())
-        temperature = exchange.state((values[0], values[1]))
+        punch, strip = (_read_temperature(folder, body) for body in system.heat_bodies)
+        temperature = exchange.state((punch, strip))
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
     numbers = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
-    worn = Worn(arrays["wear"], arrays["wear_strip"])
+    worn = Worn(*(arrays[name] for name in WEAR))
     return Moment(int(arrays["half_cycle"]), worn, contacts, temperature, *numbers)
+
+
+def _read_temperature(folder: Path, body: HeatBody) -> Array:
+    """Return the temperatures of this rank's own nodes of a body; collective."""
+    comm, function = body.body.mesh.comm, body.function(body.initial())
+    readable = True
+    try:
+        adios4dolfinx.read_function(folder / f"temperature_{body.body.name}.bp", function)
+    except (KeyError, OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
+        readable = False
+    values = function.x.array[: body.owned].copy()
+    if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):
+        raise _damaged(folder)
+    return values
+
+
+def _damaged(folder: Path) -> CaseError:
+    return CaseError(Problem("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
 
 
 def _find(directory: Path) -> Path:
@@ -122,8 +165,28 @@ def _find(directory: Path) -> Path:
     raise CaseError(Problem("--resume", f"no checkpoint in {directory}"))
 
 
+def reached(directory: Path) -> int | None:
+    """Return the half-cycle of the checkpoint in a run's folder; None where there is none to go on from."""
+    try:
+        return int(_arrays(_find(directory))["half_cycle"])
+    except CaseError:
+        return None
+
+
+def _arrays(folder: Path) -> dict[str, Any]:
+    try:
+        with np.load(folder / ARRAYS) as arrays:
+            followed = FOLLOWED if FOLLOWED[0] in arrays else ()
+            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *STATES, *followed)}
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+        raise _damaged(folder) from None
+
+
 def _read(folder: Path, system: System) -> dict[str, Any]:
-    saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
+    try:
+        saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
+    except (OSError, ValueError):
+        raise _damaged(folder) from None
     present = _flat(tomllib.loads(system.case.to_toml()))
     keys = sorted({*saved, *present})
     problems = [
@@ -133,8 +196,11 @@ def _read(folder: Path, system: System) -> dict[str, Any]:
     ]
     if problems:
         raise CaseError([Problem("--resume", "the checkpoint is of another case"), *problems])
-    with np.load(folder / ARRAYS) as arrays:
-        return {name: arrays[name] for name in arrays.files}
+    arrays = _arrays(folder)
+    for name, unworn in _depths(WEAR, system.unworn()).items():
+        if arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all():
+            raise _damaged(folder)
+    return arrays
 
 
 def _flat(tables: Any, path: str = "") -> dict[str, Any]:

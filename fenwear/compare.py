@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray
 
+from fenwear.disk import writing
 from fenwear.errors import CaseError, Problem
 from fenwear.figures import directions_present, mark_few, read_history
 from fenwear.key_numbers import flat, number_text, read_case, read_summary
@@ -127,14 +128,17 @@ def draw_comparison(comparison: Comparison, path: Path) -> Path:
     """Write the figure.
 
     Raises:
-        CaseError: the file's ending is unknown, or it cannot be written.
+        CaseError: the file's ending is unknown, or its folder takes no file.
+        OutputError: there is no room for it.
     """
     if path.suffix not in FORMATS:
         raise CaseError(Problem("-o", f"expected a file ending in {', '.join(FORMATS)}, got {str(path)!r}"))
     try:
-        comparison_figure(comparison).savefig(path, dpi=150)
+        path.touch()
     except OSError as error:
         raise CaseError(Problem("-o", f"{path} cannot be written: {error.strerror}")) from None
+    with writing(path):
+        comparison_figure(comparison).savefig(path, dpi=150)
     return path
 
 

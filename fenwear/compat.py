@@ -5,8 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import dolfinx.io
+import numpy as np
+from dolfinx.fem import FunctionSpace
 from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 
 def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags, MeshTags]:
@@ -23,3 +26,15 @@ def interpolation_points(space: Any) -> Any:
     """Return the points that functions are interpolated at; a method up to dolfinx 0.9, then a property."""
     points = space.element.interpolation_points
     return points() if callable(points) else points
+
+
+def collapse(space: FunctionSpace) -> tuple[FunctionSpace, NDArray[np.int32]]:
+    """Return a component's own space, and the degree of freedom of the whole for each of its; in 0.11 in a list."""
+    collapsed, to_whole = space.collapse()
+    return collapsed, np.asarray(to_whole, dtype=np.int32).reshape(-1)
+
+
+def geometry_dofmap(mesh: Mesh) -> NDArray[np.int32]:
+    """Return the geometry's nodes of every cell (cells, nodes); from 0.11 on one such array per cell type."""
+    maps = getattr(mesh.geometry, "dofmaps", None)
+    return mesh.geometry.dofmap if maps is None else maps[0]

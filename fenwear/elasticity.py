@@ -15,6 +15,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from fenwear import compat
 from fenwear.case import Body, Load, Material, Model, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.mesh import BodyMesh
@@ -160,7 +161,7 @@ class ElasticBody:
             facets = body.facet_tags.find(body.curves[support.on])
             return fem.locate_dofs_topological(sub, body.mesh.topology.dim - 1, facets)
         points = _support_points(body, support, key)
-        collapsed, to_parent = sub.collapse()
+        collapsed, to_parent = compat.collapse(sub)
         x = collapsed.tabulate_dof_coordinates()[:, : points.shape[1]]
         distance = np.linalg.norm(x[:, None] - points[None], axis=2)
         tolerance = 1e-6 * self._size()
@@ -169,7 +170,7 @@ class ElasticBody:
         if len(missing):
             place = ", ".join(f"({p[0]:g}, {p[1]:g})" for p in missing)
             raise CaseError(Problem(f"{key}.at", f"a pin off the {body.name}: no node of its mesh at {place} mm"))
-        return np.asarray(to_parent, dtype=np.int32)[(distance < tolerance).any(axis=1)]
+        return to_parent[(distance < tolerance).any(axis=1)]
 
     def _size(self) -> float:
         """Return the largest extent of the body, mm; collective."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 
@@ -17,11 +18,17 @@ class Problem(NamedTuple):
     message: str
 
 
+def _shortened(text: str, length: int = 500) -> str:
+    """Return a text that may repeat what a file holds, however long that is, as long as people read."""
+    return text if len(text) <= length else f"{text[: length - 50]} ... ({len(text):,} characters)"
+
+
 class CaseError(FenwearError):
     """The case, its geometry or the usage is wrong; lists every problem found."""
 
     def __init__(self, problems: Sequence[Problem] | Problem) -> None:
-        self.problems = [problems] if isinstance(problems, Problem) else list(problems)
+        found = [problems] if isinstance(problems, Problem) else problems
+        self.problems = [Problem(_shortened(p.key), _shortened(p.message)) for p in found]
         super().__init__("\n".join(f"{p.key}: {p.message}" if p.key else p.message for p in self.problems))
 
     def __reduce__(self) -> tuple[type[CaseError], tuple[list[Problem]]]:
@@ -30,6 +37,17 @@ class CaseError(FenwearError):
 
 class ConvergenceError(FenwearError):
     """A solver did not converge; names the solver, the reason and what may help."""
+
+
+class OutputError(FenwearError):
+    """A file of the results cannot be written: names it, the reason and, in a run, how to go on."""
+
+    def __init__(self, path: Path, reason: str, how_to_go_on: str = "") -> None:
+        self.path, self.reason, self.how_to_go_on = path, reason, how_to_go_on
+        super().__init__("\n".join(filter(None, (f"{path} cannot be written: {reason}", how_to_go_on))))
+
+    def __reduce__(self) -> tuple[type[OutputError], tuple[Path, str, str]]:
+        return type(self), (self.path, self.reason, self.how_to_go_on)  # crosses ranks by pickle
 
 
 class InterruptedRunError(FenwearError):

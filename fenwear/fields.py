@@ -21,12 +21,15 @@ from dolfinx import fem
 
 from fenwear.arrays import Array
 from fenwear.compat import interpolation_points
+from fenwear.disk import check_room, writing, writing_together
 from fenwear.elasticity import ElasticBody, strain, stress
 from fenwear.heat.conduction import HeatBody
+from fenwear.parallel import on_root
 from fenwear.surface import SurfaceNodes
 from fenwear.system import System
 
 FOLDER = "fields"
+BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
 AXES = ("x", "z")
 
 
@@ -161,12 +164,15 @@ def write_fields(
     fields: tuple[BodyFields, BodyFields],
     direction: int,
 ) -> None:
-    """Write the fields of a half-cycle into `directory`/fields; collective."""
+    """Write the fields of a half-cycle into `directory`/fields; collective.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
     comm = system.comm
     folder = directory / FOLDER
-    if comm.rank == 0:
-        folder.mkdir(exist_ok=True)
-    comm.Barrier()
+    nodes = sum(body.space.dofmap.index_map.size_global for body in (system.punch, system.strip))
+    on_root(comm, lambda: _make_folder(folder, BYTES_PER_NODE * nodes + BYTES_PER_RANK * comm.size))
     stem = f"half_cycle_{half_cycle:06d}"
     data: dict[str, Any] = {}
     for elastic, body in zip((system.punch, system.strip), fields, strict=True):
@@ -174,19 +180,30 @@ def write_fields(
         functions = [f for f in (body.displacement, body.von_mises, body.temperature, body.heat_flux) if f is not None]
         _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
         data.update(_gathered(name, elastic, functions))
-    if comm.rank == 0:
-        attributes = {
-            "half_cycle": half_cycle,
-            "direction": direction,
-            "time": float(system.motion.time(np.array(half_cycle))),
-        }
-        dataset = xarray.Dataset(data, attrs=attributes)
-        part = folder / f"{stem}.part"
+    time = float(system.motion.time(np.array(half_cycle)))
+    attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
+    on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
+
+
+def _make_folder(folder: Path, size: int) -> None:
+    with writing(folder):
+        folder.mkdir(exist_ok=True)
+    check_room(folder, size)
+
+
+def _write_nodal(dataset: xarray.Dataset, path: Path) -> None:
+    part = path.with_suffix(".part")
+    with writing(path):
         dataset.to_netcdf(part, engine="h5netcdf")
-        part.replace(folder / f"{stem}.nc")
+        part.replace(path)
 
 
 def _write_for_paraview(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
+    with writing_together(elastic.body.mesh.comm, stem):
+        _write_vtx_or_xdmf(stem, elastic, functions)
+
+
+def _write_vtx_or_xdmf(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
     comm = elastic.body.mesh.comm
     if dolfinx.has_adios2:
         with dolfinx.io.VTXWriter(comm, str(stem.with_suffix(".bp")), functions, engine="BP4") as writer:

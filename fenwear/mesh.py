@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from fenwear import compat
 from fenwear.case import Geometry
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.mesh_check import element_problems
 from fenwear.parallel import on_root
 
 BODIES = ("punch", "strip")
@@ -110,6 +111,7 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
 
     Raises:
         CaseError: as `build_meshes`; or `path` cannot be written.
+        OutputError: there is no room for it.
     """
     with _gmsh() as gmsh:
         _load(gmsh, geometry, find_geometry(geometry, folder))
@@ -118,6 +120,9 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
         except OSError as error:
             raise CaseError(Problem(str(path), f"cannot be written: {error.strerror}")) from None
         gmsh.write(str(path))
+        if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
+            path.unlink()
+            raise OutputError(path, "gmsh wrote only a part of it; is there room?")
 
 
 @contextmanager
@@ -212,6 +217,9 @@ def _check_groups(gmsh: Any, path: Path) -> None:
                 problems.append(Problem("geometry.file", f"{path.name}: physical group {name} has no elements"))
             if len(types) > 1:
                 problems.append(Problem("geometry.file", f"{path.name}: physical group {name} mixes element types"))
+    if not problems:
+        groups = [{n: t for n, t in _groups(gmsh, dim).items() if n.startswith(BODIES)} for dim in range(3)]
+        problems = [Problem("geometry.file", f"{path.name}: {text}") for text in element_problems(gmsh, groups)]
     if problems:
         raise CaseError(problems)
 

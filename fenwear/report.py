@@ -10,7 +10,8 @@ from typing import Any
 
 import xarray
 
-from fenwear.errors import CaseError
+from fenwear.disk import write_text, writing
+from fenwear.errors import CaseError, OutputError
 from fenwear.figures import FOLDER, draw_figures, read_history
 from fenwear.html_page import document, escape, figure, section
 from fenwear.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
@@ -49,7 +50,13 @@ def write_report(
 
     Raises:
         CaseError: the folder holds no run.
+        OutputError: a figure or the page cannot be written.
     """
+    with writing(directory):
+        return _write_report(directory, log, complete)
+
+
+def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
     case = read_case(directory)
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
     if complete:
@@ -61,9 +68,7 @@ def write_report(
         except DrawingError as error:
             log(f"warning: {error}")
     report = directory / REPORT
-    part = report.with_suffix(".part")
-    part.write_text(page(directory), "utf-8")
-    part.replace(report)
+    write_text(report, page(directory))
     return [*paths, report]
 
 
@@ -71,7 +76,7 @@ def try_report(directory: Path, log: Callable[[str], None]) -> None:
     """Write the report of a run whose results are safe already: what fails here is a warning."""
     try:
         write_report(directory, log)
-    except (CaseError, ImportError, OSError, RuntimeError, ValueError) as error:
+    except (CaseError, OutputError, ImportError, OSError, RuntimeError, ValueError) as error:
         log(f"warning: no report of the run: {error}; to try again: python -m fenwear plot {directory}")
 
 

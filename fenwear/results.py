@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import time
 from pathlib import Path
@@ -12,8 +13,10 @@ import h5netcdf
 import numpy as np
 from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.cycle import Block
+from fenwear.disk import check_room, claim, write_text, writing
 from fenwear.errors import CaseError, Problem
 from fenwear.heat.exchange import TERMS
 from fenwear.system import System
@@ -21,6 +24,8 @@ from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 SECONDS_BETWEEN_WRITES = 2.0
+CHUNK = 256  # rows that a variable's storage grows by
+INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
 
 # name: (dimensions, units, long_name); a Block has an attribute of each name
 VARIABLES = {
@@ -71,6 +76,20 @@ def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
     return {**variables, **HEAT_VARIABLES, **terms}
 
 
+def _coordinates(system: System) -> dict[str, tuple[str, Array, str]]:
+    """Return, by name, what does not change in a run: its dimension, values (mm) and long name."""
+    facing = system.facing
+    coordinates = {
+        "x": ("x", facing.x, "position along the contact, from the centre of the geometry"),
+        "weight": ("x", facing.weights, "length that each contact node stands for"),
+    }
+    if system.case.wear.strip is not None:
+        along = "position along the strip, on its material, as x in the middle position"
+        coordinates["x_strip"] = ("x_strip", facing.strip.x[:, 0], along)
+        coordinates["weight_strip"] = ("x_strip", facing.strip.weights, "length that each node stands for")
+    return coordinates
+
+
 def _values(block: Block, name: str) -> NDArray[Any]:
     """Return the values of a variable over a block's half-cycles."""
     if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
@@ -111,60 +130,78 @@ def free_directory(stem: Path) -> Path:
 class HistoryWriter:
     """Writes blocks of half-cycles to history.nc, every few seconds; for one rank.
 
-    Each write goes to a copy that then takes the file's place: it is whole and readable at any moment.
+    history.nc has a twin that lags one write behind. A write brings the twin up to date, and the two
+    change places: history.nc is whole and readable at any moment, and no write costs more in a long run.
     """
 
     def __init__(self, directory: Path, system: System, resumed_after: int | None = None) -> None:
-        """Begin a history, or go on with the one of a run that is resumed after a half-cycle."""
-        self.path = directory / HISTORY
+        """Begin a history, or go on with the one of a run that is resumed after a half-cycle.
+
+        Raises:
+            CaseError: the history to go on with cannot be read.
+            OutputError: it cannot be written.
+        """
+        self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
         self._variables = _variables(system.case)
+        self._coordinates = _coordinates(system)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
         self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
         self._pending: list[dict[str, NDArray[Any]]] = []
         self._last: dict[str, NDArray[Any]] | None = None
         self._due = time.monotonic() + SECONDS_BETWEEN_WRITES
-        self.rows = 0
-        if resumed_after is None:
-            self._create(system)
-        else:
-            self._cut(resumed_after)
-
-    def _cut(self, half_cycle: int) -> None:
-        """Drop what a killed run wrote after its last checkpoint."""
-        with h5netcdf.File(self.path, "a") as file:
-            self.rows = int(np.searchsorted(file["half_cycle"][:], half_cycle, side="right"))
-            file.resize_dimension("half_cycle", self.rows)
+        self._seconds_of_copying = 0.0
+        self.rows = self._twin_rows = 0
+        with writing(self.path):
+            for left_by_a_killed_run in (self._twin, self._spare):
+                left_by_a_killed_run.unlink(missing_ok=True)
+            if resumed_after is None or not self.path.exists():
+                self._create(system)
+            else:
+                self._cut(resumed_after)
 
     def _create(self, system: System) -> None:
-        facing = system.facing
-        with h5netcdf.File(self.path, "w") as file:
+        coordinates = sum(values.nbytes for _, values, _ in self._coordinates.values())
+        check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + coordinates)
+        with h5netcdf.File(self._twin, "w") as file:
             file.attrs["title"] = system.case.title or "fenwear run"
             file.attrs["Conventions"] = "CF-1.11"
             file.attrs["case"] = system.case.to_toml()
             file.attrs["versions"] = json.dumps(versions())
-            coordinates = {
-                "x": ("x", facing.x, "position along the contact, from the centre of the geometry"),
-                "weight": ("x", facing.weights, "length that each contact node stands for"),
-            }
-            if system.case.wear.strip is not None:
-                along = "position along the strip, on its material, as x in the middle position"
-                coordinates["x_strip"] = ("x_strip", facing.strip.x[:, 0], along)
-                coordinates["weight_strip"] = ("x_strip", facing.strip.weights, "length that each node stands for")
-            sizes = {dimension: len(values) for dimension, values, _ in coordinates.values()}
+            sizes = self._sizes()
             file.dimensions = {"half_cycle": None, **sizes}
-            for name, (dimension, values, long_name) in coordinates.items():
+            for name, (dimension, values, long_name) in self._coordinates.items():
                 variable = file.create_variable(name, (dimension,), float)
                 variable[:] = values
                 variable.attrs.update(units="mm", long_name=long_name)
             for name, (dimensions, units, long_name) in self._variables.items():
                 kind = int if name in ("half_cycle", "direction", "coupling_iterations") else float
-                chunks = (256, *(sizes[d] for d in dimensions[1:]))
+                chunks = (CHUNK, *(sizes[d] for d in dimensions[1:]))
                 variable = file.create_variable(name, dimensions, kind, chunks=chunks)
                 variable.attrs.update(units=units, long_name=long_name)
+        self._twin.replace(self.path)
+
+    def _cut(self, half_cycle: int) -> None:
+        """Drop what a killed run wrote after its last checkpoint."""
+        try:
+            with h5netcdf.File(self.path, "r") as file:
+                stored = file["half_cycle"][:]
+        except (OSError, KeyError, RuntimeError):
+            message = "cannot be read; remove it to go on with a new one, which begins at the checkpoint"
+            raise CaseError(Problem(str(self.path), message)) from None
+        self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
+        if self.rows < len(stored):
+            self._copy()
+            with h5netcdf.File(self._twin, "a") as file:
+                file.resize_dimension("half_cycle", self.rows)
+            self._twin.replace(self.path)
 
     def add(self, block: Block) -> None:
-        """Take a block; write what has gathered if the last write is some seconds ago."""
+        """Take a block; write what has gathered if the last write is some seconds ago.
+
+        Raises:
+            OutputError: history.nc cannot be written; it stays as it was at the last write.
+        """
         rows = {name: _values(block, name) for name in self._variables}
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
@@ -174,35 +211,89 @@ class HistoryWriter:
             self.flush()
 
     def close(self) -> None:
-        """Write the rest, with the last cycle whatever `output.every` is."""
+        """Write the rest, with the last cycle whatever `output.every` is.
+
+        Raises:
+            OutputError: as `add`.
+        """
         if self._last is not None:
             seen = {int(n) for rows in self._pending for n in rows["half_cycle"]} | self._stored_tail()
             new = np.array([int(n) not in seen for n in self._last["half_cycle"]])
             self._pending.append({name: values[new] for name, values in self._last.items()})
         self.flush()
+        with writing(self._twin):
+            self._twin.unlink(missing_ok=True)
 
     def _stored_tail(self) -> set[int]:
-        with h5netcdf.File(self.path, "r") as file:
+        with writing(self.path), h5netcdf.File(self.path, "r") as file:
             return {int(n) for n in file["half_cycle"][max(0, self.rows - self._phases) :]}
 
     def flush(self) -> None:
-        """Write what has gathered."""
-        begin = time.monotonic()
+        """Write what has gathered.
+
+        Raises:
+            OutputError: as `add`.
+        """
+        self._seconds_of_copying = 0.0
         joined = {n: np.concatenate([rows[n] for rows in self._pending]) for n in self._variables if self._pending}
-        count = len(joined.get("half_cycle", ()))
-        if count:
-            part = self.path.with_suffix(".part")
-            shutil.copyfile(self.path, part)
-            with h5netcdf.File(part, "a") as file:
-                file.resize_dimension("half_cycle", self.rows + count)
-                for name, values in joined.items():
-                    file[name][self.rows : self.rows + count] = values
-            part.replace(self.path)
-            self.rows += count
+        if len(joined.get("half_cycle", ())):
+            with writing(self.path):
+                try:
+                    self._write(joined)
+                except (OSError, RuntimeError):
+                    self._twin.unlink(missing_ok=True)
+                    raise
         self._pending = []
-        # The copy grows with the file: let it cost a small share of the time only.
-        now = time.monotonic()
-        self._due = now + max(SECONDS_BETWEEN_WRITES, 20 * (now - begin))
+        # A copy grows with the file: let it cost a small share of the time only.
+        self._due = time.monotonic() + max(SECONDS_BETWEEN_WRITES, 20 * self._seconds_of_copying)
+
+    def _write(self, values: dict[str, NDArray[Any]]) -> None:
+        count = self.rows + len(values["half_cycle"])
+        with h5netcdf.File(self.path, "r") as stored, self._open_twin(count) as twin:
+            twin.resize_dimension("half_cycle", count)
+            for name in self._variables:
+                twin[name][self._twin_rows : self.rows] = stored[name][self._twin_rows : self.rows]
+                twin[name][self.rows : count] = values[name]
+        self._twin_rows, self.rows = self.rows, count
+        self._change_places()
+
+    def _open_twin(self, rows: int) -> h5netcdf.File:
+        """Open the twin, with room for so many rows in all."""
+        if not self._twin.exists():
+            self._copy()
+        claim(self._twin, self._bytes(rows - self._twin_rows))
+        try:
+            return h5netcdf.File(self._twin, "a")
+        except OSError:  # locked: someone still reads what was history.nc before the last write
+            self._twin.unlink()
+            self._copy()
+            claim(self._twin, self._bytes(rows - self._twin_rows))
+            return h5netcdf.File(self._twin, "a")
+
+    def _copy(self) -> None:
+        begin = time.monotonic()
+        shutil.copyfile(self.path, self._twin)
+        self._twin_rows = self.rows
+        self._seconds_of_copying = time.monotonic() - begin
+
+    def _sizes(self) -> dict[str, int]:
+        return {dimension: len(values) for dimension, values, _ in self._coordinates.values()}
+
+    def _bytes(self, rows: int) -> int:
+        """Return what so many more rows take at most: whole chunks, and for each variable some nodes of an index."""
+        chunks = (rows > 0) + -(-rows // CHUNK)
+        sizes = self._sizes()
+        values = sum(sizes[d[1]] if len(d) > 1 else 1 for d, _, _ in self._variables.values())
+        return chunks * CHUNK * 8 * values + (chunks // 16 + 1) * INDEX * len(self._variables)
+
+    def _change_places(self) -> None:
+        try:
+            os.link(self.path, self._spare)
+        except OSError:  # no hard links here: the next write makes a copy
+            self._twin.replace(self.path)
+            return
+        self._twin.replace(self.path)
+        self._spare.replace(self._twin)
 
 
 def summarise(system: System, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
@@ -271,9 +362,9 @@ def _heat_summary(system: System, last: Block, places: NDArray[Any]) -> dict[str
 
 def write_summary(directory: Path, summary: dict[str, Any]) -> None:
     """Write summary.json."""
-    (directory / SUMMARY).write_text(json.dumps(summary, indent=2) + "\n", "utf-8")
+    write_text(directory / SUMMARY, json.dumps(summary, indent=2) + "\n")
 
 
 def write_case(directory: Path, case: Case) -> None:
     """Write the resolved case.toml, which runs again as it is."""
-    (directory / CASE).write_text(case.to_toml(), "utf-8")
+    write_text(directory / CASE, case.to_toml())

@@ -18,12 +18,20 @@ from fenwear import checkpoint
 from fenwear.case import Case
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
-from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, Problem
 from fenwear.fields import body_fields, write_fields
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.report import try_report
-from fenwear.results import HistoryWriter, free_directory, make_directory, summarise, write_case, write_summary
+from fenwear.results import (
+    HISTORY,
+    HistoryWriter,
+    free_directory,
+    make_directory,
+    summarise,
+    write_case,
+    write_summary,
+)
 from fenwear.system import System
 
 Log = Callable[[str], None]
@@ -59,30 +67,42 @@ def run_case(
             nothing is written.
         ConvergenceError: a half-cycle failed; the results up to it are in the folder.
         InterruptedRunError: a signal ended the run; it can be resumed.
+        OutputError: a file cannot be written; what was written before it is whole.
     """
     begin = time.perf_counter()
     system = System(case, comm)
     system.prepare()
     setup = time.perf_counter() - begin
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
+    try:
+        return _run(system, directory, log, progress, setup, resume=resume), directory
+    except OutputError as error:
+        raise OutputError(error.path, error.reason, on_root(comm, lambda: _way_on(directory))) from error
+
+
+def _run(
+    system: System, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
+) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
-    begin = time.perf_counter()
     failure: Exception | None = None
-    stop = "all half-cycles done"
+    begin = time.perf_counter()
     try:
         run.march(progress)
     except (ConvergenceError, InterruptedRunError) as error:
-        stop, failure = str(error), error
+        failure = error
     times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
-    done = run.moment.half_cycle
-    if failure is None and done < case.run.half_cycles:
-        stop = "periodic"
-    summary = run.finish({"stop": stop, **times, "warnings": run.warnings})
+    summary = run.finish({"stop": run.stop(failure), **times, "warnings": run.warnings})
     if failure is not None:
-        again = ", to go on: --resume" if isinstance(failure, InterruptedRunError) else ""
-        message = f"{failure}\nthe results up to half-cycle {done} are in {run.directory}{again}"
-        raise type(failure)(message) from failure
-    return summary, run.directory
+        raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
+    return summary
+
+
+def _way_on(directory: Path) -> str:
+    """Say how to go on after a fault of the disk."""
+    reached = checkpoint.reached(directory)
+    if reached is None:
+        return "there is no checkpoint to go on from: mend the cause, then start anew in a new folder"
+    return f"mend the cause, then go on from the checkpoint of half-cycle {reached}: --resume"
 
 
 class _Run:
@@ -105,6 +125,8 @@ class _Run:
             on_root(self.comm, lambda: make_directory(directory))
         self.system = system
         on_root(self.comm, lambda: write_case(directory, self.case))
+        self.writer: HistoryWriter | None = None  # of rank 0
+        on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
         self.moment = start or Moment(0, system.unworn(), (), None)
         self.last: Block | None = None
@@ -115,13 +137,27 @@ class _Run:
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
         for warning in self.warnings:
             log(f"warning: {warning}")
-        after = None if start is None else start.half_cycle
-        self.writer = HistoryWriter(directory, system, after) if self.comm.rank == 0 else None
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
 
+    def _open_history(self, after: int | None) -> None:
+        if after is not None and not (self.directory / HISTORY).exists():
+            self.log(f"warning: {HISTORY} is gone from {self.directory}: a new one begins after half-cycle {after}")
+        self.writer = HistoryWriter(self.directory, self.system, after)
+
+    def _on_history(self, act: Callable[[HistoryWriter], None]) -> None:
+        """Let rank 0 write; collective, so that every rank knows of an error."""
+        writer = self.writer
+        on_root(self.comm, lambda: None if writer is None else act(writer))
+
     def march(self, progress: Progress) -> None:
-        """Compute all half-cycles; collective."""
+        """Compute all half-cycles; collective.
+
+        Raises:
+            ConvergenceError: a half-cycle failed.
+            InterruptedRunError: a signal has come; the checkpoint is written.
+            OutputError: a file cannot be written.
+        """
         last, done = self.case.run.half_cycles, self.moment.half_cycle
         with _Signals() as signals:
             for block in _with_progress(self._blocks(), last, done, self.comm, progress):
@@ -155,8 +191,7 @@ class _Run:
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
-        if self.writer is not None:
-            self.writer.add(block)
+        self._on_history(lambda writer: writer.add(block))
         if int(block.half_cycle[-1]) in self._fields_at:
             self._write_fields(block)
 
@@ -177,15 +212,26 @@ class _Run:
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
-        if self.writer is not None:
-            self.writer.flush()
+        self._on_history(HistoryWriter.flush)
         checkpoint.save(self.directory, self.system, self._exchange(self.system), self.moment)
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
 
+    def stop(self, failure: Exception | None) -> str:
+        """Return how the half-cycles ended."""
+        if failure is not None:
+            return str(failure)
+        return "all half-cycles done" if self.moment.half_cycle >= self.case.run.half_cycles else "periodic"
+
+    def results_so_far(self, failure: Exception) -> str:
+        """Say what there is after a run that ended early, and how to go on."""
+        if self.moment.half_cycle == 0:
+            return f"no half-cycle was done; {self.directory} can be removed"
+        how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
+        return f"the results up to half-cycle {self.moment.half_cycle} are in {self.directory}, to go on: --resume{how}"
+
     def finish(self, how: dict[str, Any]) -> dict[str, Any]:
         """Write what a run ends with, and return the summary; collective."""
-        if self.writer is not None:
-            self.writer.close()
+        self._on_history(HistoryWriter.close)
         if self.last is None:
             return {}
         if self.moment.half_cycle not in self._fields_at and self.case.output.fields_at is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -15,6 +16,7 @@ from dolfinx.mesh import CellType, Mesh, create_rectangle, locate_entities_bound
 from mpi4py import MPI
 
 from fenwear import CaseError, System, load_case
+from fenwear.compat import interpolation_points
 from fenwear.elasticity import lame, region_field, strain, stress
 from fenwear.mesh import BodyMesh, build_meshes
 
@@ -27,12 +29,16 @@ def solve(mesh: Mesh, degree: int, exact: Any, force: Any, moduli: Any) -> fem.F
     V = fem.functionspace(mesh, basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(2,)))
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     boundary = fem.Function(V)
-    boundary.interpolate(fem.Expression(exact, V.element.interpolation_points()))
+    boundary.interpolate(fem.Expression(exact, interpolation_points(V)))
     facets = locate_entities_boundary(mesh, 1, lambda x: np.full(x.shape[1], True))
     bc = fem.dirichletbc(boundary, fem.locate_dofs_topological(V, 1, facets))
     a = ufl.inner(stress(u, *moduli), strain(v)) * ufl.dx
     options = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
-    return fem.petsc.LinearProblem(a, ufl.inner(force, v) * ufl.dx, bcs=[bc], petsc_options=options).solve()
+    # Required from dolfinx 0.10 on, not known before.
+    known = "petsc_options_prefix" in inspect.signature(fem.petsc.LinearProblem).parameters
+    prefix = {"petsc_options_prefix": "fenwear_exact_"} if known else {}
+    problem = fem.petsc.LinearProblem(a, ufl.inner(force, v) * ufl.dx, bcs=[bc], petsc_options=options, **prefix)
+    return problem.solve()
 
 
 def norm(expression: Any) -> float:

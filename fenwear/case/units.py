@@ -38,7 +38,10 @@ def convert(value: object, unit: str) -> float:
     expected = f"expected a number or a string with a unit such as '1 {unit}'" if unit else "expected a number"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"{expected}, got {value!r}")
-    number = _convert_text(value, unit, expected) if isinstance(value, str) else float(value)
+    try:
+        number = _convert_text(value, unit, expected) if isinstance(value, str) else float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        number = math.inf
     if not math.isfinite(number):
         raise ValueError(f"{expected} that is finite, got {value!r}")
     return number

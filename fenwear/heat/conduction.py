@@ -22,6 +22,7 @@ from dolfinx import fem, mesh
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
+from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.elasticity import region_field
@@ -147,7 +148,7 @@ class HeatBody:
         domain = self.body.mesh
         cells = domain.topology.index_map(domain.topology.dim)
         count = cells.size_local + cells.num_ghosts
-        x = domain.geometry.x[domain.geometry.dofmap[:count], 0]
+        x = domain.geometry.x[compat.geometry_dofmap(domain)[:count], 0]
         lengths = fem.Function(fem.functionspace(domain, ("DG", 0)))
         lengths.x.array[:count] = x.max(axis=1) - x.min(axis=1)
         return lengths

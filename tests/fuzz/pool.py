@@ -1,0 +1,87 @@
+"""Workers that may crash or hang: processes that live long, are watched, and are replaced where they die."""
+
+from __future__ import annotations
+
+import multiprocessing
+import resource
+import traceback
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection, wait
+from typing import Any, NamedTuple
+
+MEMORY = 8 << 30  # bytes of address space of a worker
+
+
+class Verdict(NamedTuple):
+    """What became of one case: ok, refused, wrong, traceback, crash or hang."""
+
+    seed: int
+    kind: str
+    text: str
+
+
+def _work(task: Callable[[int], tuple[str, str]], connection: Connection) -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    while True:
+        seed = connection.recv()
+        if seed is None:
+            return
+        try:
+            connection.send((seed, *task(seed)))
+        except Exception:
+            connection.send((seed, "traceback", traceback.format_exc()))
+
+
+class _Worker:
+    def __init__(self, task: Callable[[int], tuple[str, str]]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.connection, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(task, theirs), daemon=True)
+        self.process.start()
+        theirs.close()
+
+    def answer(self, seed: int) -> Verdict:
+        try:
+            return Verdict(*self.connection.recv())
+        except EOFError:
+            self.process.join()
+            return Verdict(seed, "crash", f"exit status {self.process.exitcode}")
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.join()
+
+
+def verdicts(task: Callable[[int], tuple[str, str]], seeds: range, workers: int, seconds: float) -> Iterator[Verdict]:
+    """Yield what `task` says of every seed, in any order, or how it took its process down.
+
+    Args:
+        task: Returns a kind and a text; what it raises is a traceback.
+        seeds: The seeds.
+        workers: How many processes.
+        seconds: After which a case hangs.
+    """
+    left = iter(seeds)
+    busy: dict[Any, tuple[_Worker, int]] = {}
+
+    def give(worker: _Worker) -> None:
+        seed = next(left, None)
+        if seed is None:
+            worker.end()
+        else:
+            worker.connection.send(seed)
+            busy[worker.connection] = (worker, seed)
+
+    for _ in range(workers):
+        give(_Worker(task))
+    while busy:
+        ready = wait(list(busy), timeout=seconds)
+        for connection in ready or list(busy):
+            worker, seed = busy.pop(connection)
+            # Otherwise none has answered for so long.
+            verdict = worker.answer(seed) if ready else Verdict(seed, "hang", f"no end after {seconds:g} s")
+            yield verdict
+            if verdict.kind in ("crash", "hang"):
+                worker.end()
+                worker = _Worker(task)
+            give(worker)

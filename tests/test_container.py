@@ -1,0 +1,160 @@
+"""The images: no root, no secrets, a root file system that may be read-only, a token for JupyterLab."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+DOCKERFILE = ROOT / "docker" / "Dockerfile"
+pytestmark = pytest.mark.skipif(not DOCKERFILE.is_file(), reason="no checkout: the Dockerfile is not installed")
+
+
+def instructions(stage: str) -> list[tuple[str, str]]:
+    """Return the instructions of a stage of the Dockerfile, continued lines joined."""
+    text = re.sub(r"^\s*#.*\n", "", DOCKERFILE.read_text(), flags=re.MULTILINE).replace("\\\n", " ")
+    found: dict[str, list[tuple[str, str]]] = {}
+    name = ""
+    for line in filter(str.strip, text.splitlines()):
+        word, _, rest = line.strip().partition(" ")
+        if word == "FROM":
+            name = rest.split()[-1]
+        found.setdefault(name, []).append((word, rest.strip()))
+    return found[stage]
+
+
+def environment(*stages: str) -> dict[str, str]:
+    """Return the variables that the stages set."""
+    texts = [rest for stage in stages for word, rest in instructions(stage) if word == "ENV"]
+    return dict(pair.split("=", 1) for text in texts for pair in text.split())
+
+
+def jupyter_command() -> list[str]:
+    """Return the command that the jupyter image starts."""
+    (command,) = (rest for word, rest in instructions("jupyter") if word == "CMD")
+    return list(json.loads(command))
+
+
+def test_jupyter_image_is_not_root() -> None:
+    """The last user is not root, and JupyterLab is not told to accept root or to go without a token."""
+    users = [rest for word, rest in instructions("jupyter") if word == "USER"]
+    assert users
+    assert users[-1] not in ("root", "0")
+    words = " ".join(jupyter_command())
+    assert not re.search(r"allow-root|token|password|disable_check_xsrf|allow_origin", words)
+
+
+def test_no_secrets_in_the_image() -> None:
+    """What the host lends is mounted for one instruction; nothing else names a secret, and git's folder stays out."""
+    for stage in ("base", "dev", "jupyter"):
+        for word, rest in instructions(stage):
+            assert word in ("FROM", "RUN", "ENV", "COPY", "WORKDIR", "USER", "EXPOSE", "CMD", "ENTRYPOINT"), word
+            if word == "RUN":
+                targets = re.findall(r"--mount=type=(\w+)", rest)
+                assert set(targets) <= {"secret"}
+                assert "/run/secrets" not in re.sub(r"--mount=\S+", "", rest)
+            elif word != "FROM":
+                assert not re.search(r"token|password|secret|proxy|credential", rest, re.IGNORECASE), rest
+    ignored = (ROOT / ".dockerignore").read_text().splitlines()
+    assert {".git", "results", "docker"} <= set(ignored)
+
+
+def test_jupyter_image_writes_below_tmp() -> None:
+    """With --read-only --tmpfs /tmp -v results: what programs write for themselves goes below /tmp."""
+    variables = environment("base", "jupyter")
+    names = [name for name in variables if name.startswith(("XDG", "MPL", "IPYTHON", "JUPYTER"))]
+    assert len(names) >= 5
+    assert all(variables[name].startswith("/tmp/") for name in names)
+    assert variables["PYTHONDONTWRITEBYTECODE"] == "1"
+
+
+def answer(port: int, path: str) -> tuple[int, str]:
+    """Return status and last address of a request."""
+    try:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=30) as response:
+            return response.status, response.url
+    except urllib.error.HTTPError as error:
+        return error.code, error.url
+
+
+@pytest.mark.skipif(shutil.which("jupyter-lab") is None, reason="JupyterLab is not installed")
+def test_jupyterlab_asks_for_its_token(tmp_path: Path) -> None:
+    """The image's own command and variables: 403 without the token and with a wrong one, 200 with it."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    variables = {k: v.replace("/tmp/", f"{tmp_path}/") for k, v in environment("jupyter").items()}
+    command = [f"--port={port}" if word.startswith("--port") else word for word in jupyter_command()]
+    command = ["--ip=127.0.0.1" if word.startswith("--ip") else word for word in command]
+    root = ["--allow-root"] if os.getuid() == 0 else []  # here, not in the image
+    log = tmp_path / "log"
+    with log.open("w") as out:
+        process = subprocess.Popen(
+            [*command, *root], stdout=out, stderr=subprocess.STDOUT, cwd=tmp_path, env={**os.environ, **variables}
+        )
+        try:
+            deadline = time.monotonic() + 120
+            while not (found := re.search(r"token=(\w{40,})", log.read_text())):
+                assert process.poll() is None, log.read_text()
+                assert time.monotonic() < deadline, log.read_text()
+                time.sleep(0.2)
+            assert answer(port, "/api/contents")[0] == 403
+            assert answer(port, f"/api/contents?token={'0' * 48}")[0] == 403
+            assert "/login" in answer(port, "/lab")[1]
+            assert answer(port, f"/api/contents?token={found[1]}")[0] == 200
+        finally:
+            process.terminate()
+            process.wait(timeout=30)
+
+
+READ_ONLY = """
+set -e
+mkdir "$1/root"
+mount --bind / "$1/root"
+mount -o remount,bind,ro "$1/root"
+mount -t tmpfs -o mode=1777 tmpfs "$1/root/tmp"
+mount --rbind /dev "$1/root/dev"
+mount --rbind /proc "$1/root/proc"
+mkdir "$1/root/tmp/fenwear" "$1/root/tmp/results"
+mount --bind "$2" "$1/root/tmp/fenwear"
+mount -o remount,bind,ro "$1/root/tmp/fenwear"
+mount --bind "$1/results" "$1/root/tmp/results"
+exec chroot --userspec=1000:1000 "$1/root" env --chdir=/tmp PYTHONPATH=/tmp/fenwear HOME=/nowhere \
+    XDG_CACHE_HOME=/tmp/cache MPLCONFIGDIR=/tmp/cache/matplotlib PYTHONDONTWRITEBYTECODE=1 OMP_NUM_THREADS=1 "$3" -c '
+import os, subprocess, sys
+assert os.getuid() == 1000
+try:
+    open("/written", "w")
+except OSError as error:
+    assert error.strerror in ("Read-only file system", "Permission denied"), error
+else:
+    raise SystemExit("the root file system can be written")
+words = ["-m", "fenwear", "run", "example1", "-o", "results/run", "--set", "run.half_cycles=4"]
+sys.exit(subprocess.run([sys.executable, *words]).returncode)
+'
+"""
+
+
+@pytest.mark.slow
+def test_run_without_root_on_a_read_only_system(tmp_path: Path) -> None:
+    """As user 1000, only /tmp and a mounted folder of results can be written: a run, with its forms compiled."""
+    permitted = os.getuid() == 0 and shutil.which("unshare") is not None
+    if not permitted or subprocess.run(["unshare", "--mount", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("a mount namespace is not permitted here; needs root and CAP_SYS_ADMIN")
+    (tmp_path / "results").mkdir()
+    os.chown(tmp_path / "results", 1000, 1000)
+    command = ["unshare", "--mount", "sh", "-c", READ_ONLY, "sh", str(tmp_path), str(ROOT), sys.executable]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "results" / "run" / "summary.json").stat().st_uid == 1000

@@ -1,0 +1,52 @@
+"""The same run again gives the same bits; other numbers of ranks the same numbers, to 1e-9."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+Run = Callable[..., Any]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+CASES = {
+    "explicit": ("example1", "run.half_cycles=100"),
+    "implicit": ("example2", "run.half_cycles=40", "run.integration=implicit"),
+    "jump": ("example1", "run.half_cycles=2000", "run.integration=jump"),
+    "heat": ("example1-heat", "run.half_cycles=60"),
+    "full heat": ("example1-heat", "run.half_cycles=30", "heat.operator=full"),
+}
+
+
+def run(fenwear: Run, folder: Path, name: str, ranks: int) -> xarray.Dataset:
+    case, *settings = CASES[name]
+    words = [word for setting in (*SMALL, *settings, "output.fields_at=[]") for word in ("--set", setting)]
+    done = fenwear("run", case, "-o", folder, *words, ranks=ranks)
+    assert done.returncode == 0, done.stderr
+    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
+        return history.load()
+
+
+@pytest.mark.parametrize("ranks", [1, 3])
+@pytest.mark.parametrize("name", CASES)
+def test_the_same_bits_again(fenwear: Run, tmp_path: Path, name: str, ranks: int) -> None:
+    """Every variable of history.nc, bit by bit."""
+    one, again = (run(fenwear, tmp_path / number, name, ranks) for number in ("one", "again"))
+    assert set(one.variables) == set(again.variables)
+    for variable in one.variables:
+        assert one[variable].values.tobytes() == again[variable].values.tobytes(), variable
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_other_ranks_give_the_same_numbers(fenwear: Run, tmp_path: Path, name: str) -> None:
+    """1, 2 and 3 ranks to 1e-9 of each variable's largest value."""
+    one, *others = (run(fenwear, tmp_path / str(ranks), name, ranks) for ranks in (1, 2, 3))
+    measures = ("equilibrium_error", "heat_balance_error")  # of rounding itself
+    for other in others:
+        np.testing.assert_array_equal(other.half_cycle, one.half_cycle)
+        for variable in sorted(set(one.data_vars) - set(measures)):
+            scale = float(np.abs(one[variable]).max())
+            np.testing.assert_allclose(other[variable], one[variable], rtol=0, atol=1e-9 * scale, err_msg=str(variable))

@@ -1,0 +1,413 @@
+"""Real faults: full and read-only disks, signals, killed ranks, removed files, NaN. See also test_checkpoint.py."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+Run = Callable[..., Any]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+ENDLESS = ("run.half_cycles=10_000_000", "output.checkpoint=0.5", "output.every=10")
+
+
+def options(*settings: str) -> list[str]:
+    return [word for setting in (*SMALL, *settings) for word in ("--set", setting)]
+
+
+def mount(*arguments: str) -> bool:
+    return subprocess.run(["mount", *arguments], capture_output=True, check=False).returncode == 0
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
+    """Return small_disk(kilobytes): the folder of a file system of that size, in memory."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+
+    def small_disk(kilobytes: int) -> Path:
+        if os.getuid() != 0 or not mount("-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(folder)):
+            pytest.skip("mounting a small file system is not permitted here; needs root and CAP_SYS_ADMIN")
+        return folder
+
+    yield small_disk
+    if folder.is_mount():
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+@contextmanager
+def running(folder: Path, *settings: str, ranks: int = 1, case: str = "example1-heat") -> Iterator[Any]:
+    """Start a run in a process of its own, and pass it on once its first checkpoint is there."""
+    start = [sys.executable] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable]
+    words = [*start, "-m", "fenwear", "run", case, "-o", str(folder), *options(*ENDLESS, *settings)]
+    inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE", "OMPI_COMM", "OMPI_FILE"))}
+    environment = {**inherited, "PYTHONPATH": str(Path(__file__).parents[1]), "OMP_NUM_THREADS": "1"}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(words, env=environment, **pipes) as process:  # type: ignore[call-overload]
+        try:
+            deadline = time.monotonic() + 120
+            while not (folder / "checkpoint").exists():
+                assert process.poll() is None, process.communicate()
+                assert time.monotonic() < deadline
+                time.sleep(0.02)
+            yield process
+        finally:
+            process.kill()
+
+
+def ended(process: Any, seconds: float = 10) -> tuple[int, str]:
+    """Return exit status and messages of a process that ends by itself in so many seconds."""
+    _, messages = process.communicate(timeout=seconds)
+    assert "Traceback" not in messages, messages
+    return process.returncode, messages
+
+
+def ranks_of(process: Any) -> list[int]:
+    """Return the process ids of mpirun's ranks."""
+    listed = subprocess.run(["ps", "-eo", "pid=,ppid="], capture_output=True, text=True, check=True).stdout
+    pairs = [[int(word) for word in line.split()] for line in listed.splitlines()]
+    return sorted(pid for pid, parent in pairs if parent == process.pid)
+
+
+def check_gone(processes: list[int]) -> None:
+    """Check that no process outlives its mpirun by more than ten seconds."""
+    deadline = time.monotonic() + 10
+    while left := [pid for pid in processes if _runs(pid)]:
+        assert time.monotonic() < deadline, left
+        time.sleep(0.1)
+
+
+def _runs(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+    return state not in "ZX"
+
+
+def check_history(folder: Path) -> int:
+    """Check that history.nc is whole and consistent; return its last half-cycle."""
+    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as opened:
+        history = opened.load()
+    assert (np.diff(history.half_cycle) > 0).all()
+    for name, variable in history.variables.items():
+        assert name == "periodicity" or np.isfinite(variable.values).all(), name
+    np.testing.assert_allclose(history.pressure @ history.weight, 1000, rtol=1e-8)
+    return int(history.half_cycle.values[-1]) if history.sizes["half_cycle"] else 0
+
+
+def check_goes_on(fenwear: Run, folder: Path) -> None:
+    """Check that the checkpoint loads, no farther than the history, and that the run goes on."""
+    with np.load(folder / "checkpoint" / "moment.npz") as moment:
+        reached = int(moment["half_cycle"])
+    assert reached <= check_history(folder) + 20  # every tenth cycle is kept
+    on = options(f"run.half_cycles={reached + 20}", "output.every=10")
+    done = fenwear("run", "example1-heat", "-o", folder, *on, "--resume")
+    assert done.returncode == 0, done.stderr
+    assert check_history(folder) == reached + 20
+
+
+# ------------------------------------------------------------------------- full disks
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("kilobytes", [8, 40, 160, 500, 900, 1200, 2000])
+def test_full_disk(fenwear: Run, small_disk: Callable[[int], Path], kilobytes: int, ranks: int) -> None:
+    """However much room there is, the run ends with a message, no crash, and what is written is whole."""
+    folder = small_disk(kilobytes) / "run"
+    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=40"), ranks=ranks)
+    assert "Traceback" not in done.stderr, done.stderr
+    assert "Exception ignored" not in done.stderr, done.stderr
+    assert done.stderr.count("No space left on device") == 1, done.stderr
+    if done.returncode == 0:  # all but the report is there
+        assert "warning: no report of the run" in done.stderr
+        assert check_history(folder) == 40
+        with np.load(folder / "checkpoint" / "moment.npz") as moment:
+            assert int(moment["half_cycle"]) == 40
+        return
+    assert done.returncode == 1, done.stderr
+    assert "cannot be written" in done.stderr
+    assert "mend the cause, then" in done.stderr
+    if (folder / "history.nc").exists():
+        check_history(folder)
+
+
+def test_disk_fills_up_during_the_run(fenwear: Run, small_disk: Callable[[int], Path]) -> None:
+    """The files stay at the last write; with room again the run goes on."""
+    folder = small_disk(6000) / "run"
+    with running(folder) as process:
+        filler = folder.parent / "filler"
+        filler.write_bytes(b"0" * (shutil.disk_usage(folder).free - 100_000))
+        status, messages = ended(process, 60)
+    assert status == 1
+    assert messages.count("No space left on device") == 1, messages
+    assert "then go on from the checkpoint of half-cycle" in messages
+    check_history(folder)
+    filler.unlink()
+    check_goes_on(fenwear, folder)
+
+
+def test_disk_turns_read_only(fenwear: Run, small_disk: Callable[[int], Path]) -> None:
+    """As file systems do after an error of the device: a message, and the files stay as they were."""
+    folder = small_disk(20_000) / "run"
+    with running(folder) as process:
+        assert mount("-o", "remount,ro", str(folder.parent)) or mount("-o", "remount,ro,force", str(folder.parent)), (
+            "cannot be remounted"
+        )
+        status, messages = ended(process, 60)
+    assert status == 1
+    assert messages.count("Read-only file system") == 1, messages
+    assert mount("-o", "remount,rw", str(folder.parent))
+    check_goes_on(fenwear, folder)
+
+
+def test_read_only_folder(fenwear: Run, small_disk: Callable[[int], Path]) -> None:
+    """Refused as wrong usage before anything is computed, on one rank and on two."""
+    folder = small_disk(1000)
+    assert mount("-o", "remount,ro", str(folder))
+    for ranks in (1, 2):
+        done = fenwear("run", "example1", "-o", folder / "run", *options("run.half_cycles=2"), ranks=ranks)
+        assert done.returncode == 2, done.stderr
+        assert done.stderr.count("cannot be written: Read-only file system") == 1
+
+
+def test_full_disk_for_other_commands(fenwear: Run, small_disk: Callable[[int], Path], tmp_path: Path) -> None:
+    """plot, compare and mesh say it, too."""
+    folder = tmp_path / "run"
+    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=4"))
+    assert done.returncode == 0, done.stderr
+    disk = small_disk(1000)
+    shutil.copytree(folder, disk / "run", ignore=shutil.ignore_patterns("figures", "report.html", "*.bp"))
+    (disk / "filler").write_bytes(b"0" * (shutil.disk_usage(disk).free - 8192))
+    commands = (
+        ("plot", disk / "run"),
+        ("compare", disk / "run", disk / "run", "-o", disk / "compare.png"),
+        ("mesh", "example1", "-o", disk / "own.msh"),
+    )
+    for command in commands:
+        done = fenwear(*command)
+        assert done.returncode == 1, (command, done.stdout, done.stderr)
+        assert "No space left on device" in done.stderr or "is there room" in done.stderr, (command, done.stderr)
+        assert "Traceback" not in done.stderr, (command, done.stderr)
+    assert not (disk / "own.msh").exists()
+
+
+# ---------------------------------------------------------------------------- signals
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signal_to_one_rank(fenwear: Run, tmp_path: Path, number: signal.Signals) -> None:
+    """All ranks end together, with a checkpoint."""
+    folder = tmp_path / "run"
+    with running(folder, ranks=2) as process:
+        os.kill(ranks_of(process)[1], number)
+        status, messages = ended(process)
+    assert status == 1
+    assert messages.count("--resume") == 1, messages
+    check_goes_on(fenwear, folder)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_signal_to_mpirun(fenwear: Run, tmp_path: Path, number: signal.Signals) -> None:
+    """mpirun passes it on to all ranks: they end, and what is there is whole."""
+    folder = tmp_path / "run"
+    with running(folder, ranks=2) as process:
+        ranks = ranks_of(process)
+        assert len(ranks) == 2
+        process.send_signal(number)
+        status, _ = ended(process)
+    assert status != 0
+    check_gone(ranks)
+    check_goes_on(fenwear, folder)
+
+
+@pytest.mark.parametrize("victims", [1, 2])
+def test_killed_ranks(fenwear: Run, tmp_path: Path, victims: int) -> None:
+    """One rank killed: the other does not wait for it for ever. Both killed: the files are whole all the same."""
+    folder = tmp_path / "run"
+    with running(folder, ranks=2) as process:
+        ranks = ranks_of(process)
+        for pid in ranks[:victims]:
+            os.kill(pid, signal.SIGKILL)
+        status, messages = ended(process)
+    assert status != 0
+    assert "killed" in messages.lower(), messages
+    check_gone(ranks)
+    check_goes_on(fenwear, folder)
+
+
+def test_killed_at_any_moment(tmp_path: Path) -> None:
+    """Killed twelve times, at moments spread over several writes of history and checkpoint: always whole."""
+    for number in range(12):
+        folder = tmp_path / str(number)
+        with running(folder, "output.checkpoint=0.01") as process:
+            time.sleep(0.037 * number)
+            process.send_signal(signal.SIGKILL)
+            process.communicate(timeout=10)
+        present = [name for name in ("checkpoint", "checkpoint.old") if (folder / name / "moment.npz").exists()]
+        assert present
+        with np.load(folder / present[0] / "moment.npz") as moment:
+            assert int(moment["half_cycle"]) <= check_history(folder) + 20
+
+
+# ---------------------------------------------------------------------- removed files
+
+
+def test_history_removed(fenwear: Run, tmp_path: Path) -> None:
+    """The run ends and says so; it goes on with a new history, and says this, too."""
+    folder = tmp_path / "run"
+    with running(folder, ranks=2) as process:
+        (folder / "history.nc").unlink()
+        status, messages = ended(process)
+    assert status == 1
+    assert messages.count("history.nc cannot be written: it or its folder has been removed") == 1, messages
+    assert "then go on from the checkpoint" in messages
+    with np.load(folder / "checkpoint" / "moment.npz") as moment:
+        reached = int(moment["half_cycle"])
+    done = fenwear("run", "example1-heat", "-o", folder, *options(f"run.half_cycles={reached + 20}"), "--resume")
+    assert done.returncode == 0, done.stderr
+    assert "warning: history.nc is gone" in done.stderr
+    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
+        assert history.half_cycle.values.tolist() == list(range(reached + 1, reached + 21))
+
+
+def test_checkpoint_removed(fenwear: Run, tmp_path: Path) -> None:
+    """The next one takes its place: nothing is lost, the run goes on."""
+    folder = tmp_path / "run"
+    with running(folder) as process:
+        shutil.rmtree(folder / "checkpoint")
+        deadline = time.monotonic() + 20
+        while not (folder / "checkpoint").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGTERM)
+        status, messages = ended(process)
+    assert status == 1
+    assert "interrupted" in messages
+    check_goes_on(fenwear, folder)
+
+
+def test_results_removed(tmp_path: Path) -> None:
+    """The whole folder gone: the run ends and says that there is nothing to go on from."""
+    folder = tmp_path / "run"
+    with running(folder, ranks=2) as process:
+        folder.rename(tmp_path / "elsewhere")
+        shutil.rmtree(tmp_path / "elsewhere")
+        status, messages = ended(process)
+    assert status == 1
+    assert messages.count("it or its folder has been removed") == 1, messages
+    assert "start anew" in messages
+    assert not folder.exists()
+
+
+def test_history_is_read_during_the_run(tmp_path: Path) -> None:
+    """A reader that keeps history.nc open neither disturbs the run nor sees its values change."""
+    folder = tmp_path / "run"
+    with running(folder) as process:
+        with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
+            before, count = history.half_cycle.values.copy(), history.sizes["half_cycle"]
+            time.sleep(2)
+            assert process.poll() is None
+            np.testing.assert_array_equal(history.half_cycle.values, before)
+            assert history.pressure.values.shape[0] == count
+        process.send_signal(signal.SIGTERM)
+        assert ended(process)[0] == 1
+    assert check_history(folder) > before[-1]
+    assert not list(folder.glob("history.[!n]*"))
+
+
+# --------------------------------------------------------------------- wrong numbers
+
+
+def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
+    """Exit status 3 with the half-cycle; the results before it are whole, and the run goes on with other options."""
+    folder = tmp_path / "run"
+    words = ("run", "example1-heat", "-o", folder, *options("output.every=10"))
+    assert fenwear(*words, "--set", "run.half_cycles=40").returncode == 0
+    failing = (*words, "--set", "run.half_cycles=60", "--resume", "--", "-fenwear_contact_snes_max_it", "0")
+    for ranks in (1, 2):
+        done = fenwear(*failing, ranks=ranks)
+        assert done.returncode == 3, done.stderr
+        assert done.stderr.count("half-cycle 41: ") == 1
+        assert "DIVERGED_MAX_IT" in done.stderr
+        assert "results up to half-cycle 40" in done.stderr
+        assert "Traceback" not in done.stderr
+    check_goes_on(fenwear, folder)
+
+
+@pytest.mark.parametrize("name", ["moment.npz", "case.toml", "temperature_punch.bp/md.idx"])
+def test_damaged_checkpoint(fenwear: Run, tmp_path: Path, name: str) -> None:
+    """Cut in half it is refused, on one rank and on two, and nothing is changed."""
+    folder = tmp_path / "run"
+    assert fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=4")).returncode == 0
+    damaged = folder / "checkpoint" / name
+    damaged.write_bytes(damaged.read_bytes()[: damaged.stat().st_size // 2])
+    history = (folder / "history.nc").read_bytes()
+    for ranks in (1, 2):
+        done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=8"), "--resume", ranks=ranks)
+        assert done.returncode == 2, done.stderr
+        assert "the checkpoint" in done.stderr
+        assert "Traceback" not in done.stderr
+    assert (folder / "history.nc").read_bytes() == history
+
+
+def test_nan_in_a_checkpoint(fenwear: Run, tmp_path: Path) -> None:
+    """A worn shape that is no number is refused."""
+    folder = tmp_path / "run"
+    assert fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=4")).returncode == 0
+    path = folder / "checkpoint" / "moment.npz"
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    arrays["wear"][3] = np.nan
+    np.savez(path, **arrays)
+    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=8"), "--resume")
+    assert done.returncode == 2, done.stderr
+    assert "is damaged" in done.stderr
+
+
+def test_damaged_history(fenwear: Run, tmp_path: Path) -> None:
+    """Refused with what to do; without it the run goes on."""
+    folder = tmp_path / "run"
+    assert fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=4")).returncode == 0
+    history = folder / "history.nc"
+    history.write_bytes(history.read_bytes()[:5000])
+    words = ("run", "example1-heat", "-o", folder, *options("run.half_cycles=8"), "--resume")
+    for ranks in (1, 2):
+        done = fenwear(*words, ranks=ranks)
+        assert done.returncode == 2, done.stderr
+        assert "remove it to go on" in done.stderr
+    history.unlink()
+    assert fenwear(*words).returncode == 0
+
+
+@pytest.mark.parametrize("coefficient", ["1e290", "1e30"])
+def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str) -> None:
+    """Numbers that overflow end as a solver that did not converge; no NaN gets into the history."""
+    folder = tmp_path / "run"
+    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=6"),
+                   "--set", f"wear.punch.coefficient={coefficient}")  # fmt: skip
+    assert done.returncode == 3, done.stderr
+    assert "did not converge" in done.stderr
+    check_history(folder)
+
+
+def test_second_signal_ends_all_ranks(tmp_path: Path) -> None:
+    """Asked twice, a rank leaves at once and takes the other with it."""
+    folder = tmp_path / "run"
+    with running(folder, "contact.solver='full'", ranks=2, case="example1") as process:
+        pid = ranks_of(process)[1]
+        os.kill(pid, signal.SIGTERM)
+        threading.Timer(0.2, lambda: Path(f"/proc/{pid}").exists() and os.kill(pid, signal.SIGTERM)).start()
+        process.communicate(timeout=10)
+    assert process.returncode == 1

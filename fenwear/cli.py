@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -144,19 +145,25 @@ def _velocities(velocity: dict[str, float], per: str) -> str:
 
 @app.command("optimum")
 def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
-    """Print lambda_F, lambda_M and the optimal pressure of both directions."""
+    """Print lambda_F, lambda_M, the optimal pressure and the angle chi of the wear velocity in both directions."""
     from fenwear.system import System
 
     system = System(_load(case, settings))
     found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
     if as_json:
         x = system.facing.x.tolist()
-        _print_json({n: {**o.velocity, "x": x, "pressure": o.pressure.tolist()} for n, o in found.items()})
+        _print_json(
+            {
+                n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
+                for n, o in found.items()
+            }
+        )
         return
     for name, state in found.items():
         print(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):
-            print(f"           p = {state.pressure[end]:.4f} MPa at x = {system.facing.x[end]:g} mm")
+            chi = math.degrees(state.tilt[end])
+            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at x = {system.facing.x[end]:g} mm")
 
 
 @app.command("check")

@@ -27,6 +27,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.parallel import on_root
 from fenwear.surface import SurfaceNodes
 from fenwear.system import System
+from fenwear.wear import Worn
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
@@ -62,7 +63,7 @@ def body_fields(
         phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
     """
-    facing, slip = system.facings[phase], system.slips()[phase]
+    facing, slip = system.facings[phase], _slip(system, phase, pressure, temperatures)
     normal, tangential = facing.weights * pressure, facing.weights * pressure * slip
     to_strip = -facing.transfer.T
     loads = ((normal, tangential), (to_strip @ normal, to_strip @ tangential))
@@ -83,6 +84,19 @@ def body_fields(
         )
     )
     return punch, strip
+
+
+def _slip(system: System, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None) -> Array:
+    """Return tau = d mu (n,) at this pressure and these temperatures; collective."""
+    friction, surfaces = system.friction, None
+    if not friction.constant and temperatures is not None and system.heat_bodies is not None:
+        punch, strip = (
+            system.comm.allreduce(body.contact_rows @ values)
+            for body, values in zip(system.heat_bodies, temperatures, strict=True)
+        )
+        surfaces = (punch, system.facing.transfer @ strip)
+    mu = friction.values(system.conditions(phase, pressure, surfaces))
+    return friction.slip(system.motion.phases[phase].direction, mu)
 
 
 def _solve(
@@ -163,8 +177,17 @@ def write_fields(
     half_cycle: int,
     fields: tuple[BodyFields, BodyFields],
     direction: int,
+    worn: Worn,
 ) -> None:
     """Write the fields of a half-cycle into `directory`/fields; collective.
+
+    Args:
+        directory: Of the run.
+        system: The assembled problem.
+        half_cycle: Its number.
+        fields: Of punch and strip.
+        direction: Sliding direction d.
+        worn: Depths at its end.
 
     Raises:
         OutputError: they cannot be written.
@@ -182,7 +205,20 @@ def write_fields(
         data.update(_gathered(name, elastic, functions))
     time = float(system.motion.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
+    data.update(_contact_surfaces(system, worn))
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
+
+
+def _contact_surfaces(system: System, worn: Worn) -> dict[str, Any]:
+    """Return where the contact nodes of both bodies are, and what is worn there that the meshes do not follow."""
+    rest = worn if system.moved is None else worn - system.moved
+    facing = system.facing
+    data: dict[str, Any] = {}
+    for name, nodes, depth in (("punch", facing.punch, rest.punch), ("strip", facing.strip, rest.strip)):
+        at = f"{name}_contact"
+        data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES)}
+        data[f"{at}_wear"] = (at, depth, {"units": "mm"})
+    return data
 
 
 def _make_folder(folder: Path, size: int) -> None:

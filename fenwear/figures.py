@@ -139,16 +139,34 @@ def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) ->
 
 
 def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
-    """Draw the worn punch at the chosen half-cycles."""
-    figure, (ax,) = panels(1, 3.6)
-    for colour, n in shades(half_cycles):
-        ax.plot(history.x, 1e3 * history.wear.sel(half_cycle=n), color=colour, label=f"{n:,}")
-    ax.set_title("Worn shape: the punch's lower surface above its flat start, w = 0", loc="left")
-    ax.set_ylabel("worn depth w (µm)")
-    ax.set_ylim(bottom=0)
-    legend_beside(ax, "after half-cycle")
-    contact_axis(ax)
+    """Draw what is worn off the punch, and off the strip where it wears, at the chosen half-cycles."""
+    strip_wears = "wear_strip" in history
+    figure, axes = panels(1 + strip_wears, 3.6)
+    surfaces = [("Worn shape: the punch's surface above its start, w = 0", history.x, history.wear)]
+    if strip_wears:
+        title = "Worn shape: the strip's surface below its start, on its material"
+        surfaces.append((title, history.x_strip, -history.wear_strip))
+    for ax, (title, x, height) in zip(axes, surfaces, strict=True):
+        for colour, n in shades(half_cycles):
+            ax.plot(x, 1e3 * height.sel(half_cycle=n), color=colour, label=f"{n:,}")
+        ax.set_title(title, loc="left")
+        legend_beside(ax, "after half-cycle")
+    axes[0].set_ylabel("worn depth w (µm)")
+    axes[0].set_ylim(bottom=0)
+    if strip_wears:
+        axes[1].set_ylabel("- worn depth (µm)")
+        axes[1].set_ylim(top=0)
+        left, right = _worn_range(history)
+        axes[1].set_xlim(left, right)
+    contact_axis(axes[-1])
     return figure
+
+
+def _worn_range(history: xarray.Dataset) -> tuple[float, float]:
+    """Return the ends of the punch's contact and of the strip's scar, mm."""
+    worn = history.x_strip.values[history.wear_strip.values.max(axis=0) > 0]
+    x = np.concatenate([worn, history.x.values])
+    return float(x.min()), float(x.max())
 
 
 def peak_figure(history: xarray.Dataset) -> Figure:

@@ -24,11 +24,12 @@ from fenwear.style import save_gif
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FIELDS, FIGURES, HISTORY = "fields", "figures", "history.nc"
+FIELDS, FIGURES = "fields", "figures"
 BODIES = ("punch", "strip")
 # Pale to dark, so that outlines stay visible and grey prints keep the order.
 SHOWN = {"von_mises": ("von Mises stress", "MPa", "YlGnBu"), "temperature": ("temperature", "K", "YlOrRd")}
 COLOURS = 16
+FLAT = 1e-4  # of the width: how far a contact surface that counts as flat may be from its lowest height
 PIXELS = 1100
 SECONDS = 300
 MOST_FRAMES = 40
@@ -101,16 +102,15 @@ def draw_here(directory: Path) -> list[Path]:
     if len(files) > MOST_FRAMES:
         files = [files[k] for k in np.unique(np.linspace(0, len(files) - 1, MOST_FRAMES).round().astype(int))]
     datasets = [_loaded(path) for path in files]
-    wears = [_wear(directory, int(data.attrs["half_cycle"])) for data in datasets]
     view = common_view(datasets)
     folder = directory / FIGURES
     folder.mkdir(exist_ok=True)
     paths = []
     for field in view.ranges:
         frames = []
-        for data, wear in zip(datasets, wears, strict=True):
+        for data in datasets:
             paths.append(folder / f"bodies_{field}_{int(data.attrs['half_cycle']):06d}.png")
-            figure = bodies_figure(data, field, view, bodies_image(data, field, view, wear))
+            figure = bodies_figure(data, field, view, bodies_image(data, field, view))
             figure.savefig(paths[-1], dpi=150)
             with Image.open(paths[-1]) as picture:
                 small = picture.convert("RGB").resize((picture.width * 2 // 3, picture.height * 2 // 3))
@@ -122,9 +122,9 @@ def draw_here(directory: Path) -> list[Path]:
 
 
 def common_view(datasets: Sequence[xarray.Dataset]) -> View:
-    """Return the view that fits all half-cycles: the punch's width and what lies below and above its contact."""
+    """Return the view that fits all half-cycles: the contact surface of the punch and what lies below and above it."""
     first = datasets[0]
-    x, z = first.punch_x.values, first.punch_z.values
+    x, z = first.punch_contact_x.values, first.punch_contact_z.values
     contact, width = float(z.min()), float(np.ptp(x))
     box = (x.min() - 0.22 * width, x.max() + 0.22 * width, contact - 0.5 * width, contact + 0.75 * width)
     inside = {body: _inside(first, body, box) for body in BODIES}
@@ -141,7 +141,10 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
             # A corner's stress has no bound: the colours leave out the largest half per cent.
             low, high = float(values.min()), float(np.quantile(values, 0.995 if field == "von_mises" else 1.0))
             ranges[field] = (0.0 if 0 < low < high else low, high if high > low else low + 1.0)
-    return View(box, contact, magnification(largest, width), ranges)
+    surfaces = [data[f"{body}_contact_z"].values for data in datasets for body in BODIES]
+    # Displacement that is magnified fits surfaces which lie on each other, not the gap between curved ones.
+    curved = any(np.abs(surface - contact).max() > FLAT * width for surface in surfaces)
+    return View(box, contact, 1.0 if curved else magnification(largest, width), ranges)
 
 
 def magnification(largest: float, width: float) -> float:
@@ -153,21 +156,21 @@ def magnification(largest: float, width: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= target))
 
 
-def deformed(data: xarray.Dataset, body: str, view: View, wear: tuple[Any, Any] | None) -> NDArray[np.float64]:
-    """Return a body's nodes (n, 3) after the magnified displacement; the punch's surface as it is worn.
+def deformed(data: xarray.Dataset, body: str, view: View) -> NDArray[np.float64]:
+    """Return a body's nodes (n, 3) after the magnified displacement, its surface as it is worn.
 
-    The wear is as small as the displacement and is magnified with it: else the worn punch would seem
-    to sink into the strip. It fades out over a tenth of the width above the contact.
+    The wear is as small as the displacement and is magnified with it: else the worn bodies would seem
+    to sink into each other. It fades out over a tenth of the contact's width away from it.
     """
     x, z = data[f"{body}_x"].values, data[f"{body}_z"].values
     u, w = (data[f"{body}_displacement_{axis}"].values for axis in ("x", "z"))
-    if body == "punch" and wear is not None:
-        fading = np.clip(1 - (z - view.contact) / (0.1 * np.ptp(x)), 0, 1)
-        w = w + np.interp(x, *wear) * fading
+    reach = 0.1 * np.ptp(data.punch_contact_x.values)
+    depth = np.interp(x, data[f"{body}_contact_x"].values, data[f"{body}_contact_wear"].values)
+    w = w + (1 if body == "punch" else -1) * depth * np.clip(1 - np.abs(z - view.contact) / reach, 0, 1)
     return np.column_stack([x + view.factor * u, np.zeros_like(x), z + view.factor * w])
 
 
-def bodies_image(data: xarray.Dataset, field: str, view: View, wear: tuple[Any, Any] | None) -> NDArray[np.uint8]:
+def bodies_image(data: xarray.Dataset, field: str, view: View) -> NDArray[np.uint8]:
     """Return the view's box filled by both deformed bodies, coloured by a field."""
     import pyvista
 
@@ -182,7 +185,7 @@ def bodies_image(data: xarray.Dataset, field: str, view: View, wear: tuple[Any, 
         faces = np.hstack([np.full((len(cells), 1), 4), cells]).ravel()
         values = data[f"{body}_{field}"].values
         before = pyvista.PolyData(np.column_stack([data[f"{body}_x"], 0 * values, data[f"{body}_z"]]), faces)
-        after = pyvista.PolyData(deformed(data, body, view, wear), faces)
+        after = pyvista.PolyData(deformed(data, body, view), faces)
         after.point_data[field] = values
         plotter.add_mesh(after, scalars=field, cmap=SHOWN[field][2], clim=view.ranges[field], n_colors=COLOURS,
                          lighting=False, show_scalar_bar=False)  # fmt: skip
@@ -248,17 +251,6 @@ def _inside(data: xarray.Dataset, body: str, box: tuple[float, ...], margin: flo
 def _loaded(path: Path) -> xarray.Dataset:
     with xarray.open_dataset(path, engine="h5netcdf") as data:
         return data.load()
-
-
-def _wear(directory: Path, half_cycle: int) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Return x and the worn depth at the recorded half-cycle nearest to this one, if there is a history."""
-    if not (directory / HISTORY).is_file():
-        return None
-    with xarray.open_dataset(directory / HISTORY, engine="h5netcdf") as history:
-        if history.sizes["half_cycle"] == 0:
-            return None
-        row = int(np.abs(history.half_cycle.values - half_cycle).argmin())
-        return history.x.values, history.wear.values[row]
 
 
 if __name__ == "__main__":

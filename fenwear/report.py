@@ -23,7 +23,8 @@ SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mea
             "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
             "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
 ALT = {
-    "shape": "Worn depth in micrometres along the contact, a line for each chosen half-cycle.",
+    "shape": "Worn depth of the punch, and of the strip where it wears, in micrometres along the contact, "
+    "a line for each chosen half-cycle.",
     "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, "
     "a line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",

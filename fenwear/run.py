@@ -208,7 +208,7 @@ class _Run:
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
         fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], phase, temperatures)
-        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]))
+        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]), block.end.worn)
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""

@@ -38,6 +38,9 @@ def _grid(body: str, x: np.ndarray, z: np.ndarray, half_cycle: int) -> dict[str,
         f"{body}_displacement_z": (at, np.full(len(points), -0.01 * half_cycle)),
         f"{body}_von_mises": (at, 100 * half_cycle * bell),
         f"{body}_temperature": (at, 50 * half_cycle * bell),
+        f"{body}_contact_x": (f"{body}_contact", x),
+        f"{body}_contact_z": (f"{body}_contact", np.full(len(x), 10.0)),
+        f"{body}_contact_wear": (f"{body}_contact", np.full(len(x), {"punch": 0.01, "strip": 0.005}[body])),
     }
 
 
@@ -85,19 +88,27 @@ def test_without_heat_and_without_fields(tmp_path: Path) -> None:
 
 
 def test_nodes_are_moved_by_the_magnified_displacement(tmp_path: Path) -> None:
-    """Every node by factor times its displacement; the punch's surface by the wear, too, not what lies above."""
+    """Every node by factor times its displacement; the surfaces by the wear, too, not what lies away from them."""
     data = _write(tmp_path, 2)
     view = common_view([data])
     assert view.contact == 10
     assert view.factor == magnification(0.02, 20) == 100
-    wear = (np.array([-10.0, 10.0]), np.array([0.01, 0.01]))
-    punch, strip = (deformed(data, body, view, wear) for body in ("punch", "strip"))
-    np.testing.assert_allclose(strip[:, 2], data.strip_z - 100 * 0.02)
+    punch, strip = (deformed(data, body, view) for body in ("punch", "strip"))
+    np.testing.assert_allclose(strip[data.strip_z.values == 10, 2], 10 - 100 * 0.02 - 100 * 0.005)
+    below = data.strip_z.values <= 8
+    np.testing.assert_allclose(strip[below, 2], data.strip_z.values[below] - 100 * 0.02)
     surface = data.punch_z.values == 10
     np.testing.assert_allclose(punch[surface, 2], 10 - 100 * 0.02 + 100 * 0.01)
     above = data.punch_z.values >= 12
     np.testing.assert_allclose(punch[above, 2], data.punch_z.values[above] - 100 * 0.02)
     np.testing.assert_allclose(punch[:, 0], data.punch_x)
+
+
+def test_curved_surfaces_are_drawn_as_they_are(tmp_path: Path) -> None:
+    """The gap between a curved punch and the strip has no place in magnified displacements."""
+    data = _write(tmp_path, 2)
+    data.punch_contact_z.values[:] += 0.01 * data.punch_contact_x.values**2
+    assert common_view([data]).factor == 1
 
 
 def test_colours_leave_out_single_points_of_stress(tmp_path: Path) -> None:

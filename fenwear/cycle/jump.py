@@ -50,7 +50,7 @@ def jump(
     Args:
         system: The assembled problem.
         half_cycles: Where to end, a whole number of cycles.
-        tolerance: Largest error of pressure in one jump, as a fraction of the mean pressure.
+        tolerance: Largest error of pressure in one jump, root mean square over the contact and over the mean pressure.
         periodic_within: Stop when the pressure changes per cycle by less than this fraction of the
             mean pressure.
         block: Half-cycles in a block.
@@ -80,7 +80,7 @@ def jump(
             if recorder:
                 yield recorder.take(moment)
             raise ConvergenceError(f"half-cycle {done * strokes + 1}: {error}") from error
-        error_estimate = _largest_change(whole, end) / _present_mean(system, end)
+        error_estimate = _difference(system, whole, end)
         factor = 0.9 * np.sqrt(tolerance / max(error_estimate, 1e-300))
         if error_estimate > tolerance and tried > 1:
             length = max(1, int(tried * max(0.2, factor)))
@@ -238,16 +238,17 @@ def solve_with_heat(
     )
 
 
-def _largest_change(one: Moment, other: Moment) -> float:
-    pairs = zip(one.contacts, other.contacts, strict=True)
-    return max(float(np.abs(_present(a).pressure - _present(b).pressure).max()) for a, b in pairs)
+def _difference(system: System, one: Moment, other: Moment) -> float:
+    """Return the root mean square of the pressures' difference over what is in contact, over the mean pressure there.
 
-
-def _present_mean(system: System, moment: Moment) -> float:
-    """Return the mean pressure over what is in contact, at least that over the nominal contact, MPa."""
-    mean, weights = system.statics.mean_pressure, system.facing.weights
-    widths = [float(weights @ (_present(contact).pressure[0] > 0)) for contact in moment.contacts]
-    return mean * max(1.0, float(weights.sum()) / max(*widths, weights.min()))
+    Not the largest: that is the whole pressure of the one node which is in contact here and not there.
+    """
+    weights, largest = system.facing.weights, 0.0
+    for a, b in zip(one.contacts, other.contacts, strict=True):
+        first, second = _present(a).pressure[0], _present(b).pressure[0]
+        width = float(weights @ (np.maximum(first, second) > 0))
+        largest = max(largest, float(weights @ (first - second) ** 2) * width)
+    return float(np.sqrt(largest) / (system.statics.mean_pressure * weights.sum()))
 
 
 def _present(contact: ContactState | None) -> ContactState:

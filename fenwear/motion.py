@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -146,6 +146,19 @@ class Motion:
     def reach(self) -> float:
         """Largest offset of the strip, mm."""
         return max(abs(phase.offset) for phase in self.phases)
+
+    def in_parts(self, parts: int) -> Motion:
+        """Return the motion with each phase cut into parts of equal time at its position."""
+        if parts == 1:
+            return self
+        phases = []
+        for number, phase in enumerate(self.phases):
+            stroke, place = self._strokes[number // self.positions], number % self.positions
+            edges = _edges(stroke, self.positions * parts)[place * parts : (place + 1) * parts + 1]
+            for low, high in itertools.pairwise(edges):
+                distance = stroke.power(low, high, 1.0)
+                phases.append(replace(phase, duration=high - low, distance=distance))
+        return replace(self, phases=tuple(phases), positions=self.positions * parts)
 
     def time(self, half_cycle: NDArray[np.int64]) -> Array:
         """Return the time at the end of half-cycles, given by their numbers from 1, s."""

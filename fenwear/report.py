@@ -141,7 +141,7 @@ def _table(caption: str, rows: str, columns: Sequence[str] = ("quantity", "value
 
 def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
     """Return every number of a summary by its path."""
-    values = flat({key: value for key, value in summary.items() if key not in ("versions", "warnings")})
+    values = flat({key: value for key, value in summary.items() if key not in ("versions", "warnings", "retries")})
     return {k: v for k, v in values.items() if isinstance(v, int | float) and not isinstance(v, bool)}
 
 
@@ -179,12 +179,16 @@ def _indexed(path: str, numbers: dict[str, Any]) -> list[str]:
 
 def _convergence(summary: dict[str, Any]) -> str:
     change = summary.get("periodicity")
+    retries = "".join(
+        f"<p>Where the usual way did not converge: {escape(name)}, {count} times.</p>"
+        for name, count in summary.get("retries", {}).items()
+    )
     if change is None or math.isnan(change):
-        return ""
+        return retries
     word = "repeats from cycle to cycle" if change < 1e-3 else "still changes from cycle to cycle"
     return (
         f"<p>At the end the pressure {word}: its largest change against one cycle ago is {100 * change:.3g} % of the "
-        "mean pressure.</p>"
+        f"mean pressure.</p>{retries}"
     )
 
 

@@ -41,7 +41,10 @@ VARIABLES = {
     "optimum_distance": (("half_cycle",), "1", "largest distance to the optimal pressure over the mean pressure"),
     "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the mean pressure"),
     "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
+    "retries": (("half_cycle",), "1", "solves that took a second attempt, in another way or in smaller steps"),
 }
+
+INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 
 # the same with heat; the names of a BlockHeat, terms of the balance by their position
 HEAT_VARIABLES = {
@@ -175,7 +178,7 @@ class HistoryWriter:
                 variable[:] = values
                 variable.attrs.update(units="mm", long_name=long_name)
             for name, (dimensions, units, long_name) in self._variables.items():
-                kind = int if name in ("half_cycle", "direction", "coupling_iterations") else float
+                kind = int if name in INTEGERS else float
                 chunks = (CHUNK, *(sizes[d] for d in dimensions[1:]))
                 variable = file.create_variable(name, dimensions, kind, chunks=chunks)
                 variable.attrs.update(units=units, long_name=long_name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType, TracebackType
@@ -91,7 +92,7 @@ def _run(
     except (ConvergenceError, InterruptedRunError) as error:
         failure = error
     times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
-    summary = run.finish({"stop": run.stop(failure), **times, "warnings": run.warnings})
+    summary = run.finish({"stop": run.stop(failure), **times, "warnings": run.warnings, "retries": run.remedies})
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -132,6 +133,7 @@ class _Run:
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []
+        self.remedies: Counter[str] = Counter()
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
@@ -191,9 +193,19 @@ class _Run:
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
+        self._tell_remedies(block)
         self._on_history(lambda writer: writer.add(block))
         if int(block.half_cycle[-1]) in self._fields_at:
             self._write_fields(block)
+
+    def _tell_remedies(self, block: Block) -> None:
+        for name, count in block.remedies.items():
+            times = "once" if count == 1 else f"{count} times"
+            which = block.half_cycle[block.retries > 0]
+            self.log(
+                f"half-cycles {which[0]:,} to {which[-1]:,}: {name}, {times}, where the usual way did not converge"
+            )
+        self.remedies += block.remedies
 
     def _note(self, name: str, values: Any) -> None:
         self.extremes[name] = max(self.extremes.get(name, 0.0), float(values.max()))

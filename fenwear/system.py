@@ -25,6 +25,7 @@ from fenwear.interface import Facing, Interface, Statics, check_distance, face, 
 from fenwear.mesh import BodyMesh, build_meshes
 from fenwear.motion import Motion, make_motion
 from fenwear.optimum import Optimum, check_equilibrium, optimum
+from fenwear.remedies import Remedies
 from fenwear.shape import element_height, follow_wear
 from fenwear.surface import Surface, condense, respond_to_load, surface_nodes
 from fenwear.wear import PhasesWear, Wear, Worn
@@ -50,6 +51,8 @@ class System:
             MeshQualityError: an element does not survive the motion.
         """
         self.case, self.comm, self.followed = case, comm, followed
+        self.remedies = Remedies()
+        self._parts = 1  # into which each phase of the motion is cut
         meshes = build_meshes(case.geometry, case.folder, comm)
         self.moved: Worn | None = None if followed is None else self._move(meshes, followed)
         self.punch, self.strip = (self._body(m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
@@ -101,16 +104,23 @@ class System:
         """
         return self.with_case(changed_case(self.case, *settings))
 
+    def in_parts(self, parts: int) -> System:
+        """Return the system with each phase of the motion cut into parts of equal time; collective."""
+        return self._changed(self.case, parts)
+
     def with_case(self, case: Case) -> System:
         """Return the system of another case, as `vary`; collective."""
         if not _same_bodies(self.case, case):
             return System(case, self.comm, self.followed)
+        return self._changed(case, 1)
+
+    def _changed(self, case: Case, parts: int) -> System:
         self.prepare()  # what is not made yet would be made anew in every variant
         other = copy.copy(self)
         kept = {"facing", "punch", "strip", "statics", "comm"}
         for name in [n for n, member in vars(System).items() if isinstance(member, cached_property) and n not in kept]:
             other.__dict__.pop(name, None)
-        other.case = case
+        other.case, other._parts = case, parts
         other._share_elasticity(self)
         other._share_heat(self)
         other._check_equilibrium()
@@ -294,7 +304,7 @@ class System:
     @cached_property
     def motion(self) -> Motion:
         """The sliding motion."""
-        return make_motion(self.case.motion, strip_wears=self.case.wear.strip is not None)
+        return make_motion(self.case.motion, strip_wears=self.case.wear.strip is not None).in_parts(self._parts)
 
     @cached_property
     def friction(self) -> Friction:
@@ -396,7 +406,7 @@ class System:
     def _contact(self, phases: list[Sliding]) -> ContactSolver:
         if self.case.contact.solver == "full":
             return FullContact(self.punch, self.strip, phases[0].interface, phases[0].slip)
-        return CondensedContact(phases)
+        return CondensedContact(phases, self.remedies)
 
     def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.

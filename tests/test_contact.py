@@ -127,7 +127,7 @@ def test_warm_start_changes_nothing_but_the_work(system: System) -> None:
 @pytest.fixture
 def one_iteration() -> Iterator[None]:
     options = PETSc.Options()
-    names = [f"fenwear_{name}snes_max_it" for name in ("contact_", "full_contact_")]
+    names = [f"fenwear_{name}snes_max_it" for name in ("contact_", "contact_search_", "full_contact_")]
     for name in names:
         options[name] = 1
     yield

@@ -24,9 +24,11 @@ from fenwear.cycle.moment import Moment, beginning, joined, parted
 from fenwear.errors import ConvergenceError
 from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
+from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
 from fenwear.system import System
 from fenwear.wear import Worn, WornLayer
 
+PARTS = 8  # of a cycle that does not converge as a whole
 MAX_ITERATIONS = 60  # of contact with the nodes that conduct
 CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
 
@@ -71,18 +73,17 @@ def jump(
     while done < cycles:
         tried = min(length, next(end for end in ends if end > done) - done)
         try:
-            whole = stepper.step(moment, tried)
-            end = stepper.step(stepper.step(moment, tried / 2), tried / 2)
+            end, estimate = stepper.attempt(moment, tried, tolerance)
         except ConvergenceError as error:
             if tried > 1:
+                system.remedies.note(SHORTER_JUMPS)
                 length = max(1, tried // 4)
                 continue
             if recorder:
                 yield recorder.take(moment)
             raise ConvergenceError(f"half-cycle {done * strokes + 1}: {error}") from error
-        error_estimate = _difference(system, whole, end)
-        factor = 0.9 * np.sqrt(tolerance / max(error_estimate, 1e-300))
-        if error_estimate > tolerance and tried > 1:
+        factor = 0.9 * np.sqrt(tolerance / max(estimate, 1e-300))
+        if estimate > tolerance and tried > 1:
             length = max(1, int(tried * max(0.2, factor)))
             continue
         done += tried
@@ -111,6 +112,31 @@ class _Stepper:
     def beginning(self) -> Moment:
         """Return the unworn bodies at their initial temperature."""
         return beginning(self.system, None if self.heat is None else self.heat.exchange.initial())
+
+    def attempt(self, moment: Moment, cycles: int, tolerance: float) -> tuple[Moment, float]:
+        """Return the moment `cycles` cycles later, by two steps, and an estimate of its error.
+
+        Raises:
+            ConvergenceError: it did not converge; a single cycle not in smaller steps either.
+        """
+        try:
+            whole, halves = self.step(moment, cycles), self.steps(moment, cycles, 2)
+        except ConvergenceError as error:
+            if cycles > 1:
+                raise
+            try:
+                parts = self.steps(moment, cycles, PARTS)
+            except ConvergenceError:
+                raise error from None
+            self.system.remedies.note(SMALLER_STEPS.format(PARTS))
+            return parts, tolerance
+        return halves, _difference(self.system, whole, halves)
+
+    def steps(self, moment: Moment, cycles: float, count: int) -> Moment:
+        """Return the moment `cycles` cycles later, by that many equal steps."""
+        for _ in range(count):
+            moment = self.step(moment, cycles / count)
+        return moment
 
     def step(self, moment: Moment, cycles: float) -> Moment:
         """Return the moment `cycles` cycles later."""

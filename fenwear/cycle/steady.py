@@ -175,7 +175,7 @@ class _SteadyInequality:
         f = np.empty_like(self.x)
         self._residual(self.x, f)
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
-        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.snes.getIterationNumber())
+        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.iterations)
 
     def _start(self) -> Array:
         """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""

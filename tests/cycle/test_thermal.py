@@ -64,17 +64,26 @@ def test_split_tolerance(assemble: Assemble) -> None:
     assert 0.03 > errors[0] > 5 * errors[1] > 25 * errors[2]
 
 
-def test_diverging_split_names_the_half_cycle(assemble: Assemble) -> None:
-    """Issue 4: too much heat in a half-cycle for the split ends with its number, advice, and all that came before."""
-    hot = ("motion.amplitude=150", "heat.partition=1", "heat.relaxation=1", "wear.punch.coefficient=0")
-    system = assemble("example1-heat", *COARSE, "heat.coupling=split", *hot)
+def test_too_much_heat_names_the_half_cycle(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Too much heat in a half-cycle, without smaller steps, ends with its number and all that came before."""
+    monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
+    system = assemble("example1-heat", *COARSE, "motion.amplitude=20")
     done: list[int] = []
-    blocks = march(system, 40, implicit=True)
-    with pytest.raises(ConvergenceError, match=r"half-cycle \d+: .*heat\.relaxation") as failure:
+    blocks = march(system, 40)
+    with pytest.raises(ConvergenceError, match=r"half-cycle \d+: .*did not converge") as failure:
         done.extend(number for block in blocks for number in block.half_cycle)
     number = int(re.findall(r"half-cycle (\d+)", str(failure.value))[0])
     assert number > 1
     assert done == list(range(1, number))
+
+
+def test_slow_split_gives_advice(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A relaxation too small to come to an end in the iterations there are: the error names the key."""
+    monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
+    slow = ("heat.relaxation=0.01", "heat.split_tolerance=1e-12")
+    system = assemble("example1-heat", *COARSE, "heat.coupling=split", *slow)
+    with pytest.raises(ConvergenceError, match=r"half-cycle 1: the operator split.*heat\.relaxation"):
+        run(system, 2)
 
 
 @pytest.mark.parametrize("partition", [0.2, 0.5])

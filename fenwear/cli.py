@@ -174,10 +174,12 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
 
     loaded = _load(case, settings)
     system = System(loaded)
+    number = stability_number(system)
+    system.check_touching()
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.facing.x)} contact nodes, "
         f"{system.punch.stiffness.size[0] + system.strip.stiffness.size[0]:,} displacement degrees of freedom, "
-        f"wear step {100 * stability_number(system):.3g} % of the explicit limit")  # fmt: skip
+        f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
 
 
 @app.command("mesh")

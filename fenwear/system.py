@@ -319,6 +319,27 @@ class System:
         track = self.case.motion.track if isinstance(self.case.motion, OneWay) else None
         return Wear(*laws, (sliding[0], sliding[1]), self.facings, self.friction, track)
 
+    def check_touching(self) -> None:
+        """Make sure that the surfaces touch in some phase; collective.
+
+        Raises:
+            CaseError: they never meet: no pressure, no wear, nothing to follow.
+            ConvergenceError: the contact of a phase did not converge.
+        """
+        gaps = []
+        for phase in range(len(self.motion.phases)):
+            contact = self.phase_contact((phase,)).solve(self.gap(phase, self.unworn()))
+            if contact.pressure.max() > 0:
+                return
+            gaps.append(float(contact.gap.min()))
+        raise CaseError(
+            Problem(
+                "geometry",
+                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
+                "expected a punch that its supports let come down, or that starts in contact",
+            )
+        )
+
     @property
     def constant_coefficients(self) -> bool:
         """Whether friction and wear are the same at any temperature, pressure and speed."""

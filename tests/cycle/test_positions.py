@@ -169,6 +169,35 @@ def test_temperature_dependent_wear(assemble: Callable[..., System]) -> None:
     assert (np.diff(block.worn_area) > 0).all()
 
 
+@pytest.mark.mpi
+def test_heat_under_a_strip_that_moves(assemble: Callable[..., System]) -> None:
+    """With heat and both bodies worn: areas and friction heat exact, the balance closed; nearly as in one position."""
+    hot = ("heat.partition=0.2", "heat.steps=5")
+    one = assemble("example1-heat", *COARSE, *hot)
+    several = assemble("example1-heat", *BOTH, *hot)
+    (single,), (block,) = (list(march(system, 40)) for system in (one, several))
+    np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
+    np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
+    assert block.heat is not None
+    assert single.heat is not None
+    assert block.heat.balance_error.max() < 1e-8
+    np.testing.assert_allclose(block.heat.terms[:, 0], 0.25 * 1e4 * 3, rtol=1e-11)  # mu F 2 u0, mJ
+    largest = single.heat.temperature_punch.max()
+    np.testing.assert_allclose(block.heat.temperature_punch, single.heat.temperature_punch, atol=0.1 * largest)
+
+
+def test_surfaces_that_never_meet(assemble: Callable[..., System]) -> None:
+    """A punch that is held, and drawn away from the strip by its load: not a run without wear but an error."""
+    held = "punch.supports=[{on='punch_load', fix=['x', 'z']}]"
+    for force in (-1000, 1000):
+        system = assemble("example1", *COARSE, held, f"punch.loads=[{{on='punch_free', force=[0, {force}]}}]")
+        if force < 0:
+            system.check_touching()
+            continue
+        with pytest.raises(CaseError, match=r"geometry: the surfaces never meet within the stroke: .* mm apart"):
+            system.check_touching()
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [

@@ -176,7 +176,7 @@ def reached(directory: Path) -> int | None:
 def _arrays(folder: Path) -> dict[str, Any]:
     try:
         with np.load(folder / ARRAYS) as arrays:
-            followed = FOLLOWED if FOLLOWED[0] in arrays else ()
+            followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
             return {name: arrays[name] for name in (*NUMBERS, *WEAR, *STATES, *followed)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         raise _damaged(folder) from None
@@ -197,9 +197,10 @@ def _read(folder: Path, system: System) -> dict[str, Any]:
     if problems:
         raise CaseError([Problem("--resume", "the checkpoint is of another case"), *problems])
     arrays = _arrays(folder)
-    for name, unworn in _depths(WEAR, system.unworn()).items():
-        if arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all():
-            raise _damaged(folder)
+    for names in (WEAR, FOLLOWED):
+        for name, unworn in _depths(names, system.unworn()).items():
+            if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
+                raise _damaged(folder)
     return arrays
 
 

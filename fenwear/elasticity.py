@@ -19,7 +19,7 @@ from fenwear import compat
 from fenwear.case import Body, Load, Material, Model, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.mesh import BodyMesh
-from fenwear.parallel import total
+from fenwear.parallel import assemble_in_order, total
 
 AXES = {"x": 0, "z": 1}
 PREFIX = "fenwear_elasticity_"
@@ -111,6 +111,7 @@ class ElasticBody:
         bcs = supports + self._regularise()
         self.supported = self._owned_dofs(bcs)
         self._set_loads(description.loads, model.thickness)
+        assemble_in_order()
         self.stiffness = fem.petsc.assemble_matrix(fem.form(a), bcs=bcs)
         self.stiffness.assemble()
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)

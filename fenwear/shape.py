@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
-from fenwear.compat import interpolation_points
+from fenwear.compat import geometry_dofmap, interpolation_points
 from fenwear.errors import MeshQualityError
 from fenwear.mesh import BodyMesh
 
@@ -142,10 +142,10 @@ def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArr
 def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) -> fem.Function:
     matrix = fem.petsc.assemble_matrix(a, bcs=bcs)
     matrix.assemble()
-    load = matrix.createVecRight()
-    fem.petsc.apply_lifting(load, [a], [bcs])
-    load.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-    fem.petsc.set_bc(load, bcs)
+    load = fem.Function(space)  # its vector has ghosts, unlike the matrix's own
+    fem.petsc.apply_lifting(load.x.petsc_vec, [a], [bcs])
+    load.x.petsc_vec.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+    fem.petsc.set_bc(load.x.petsc_vec, bcs)
     ksp = PETSc.KSP().create(space.mesh.comm)
     ksp.setOptionsPrefix(PREFIX)
     ksp.setOperators(matrix)
@@ -154,7 +154,7 @@ def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) ->
     ksp.pc.setFactorSolverType("mumps")
     ksp.setFromOptions()
     solution = fem.Function(space)
-    ksp.solve(load, solution.x.petsc_vec)
+    ksp.solve(load.x.petsc_vec, solution.x.petsc_vec)
     solution.x.scatter_forward()
     return solution
 
@@ -166,7 +166,7 @@ def _move(body: BodyMesh, shift: fem.Function, direction: Array) -> None:
     of_geometry = fem.Function(space)
     of_geometry.interpolate(shift)
     x = mesh.geometry.x
-    nodes, dofs = mesh.geometry.dofmap.ravel(), space.dofmap.list.ravel()
+    nodes, dofs = geometry_dofmap(mesh).ravel(), space.dofmap.list.ravel()
     moved = x.copy()
     moved[nodes, :2] = x[nodes, :2] + of_geometry.x.array[dofs, None] * direction
     x[:] = moved

@@ -17,6 +17,8 @@ CASES = {
     "implicit": ("example2", "run.half_cycles=40", "run.integration=implicit"),
     "jump": ("example1", "run.half_cycles=2000", "run.integration=jump"),
     "heat": ("example1-heat", "run.half_cycles=60"),
+    "two worn bodies": ("fretting", "run.half_cycles=2000", "motion.positions=5"),
+    "followed meshes": ("example1-heat", "run.half_cycles=30", "run.integration=implicit", "geometry.follow_wear=1e-5"),
     "full heat": ("example1-heat", "run.half_cycles=30", "heat.operator=full"),
 }
 
@@ -42,11 +44,13 @@ def test_the_same_bits_again(fenwear: Run, tmp_path: Path, name: str, ranks: int
 
 @pytest.mark.parametrize("name", CASES)
 def test_other_ranks_give_the_same_numbers(fenwear: Run, tmp_path: Path, name: str) -> None:
-    """1, 2 and 3 ranks to 1e-9 of each variable's largest value."""
+    """1, 2 and 3 ranks to 1e-9 of each variable's largest value; gaps of that of the depths, heats of the friction's."""
     one, *others = (run(fenwear, tmp_path / str(ranks), name, ranks) for ranks in (1, 2, 3))
     measures = ("equilibrium_error", "heat_balance_error")  # of rounding itself
     for other in others:
         np.testing.assert_array_equal(other.half_cycle, one.half_cycle)
         for variable in sorted(set(one.data_vars) - set(measures)):
-            scale = float(np.abs(one[variable]).max())
+            # A gap closed everywhere and the heat that a sinusoidal motion carries away are sums of rounding.
+            measure = {"gap": "wear"}.get(variable, "heat_friction" if str(variable).startswith("heat_") else variable)
+            scale = float(np.abs(one[measure]).max())
             np.testing.assert_allclose(other[variable], one[variable], rtol=0, atol=1e-9 * scale, err_msg=str(variable))

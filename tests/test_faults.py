@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -262,6 +262,47 @@ def test_killed_at_any_moment(tmp_path: Path) -> None:
             assert int(moment["half_cycle"]) <= check_history(folder) + 20
 
 
+RICH = {
+    "worn strip": ("fretting", "motion.positions=3", "run.integration=implicit"),
+    "followed meshes": ("example1-heat", "run.integration=implicit", "geometry.follow_wear=2e-4"),
+}
+
+
+@pytest.mark.parametrize("name", RICH)
+def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -> None:
+    """Killed and gone on with on two ranks: as if never killed, with the strip's wear and meshes that have moved."""
+    case, *settings = RICH[name]
+    resumed, whole = tmp_path / "resumed", tmp_path / "whole"
+    with running(resumed, *settings, case=case) as process:
+        if name == "followed meshes":
+            _wait_for(resumed, "followed_punch")
+        process.send_signal(signal.SIGKILL)
+        process.communicate(timeout=10)
+    with np.load(resumed / "checkpoint" / "moment.npz") as moment:
+        assert np.abs(moment["wear_strip"]).max() > 0 or name != "worn strip"
+        last = int(moment["half_cycle"]) + 40
+    words = options(*settings, f"run.half_cycles={last}", "output.every=10", "output.fields_at=[]")
+    for folder, ranks, extra in ((resumed, 2, ["--resume"]), (whole, 1, [])):
+        done = fenwear("run", case, "-o", folder, *words, *extra, ranks=ranks)
+        assert done.returncode == 0, done.stderr
+    one, other = (xarray.load_dataset(folder / "history.nc", engine="h5netcdf") for folder in (resumed, whole))
+    np.testing.assert_array_equal(one.half_cycle, other.half_cycle)
+    for variable in sorted(set(other.data_vars) - {"equilibrium_error", "heat_balance_error", "periodicity"}):
+        scale = float(np.abs(other[variable]).max())
+        np.testing.assert_allclose(one[variable], other[variable], rtol=0, atol=1e-9 * scale, err_msg=str(variable))
+
+
+def _wait_for(folder: Path, name: str) -> None:
+    """Wait until the checkpoint holds these depths."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline:
+        with suppress(FileNotFoundError), np.load(folder / "checkpoint" / "moment.npz") as moment:
+            if name in moment:
+                return
+        time.sleep(0.05)
+    raise AssertionError(f"no {name} in {folder}")
+
+
 # ---------------------------------------------------------------------- removed files
 
 
@@ -376,6 +417,29 @@ def test_nan_in_a_checkpoint(fenwear: Run, tmp_path: Path) -> None:
     assert "is damaged" in done.stderr
 
 
+@pytest.mark.parametrize("array", ["wear_strip", "followed_punch", "followed_strip"])
+@pytest.mark.parametrize("damage", ["NaN", "too short", "missing"])
+def test_damaged_depths_in_a_checkpoint(fenwear: Run, tmp_path: Path, array: str, damage: str) -> None:
+    """Of the strip's wear and of what the meshes follow."""
+    folder, (name, *settings) = tmp_path / "run", RICH["followed meshes"]
+    words = ("run", name, "-o", folder, *options(*settings, "geometry.follow_wear=1e-6", "output.fields_at=[]"))
+    assert fenwear(*words, "--set", "run.half_cycles=4").returncode == 0
+    path = folder / "checkpoint" / "moment.npz"
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    match damage:
+        case "NaN":
+            arrays[array][3] = np.nan
+        case "too short":
+            arrays[array] = arrays[array][:-1]
+        case _:
+            del arrays[array]
+    np.savez(path, **arrays)
+    done = fenwear(*words, "--set", "run.half_cycles=8", "--resume")
+    assert done.returncode == 2, done.stderr
+    assert "is damaged" in done.stderr
+
+
 def test_damaged_history(fenwear: Run, tmp_path: Path) -> None:
     """Refused with what to do; without it the run goes on."""
     folder = tmp_path / "run"
@@ -392,13 +456,14 @@ def test_damaged_history(fenwear: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("coefficient", ["1e290", "1e30"])
-def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str) -> None:
+@pytest.mark.parametrize(("follow", "expected"), [("never", "did not converge"), ("0.5", "has used up the elements")])
+def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str, follow: str, expected: str) -> None:
     """Numbers that overflow end as a solver that did not converge; no NaN gets into the history."""
     folder = tmp_path / "run"
-    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=6"),
+    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=6", f"geometry.follow_wear={follow}"),
                    "--set", f"wear.punch.coefficient={coefficient}")  # fmt: skip
     assert done.returncode == 3, done.stderr
-    assert "did not converge" in done.stderr
+    assert expected in done.stderr
     check_history(folder)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any
@@ -53,8 +54,10 @@ def parse_expression(text: str) -> Function:
     """
     if len(text) > LONGEST:
         raise ValueError(f"expected at most {LONGEST} characters, got {len(text)}")
+    text = text.strip()
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        with warnings.catch_warnings(action="ignore"):  # of what is refused below in our words
+            tree = ast.parse(text, mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise ValueError(f"expected an expression of {KNOWN}, got {text!r}") from None
     return _build(tree.body, text, DEEPEST)
@@ -67,8 +70,7 @@ def _build(node: ast.AST, text: str, depth: int) -> Function:
         case ast.Constant(value=bool()):
             pass
         case ast.Constant(value=int() | float() as value):
-            number = np.float64(value)
-            return lambda _: number
+            return _constant(value, text)
         case ast.Name(id=name) if name in VARIABLES:
             return lambda state: state[name]
         case ast.UnaryOp(op=op, operand=operand) if type(op) in OPERATIONS:
@@ -83,8 +85,18 @@ def _build(node: ast.AST, text: str, depth: int) -> Function:
                 raise ValueError(f"wrong number of arguments of {name} in {text!r}")
             function, inners = FUNCTIONS[name], [_build(argument, text, depth - 1) for argument in args]
             return lambda state: function(*(inner(state) for inner in inners))
-    found = ast.unparse(node) if hasattr(node, "lineno") else type(node).__name__
+    found = ast.get_source_segment(text, node) or type(node).__name__  # ast.unparse may exhaust the stack
     raise ValueError(f"expected an expression of {KNOWN}; {found!r} is not known in {text!r}")
+
+
+def _constant(value: float, text: str) -> Function:
+    try:
+        number = np.float64(value)  # not an int: its powers would grow without end
+    except OverflowError:
+        number = np.float64(np.inf)
+    if not np.isfinite(number):
+        raise ValueError(f"expected finite numbers in {text!r}")
+    return lambda _: number
 
 
 def evaluate(function: Function, state: State, shape: tuple[int, ...]) -> Array:

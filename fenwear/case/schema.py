@@ -243,6 +243,12 @@ class Contact(_Part):
     )
     solver: Literal["condensed", "full"] = "condensed"
 
+    @model_validator(mode="after")
+    def _pure_number(self) -> Self:
+        if isinstance(self.friction, Dependence) and self.friction.unit:
+            raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
+        return self
+
 
 class WearLaw(_Part):
     """Wear rate normal to the surface = beta~ p^b v^a, equation (1).
@@ -451,7 +457,8 @@ class Heat(_Part):
         )
     )
 
-    reduction_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+    # Finer than 1e-8 the basis, found by squares, would be made of rounding.
+    reduction_tolerance: Annotated[Number, Field(ge=1e-8, lt=1)] = Field(
         default=3e-5, description="of the reduced operator's basis, relative"
     )
 

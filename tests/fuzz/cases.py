@@ -19,30 +19,27 @@ import sys
 import tempfile
 import tomllib
 from collections import Counter
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import bases
 import numpy as np
 import tomli_w
+from bases import base
 from pool import Verdict, verdicts
 
 from fenwear import Case, System, jump, load_case, make_case, march
+from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError
+from fenwear.heat.exchange import HeatExchange
 from fenwear.mesh import write_msh
 
 SECONDS = 60.0
-NAMES = ("example1", "example1-heat", "example1-lz40-heat", "example2", "example2-heat", "monotonic-lz20")
-TINY = (
-    "geometry.degree=1",
-    "geometry.parameters.elements_along_contact=4",
-    "geometry.parameters.growth=1.5",
-    "run.half_cycles=2",
-    "output.figures_at=[]",
-)
-WITH_HEAT = ("heat.steps=2",)
+NAMES = tuple(bases.BASES)
 
 # Sizes of units in fenwear's own, written down here and not taken from the library that fenwear uses.
 UNITS: dict[str, dict[str, float]] = {
@@ -58,7 +55,13 @@ UNITS: dict[str, dict[str, float]] = {
     "N/(mm*s*K)": {"W/(m^2 K)": 1e-3, "N/(mm*s*K)": 1, "W/(cm^2 K)": 10},
     "mm^2/(s^2*K)": {"J/(kg K)": 1e6, "kJ/(kg K)": 1e9, "mm^2/(s^2*K)": 1},
     "N*s^2/mm^4": {"kg/m^3": 1e-12, "g/cm^3": 1e-9, "N*s^2/mm^4": 1},
+    "N/(mm*s*K*MPa)": {"W/(m^2 K MPa)": 1e-3, "N/(mm*s*K*MPa)": 1, "kW/(m^2 K GPa)": 1e-3},
+    "MPa^-1": {"1/MPa": 1, "mm^2/N": 1, "1/GPa": 1e-3, "m^2/N": 1e6, "Pa^-1": 1e6, "mm^3/J": 1e-3},
+    "mm^3/(N*mm)": {"mm^3/(N*mm)": 1, "mm^3/J": 1e-3, "m^3/J": 1e6, "mm^3/(N m)": 1e-3, "1/MPa": 1},
+    "MPa^-1.5": {"MPa^-1.5": 1, "Pa^-1.5": 1e9, "kPa^-1.5": 10**4.5, "bar^-1.5": 10**1.5},
+    "MPa^-1*mm^-1*s^1": {"s/(MPa mm)": 1, "s/(Pa m)": 1e3, "min/(GPa mm)": 0.06, "mm s/N": 1},
 }
+ONE_KIND = ({"MPa^-1", "mm^3/(N*mm)"},)  # of the same dimension
 
 STRINGS = (
     *("", " ", "mm", "1", "-3 mm", "nan", "inf mm", "1e400", "-1e-400 mm", "1e308 km", "0x10 mm", "1_000", "1,5 mm"),
@@ -82,16 +85,9 @@ def deep(random_: random.Random) -> Any:
     """Return lists or tables inside each other."""
     value: Any = 1
     table = random_.random() < 0.5
-    for _ in range(random_.choice((3, 50, 400))):
+    for _ in range(random_.choice((3, 50, 200))):
         value = {"a": value} if table else [value]
     return value
-
-
-@cache
-def base(name: str) -> dict[str, Any]:
-    """Return the tables of a built-in case on a tiny geometry."""
-    settings = (*TINY, *(WITH_HEAT if name.endswith("heat") else ()))
-    return tomllib.loads(load_case(name, settings).to_toml())
 
 
 def places(tables: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -129,8 +125,10 @@ def mutate(random_: random.Random, tables: dict[str, Any]) -> None:
     """Change the tables in one place."""
     path = random_.choice(places(tables))
     parent, key = at(tables, path[:-1]), path[-1]
-    kind = random_.randrange(8)
-    if kind == 0:
+    kind = random_.randrange(10)
+    if kind >= 8:
+        law(random_, tables)
+    elif kind == 0:
         del parent[key]
     elif kind == 1 and isinstance(parent, dict):  # misspelt, or another key's name
         names = sorted({str(step) for p in places(tables) for step in p})
@@ -144,6 +142,71 @@ def mutate(random_: random.Random, tables: dict[str, Any]) -> None:
         parent[key] = scaled(random_, parent[key])
     else:
         parent[key] = any_value(random_)
+
+
+def law(random_: random.Random, tables: dict[str, Any]) -> None:
+    """Set one of the keys of laws, motions, loads and moving meshes."""
+    path, value = random_.choice(KEYS)(random_)
+    place: Any = tables
+    for step in path[:-1]:
+        if not isinstance(place, dict):
+            return
+        place = place.setdefault(step, {})
+        if isinstance(place, list):
+            place = place[0] if place else None
+    if isinstance(place, dict):
+        place[path[-1]] = copy.deepcopy(value)
+
+
+def dependence(random_: random.Random) -> Any:
+    """Return an expression or a table, most of them bad, at times with a unit."""
+    kind = random_.randrange(8)
+    if kind < 4:
+        made: dict[str, Any] = {"expression": random_.choice(bases.HOSTILE)}
+    elif kind < 6:
+        made = {"expression": expression(random_, random_.choice((1, 2, 4, 12)))}
+    else:
+        made = {"table": random_.choice(bases.TABLES), "of": random_.choice(("T", "p", "v", "p", "x", ""))}
+    if random_.random() < 0.5:
+        made["unit"] = random_.choice(bases.DEPENDENCE_UNITS)
+    if random_.random() < 0.05:
+        made["table" if "expression" in made else "expression"] = random_.choice((*bases.GOOD, *bases.TABLES))
+    return made
+
+
+def expression(random_: random.Random, depth: int) -> str:
+    """Return an expression of random operations, which may be of no kind that is allowed."""
+    if depth == 0 or random_.random() < 0.15:
+        return random_.choice((*"Tpv", *"Tpv", "1e-9", "2", "0", "1e-300", "1e300", "x", "9**9"))
+    one, other = (expression(random_, depth - 1) if depth < 8 or n == 0 else "p" for n in range(2))
+    name = random_.choice(("exp", "log", "sqrt", "tanh", "abs", "sin", "min", "max"))
+    operation = random_.choice(("+", "-", "*", "/", "**", "*", "*", "//"))
+    return random_.choice((f"({one} {operation} {other})", f"{name}({one})", f"{name}({one}, {other})", f"-{one}"))
+
+
+KEYS: tuple[Any, ...] = (
+    lambda r: (("contact", "friction"), dependence(r)),
+    lambda r: (("contact", "friction"), {"expression": r.choice(bases.GOOD), "unit": r.choice(bases.DEPENDENCE_UNITS)}),
+    lambda r: (("contact", "transverse_friction"), r.choice((0.1, -0.1, 5, "0.1 mm", 1e300))),
+    lambda r: (("wear", r.choice(("punch", "strip")), "coefficient"), dependence(r)),
+    lambda r: (("wear", r.choice(("punch", "strip")), "beta"), r.choice((dependence(r), 1e-8, "1e-8 1/MPa"))),
+    lambda r: (("wear", r.choice(("punch", "strip"))), r.choice(bases.LAW_TABLES)),
+    lambda r: (("wear", r.choice(("punch", "strip")), "pressure_exponent"), r.choice((*NUMBERS, 0.5, 1.5, "2"))),
+    lambda r: (("wear", r.choice(("punch", "strip")), "speed_exponent"), r.choice((*NUMBERS, 0.5, 1.5, "2"))),
+    lambda r: (("motion", "positions"), r.choice((1, 2, 3, 4, 9, 0, -1, 200, 201, 2.0, "3", None))),
+    lambda r: (("motion", "profile"), r.choice(("sinusoidal", "triangular", "trapezoidal", "square", 1))),
+    lambda r: (("motion", "ramp"), r.choice((0.1, 0.5, 0.51, 0, 1e-300, 1e-12, "10 percent"))),
+    lambda r: (("motion", "axis"), r.choice(("x", "y", "z"))),
+    lambda r: (("motion", "track"), r.choice((600, "600 mm", 0, 1e-300, 1e300, "1 s"))),
+    lambda r: (("motion", "amplitude"), r.choice(("1 um", "1 mm", "10 mm", "1 km", "1e-300 mm", "1e300 mm"))),
+    lambda r: (("motion",), dict(kind="table", **dict(zip(("times", "displacements"), r.choice(bases.STROKE_TABLES))))),
+    lambda r: ((r.choice(("punch", "strip")), "loads", "over_cycle"), r.choice(bases.CYCLES)),
+    lambda r: (("geometry", "order"), r.choice((1, 2, 3, 0, "2", True))),
+    lambda r: (("geometry", "follow_wear"), r.choice(("never", 1e-9, 1e-6, 0.5, 0, -1, 1e300, "always", 1e-300))),
+    lambda r: (("geometry", "parameters", "overlap"), r.choice((0, 0.05, 3, -3, 1e9, "3 s"))),
+    lambda r: (("run", "integration"), r.choice(("explicit", "implicit", "jump"))),
+    lambda r: (("punch", "pivot"), r.choice(([0, 0], [0], ["1 mm", "1 s"], [1e300, 0]))),
+)
 
 
 def scaled(random_: random.Random, value: Any) -> Any:
@@ -160,13 +223,18 @@ def scaled(random_: random.Random, value: Any) -> Any:
 
 def other_unit(random_: random.Random, tables: dict[str, Any]) -> tuple[tuple[Any, ...], float | None]:
     """Write one quantity in another unit; return its path and its value, None where the unit is of another kind."""
-    quantities = [p for p in places(tables) if isinstance(at(tables, p), str) and quantity(at(tables, p))]
-    path = random_.choice(quantities)
-    number, unit = quantity(at(tables, path)) or (0.0, "")
+    found = [(p, quantity(at(tables, p))) for p in places(tables) if isinstance(at(tables, p), str)]
+    found += [(p, (1.0, at(tables, p))) for p in places(tables) if p[-1] == "unit" and at(tables, p) in UNITS]
+    path, (number, unit) = random_.choice([(path, given) for path, given in found if given])
     wrong = random_.random() < 0.4
-    kind = random_.choice(sorted({*UNITS} - {unit})) if wrong else unit
+    same = next((kinds for kinds in ONE_KIND if unit in kinds), {unit})
+    kind = random_.choice(sorted({*UNITS} - same)) if wrong else unit
     name, size = random_.choice(sorted(UNITS[kind].items()))
-    at(tables, path[:-1])[path[-1]] = f"{number / size!r} {name}"
+    if path[-1] == "unit":  # of a law's expression or table: its values stay, and mean something else
+        number, written = size, name
+    else:
+        written = f"{number / size!r} {name}"
+    at(tables, path[:-1])[path[-1]] = written
     return path, None if wrong else number
 
 
@@ -180,21 +248,34 @@ def quantity(text: str) -> tuple[float, str] | None:
 
 
 def compute(case: Case) -> None:
-    """Assemble and compute two half-cycles.
+    """Assemble and compute two half-cycles, of cycle jumps two cycles; the meshes follow the wear.
 
     Raises:
         FenwearError: fenwear does not want to.
         NoResultError: what it computed is no result.
     """
-    system = System(case)
-    if case.run.integration == "jump":
-        blocks = list(jump(system, min(case.run.half_cycles, 2 * case.motion.phases)))
-    else:
-        blocks = list(march(system, min(case.run.half_cycles, 2), implicit=case.run.integration == "implicit"))
-    for block in blocks:
-        for values in (block.pressure, block.gap, block.wear, block.equilibrium_error):
+    if make_case(tomllib.loads(case.to_toml()), case.folder).resolved() != case.resolved():
+        raise NoResultError("the resolved case reads back as another one")
+    last = min(case.run.half_cycles, 2)
+    jumps, implicit = case.run.integration == "jump", case.run.integration == "implicit"
+
+    def integrate(system: System, start: Any, leave: Any) -> Iterator[Block]:
+        shared: dict[str, Any] = {"start": start, "leave": leave}
+        if jumps:
+            return jump(system, min(case.run.half_cycles, 2 * system.motion.half_cycles), tolerance=case.run.jump_tolerance, **shared)
+        return march(system, last, implicit=implicit, block=1, **shared)
+
+    def exchange(system: System) -> HeatExchange | None:
+        return system.reduced_exchange if jumps else system.exchange
+
+    for block in follow(System(case), integrate, exchange):
+        for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
                 raise NoResultError("not finite")
+        if block.heat is not None and not np.isfinite(block.heat.max_temperature).all():
+            raise NoResultError("temperatures not finite")
+        if min(block.pressure.min(), block.worn_area.min(), block.worn_area_strip.min()) < 0:
+            raise NoResultError("negative pressure or wear")
         if block.equilibrium_error.max() > 1e-6:
             raise NoResultError(f"not in equilibrium: {block.equilibrium_error.max():g}")
 
@@ -219,6 +300,14 @@ def mutated(seed: int) -> tuple[dict[str, Any], tuple[tuple[Any, ...], float | N
 
 def try_case(seed: int) -> tuple[str, str]:
     """Return what becomes of a case."""
+    kind, text = _try_case(seed)
+    if Path(bases.TRACE).exists():
+        Path(bases.TRACE).rmdir() if Path(bases.TRACE).is_dir() else Path(bases.TRACE).unlink()
+        return "wrong", f"an expression ran code; {text}"
+    return kind, text
+
+
+def _try_case(seed: int) -> tuple[str, str]:
     tables, unit = mutated(seed)
     random_ = random.Random(-seed)
     try:
@@ -227,10 +316,12 @@ def try_case(seed: int) -> tuple[str, str]:
             path, expected = unit
             if expected is None:
                 return "wrong", f"{path} accepted a unit of another kind: {at(tables, path)}"
-            found = at(case.resolved(), path)
-            number, _ = quantity(found) or (math.nan, "")
+            if path[-1] == "unit":
+                number = getattr(case.wear, path[1]).scale
+            else:
+                number, _ = quantity(at(case.resolved(), path)) or (math.nan, "")
             if not math.isclose(number, expected, rel_tol=1e-12):
-                return "wrong", f"{path}: {at(tables, path)} became {found}, expected {expected}"
+                return "wrong", f"{path}: {at(tables, path)} became {number!r}, expected {expected}"
         compute(case)
     except FenwearError as error:
         text = said(error)
@@ -272,7 +363,7 @@ def _made(tables: dict[str, Any], random_: random.Random) -> Case:
 @cache
 def mesh_lines() -> tuple[str, ...]:
     """Return the .msh file of a tiny Example 1 with heat."""
-    case = load_case("example1-heat", TINY)
+    case = load_case("example1-heat", bases.TINY)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "tiny.msh"
         write_msh(case.geometry, None, path)

@@ -98,7 +98,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     system.prepare()  # here, so that the two times are told apart
     setup = time.perf_counter() - begin
     state = steady(system)
-    rate = growth_rate(system, state.pressure)
+    rate = growth_rate(system, state.phase_pressure)
     cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
     if as_json:
         pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}

@@ -24,7 +24,8 @@ thead th:nth-child(2) { text-align: right; }
 .places thead th:nth-child(2) { text-align: left; }
 .comparison thead th:not(:first-child):not(:last-child) { text-align: right; white-space: nowrap; }
 .comparison th[scope=row] { min-width: 18rem; }
-.variants { width: auto; }
+.variants.comparison thead th:not(:first-child) { white-space: normal; overflow-wrap: normal; text-align: right; }
+.variants.comparison th[scope=row] { min-width: 14rem; }
 .stacked thead th:nth-child(2) { text-align: left; }
 .stacked td { overflow-wrap: break-word; min-width: 5rem; }
 .verdict { white-space: nowrap; }

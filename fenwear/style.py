@@ -54,7 +54,8 @@ def reference_line(ax: Axes, height: float, name: str) -> None:
     """Draw a dotted level with its name above the left end."""
     ax.axhline(height, color="0.5", linewidth=0.8, linestyle=":", label="_reference")
     ax.annotate(name, (0, height), xycoords=("axes fraction", "data"), xytext=(4, 2), textcoords="offset points",
-                color=GREY, fontsize="small")  # fmt: skip
+                color=GREY, fontsize="small", zorder=3,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1})  # fmt: skip
 
 
 def contact_axis(ax: Axes) -> None:

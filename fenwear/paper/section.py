@@ -10,7 +10,7 @@ from typing import Any, get_args
 from fenwear.html_page import escape, figure
 from fenwear.paper.figures import paper_figures
 from fenwear.paper.published import OPEN
-from fenwear.paper.rows import Row, Verdict, needed_shares, paper_rows, sensitivity_rows
+from fenwear.paper.rows import NEUTRAL, Row, Verdict, needed_shares, paper_rows, sensitivity_rows
 from fenwear.paper.study import FULL, Scope, Variant
 
 COLUMNS = ("quantity", "paper", "fenwear", "verdict", "why")
@@ -27,8 +27,7 @@ def write_section(scope: Scope = FULL) -> str:
     """Return the comparison as HTML without head or style: tables and figures with their images inline; collective."""
     rows, pictures = paper_rows(scope), paper_figures(scope)
     choices, discretisations = sensitivity_rows(scope)
-    names = {name: "none of ours" if share is None else f"{share:.3f}" for name, share in needed_shares(scope).items()}
-    shares = ", ".join(f"{escape(name)} {text}" for name, text in names.items())
+    drawn = [figure(_png(p.figure), "png", f"{p.title}. {p.caption}", f"{p.title}. {p.caption}") for p in pictures]
     return "\n".join(
         [
             f"<p>The paper leaves open: {escape('; '.join(OPEN))}. Nothing is fitted to its numbers. A number is "
@@ -36,22 +35,34 @@ def write_section(scope: Scope = FULL) -> str:
             "needs a value that the paper does not give.</p>",
             f"<p>{escape(summary(rows))}</p>",
             table(rows),
-            f"<p>The kappa that each of them needs: {shares}.</p>",
-            *(figure(_png(p.figure), "png", f"{p.title}. {p.caption}", f"{p.title}. {p.caption}") for p in pictures),
-            "<h3>Mesh and time step</h3>",
-            f"<p>{escape(LEGEND)}</p>",
-            f"<p>{escape(convergence_text(discretisations))}</p>",
-            variants_table("mesh or time step", discretisations),
+            f"<p>{escape(needed_text(needed_shares(scope)))}</p>",
+            *drawn[:-2],
             "<h3>What the paper leaves open</h3>",
+            f"<p>{escape(LEGEND)}</p>",
+            drawn[-2],
             variants_table("choice", choices),
+            "<h3>Mesh and time step</h3>",
+            f"<p>{escape(convergence_text(discretisations))}</p>",
+            drawn[-1],
+            variants_table("mesh or time step", discretisations),
         ]
     )
 
 
 def summary(rows: Sequence[Row]) -> str:
     """Return how many rows have which verdict, in a sentence."""
-    counts = [(verdict, sum(row.verdict == verdict for row in rows)) for verdict in get_args(Verdict)]
-    return f"Of {len(rows)} rows " + ", ".join(f"{count} {verdict}" for verdict, count in counts) + "."
+    counts = [f"{sum(row.verdict == verdict for row in rows)} are {verdict}" for verdict in get_args(Verdict)]
+    return f"Of {len(rows)} rows {', '.join(counts)}."
+
+
+def needed_text(needed: dict[str, float | None]) -> str:
+    """Return which kappa each number needs, in a sentence."""
+    parts = [
+        f"{name} {'no kappa of ours' if s is None else f'{s:.3f}'}" for name, s in needed.items() if name != NEUTRAL
+    ]
+    neutral = needed[NEUTRAL]
+    beyond = "" if neutral is None else f" Above {neutral:.3f} the periodic state of Example 1 is unstable."
+    return f"The kappa that each number needs: {', '.join(parts)}.{beyond}"
 
 
 def convergence_text(variants: Sequence[Variant]) -> str:
@@ -93,7 +104,9 @@ def table(rows: Sequence[Row]) -> str:
     head = "".join(f'<th scope="col">{name}</th>' for name in COLUMNS)
     body = "\n".join(
         "<tr>"
-        + "".join(f'<td data-column="{name}">{escape(text)}</td>' for name, text in zip(COLUMNS, _cells(row), strict=True))
+        + "".join(
+            f'<td data-column="{name}">{escape(text)}</td>' for name, text in zip(COLUMNS, _cells(row), strict=True)
+        )
         + "</tr>"
         for row in rows
     )
@@ -110,7 +123,8 @@ def variants_table(what: str, variants: Sequence[Variant]) -> str:
         for v in variants
     )
     return (
-        f'<div class="wide" role="region" aria-label="{escape(what)}" tabindex="0"><table class="comparison variants">\n'
+        f'<div class="wide" role="region" aria-label="{escape(what)}" tabindex="0">'
+        f'<table class="comparison variants">\n'
         f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
     )
 

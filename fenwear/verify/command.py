@@ -18,7 +18,7 @@ from fenwear.verify.page import page
 from fenwear.verify.suite import Outcome, Row, VerificationCase, registered, run_cases
 from fenwear.versions import versions
 
-PAPER, PAPER_TITLE = "paper", "Every number of the paper beside fenwear's, with its verdict (MINUTES)"
+PAPER, PAPER_TITLE = "paper", "Every number of the paper beside fenwear's, with its verdict (about 3 minutes)"
 PAGE, NUMBERS = "verification.html", "verification.json"
 DEFAULT = Path("results") / "verification"
 WIDTH = 78

@@ -27,7 +27,7 @@ def page(outcomes: Sequence[Outcome], beside_paper: str | None, ranks: int, vers
     """Return the page of what the cases found, and of the comparison with the paper where there is one."""
     now = datetime.now().astimezone()
     when = f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>'
-    paper = "" if beside_paper is None else '<p><a href="#paper">The paper\'s numbers beside fenwear\'s</a>.</p>'
+    paper = "" if beside_paper is None else "<p><a href=\"#paper\">The paper's numbers beside fenwear's</a>.</p>"
     head = (
         "<header>\n<h1>Verification of fenwear</h1>\n"
         f"<p>{_found(outcomes)}On {ranks} rank{'s' if ranks > 1 else ''}, {when}.</p>\n{paper}</header>\n<main>"

@@ -36,6 +36,7 @@ td.unit { width: 3.5rem; }
 pre { white-space: pre-wrap; background: #f5f5f5; padding: .8rem; font-size: .85rem; }
 summary { cursor: pointer; }
 @media (max-width: 45rem) {
+  .comparison th[scope=row], .variants.comparison th[scope=row] { min-width: 9rem; }
   .stacked thead { display: none; }
   .stacked tr { display: block; padding: .6rem 0; border-bottom: 1px solid #bbb; }
   .stacked td { display: block; border: 0; padding: 0; }

@@ -98,7 +98,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     system.prepare()  # here, so that the two times are told apart
     setup = time.perf_counter() - begin
     state = steady(system)
-    rate = growth_rate(system, state.pressure)
+    rate = growth_rate(system, state.phase_pressure)
     cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
     if as_json:
         pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
@@ -239,15 +239,15 @@ def verify_command(
     as_json: JsonOption = False,
 ) -> None:
     """Solve problems whose answer is known, and compare: a table, a page and an exit status of 1 where they differ."""
-    from fenwear.verify import registered
-    from fenwear.verify.command import verify
+    from fenwear.verify.command import choose, titles, verify
 
-    cases = registered(only)
+    cases, paper = choose(only)
     if list_cases:
-        for case in cases:
-            print(f"{case.name:24} {case.title}")
+        for name, title in titles().items():
+            if not only or name in only:
+                print(f"{name:24} {title}")
         return
-    found, directory = verify(cases, output, log if as_json else print)
+    found, directory = verify(cases, paper, output, log if as_json else print)
     if as_json:
         _print_json(found)
     log(f"page in {directory}/verification.html")

@@ -24,6 +24,10 @@ thead th:nth-child(2) { text-align: right; }
 .places thead th:nth-child(2) { text-align: left; }
 .comparison thead th:not(:first-child):not(:last-child) { text-align: right; white-space: nowrap; }
 .comparison th[scope=row] { min-width: 18rem; }
+.variants.comparison thead th:not(:first-child) { white-space: normal; overflow-wrap: normal; text-align: right; }
+.variants.comparison th[scope=row] { min-width: 14rem; }
+.stacked thead th:nth-child(2) { text-align: left; }
+.stacked td { overflow-wrap: break-word; min-width: 5rem; }
 .verdict { white-space: nowrap; }
 td.number { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums; }
 td.unit { width: 3.5rem; }
@@ -31,6 +35,14 @@ td.unit { width: 3.5rem; }
 .warning { border-left: .3rem solid #d55e00; padding: .3rem .8rem; background: #fdf1ea; }
 pre { white-space: pre-wrap; background: #f5f5f5; padding: .8rem; font-size: .85rem; }
 summary { cursor: pointer; }
+@media (max-width: 45rem) {
+  .comparison th[scope=row], .variants.comparison th[scope=row] { min-width: 9rem; }
+  .stacked thead { display: none; }
+  .stacked tr { display: block; padding: .6rem 0; border-bottom: 1px solid #bbb; }
+  .stacked td { display: block; border: 0; padding: 0; }
+  .stacked td:first-child { font-weight: 600; }
+  .stacked td:not(:first-child)::before { content: attr(data-column) ": "; color: #555; }
+}
 @media print { body { max-width: none; padding: 0; font-size: 10pt; } .animation { display: none; } }
 """
 

@@ -50,10 +50,10 @@ def legend_beside(ax: Axes, title: str) -> None:
     ax.legend(title=title, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
 
 
-def reference_line(ax: Axes, height: float, name: str) -> None:
-    """Draw a dotted level with its name above the left end."""
+def reference_line(ax: Axes, height: float, name: str, at: float = 0.0) -> None:
+    """Draw a dotted level with its name above it, from a fraction of its width on."""
     ax.axhline(height, color="0.5", linewidth=0.8, linestyle=":", label="_reference")
-    ax.annotate(name, (0, height), xycoords=("axes fraction", "data"), xytext=(4, 2), textcoords="offset points",
+    ax.annotate(name, (at, height), xycoords=("axes fraction", "data"), xytext=(4, 2), textcoords="offset points",
                 color=GREY, fontsize="small")  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from typing import Any, get_args
 
@@ -21,8 +22,8 @@ from fenwear.paper import (
     write_section,
 )
 from fenwear.paper.published import OPEN, VELOCITIES, last_digit
-from fenwear.paper.rows import _is_bell, _share_at
-from fenwear.paper.section import COLUMNS, markdown, table
+from fenwear.paper.rows import NEUTRAL, _is_bell, _share_at
+from fenwear.paper.section import COLUMNS, as_json, convergence_text, markdown, needed_text, summary, table
 from fenwear.paper.study import heat_runs, neutral_share, no_heat
 
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
@@ -151,16 +152,42 @@ def test_sensitivity() -> None:
 
 def test_page() -> None:
     """A section without head or style: the table, then every picture inline with its caption; text escaped."""
-    section = write_section(SCOPE)
-    assert section.count("data:image/png;base64,") == section.count("<figcaption>") == len(paper_figures(SCOPE)) == 8
-    assert section.count("<tr>") == 16
-    assert all(choice.partition(",")[0].replace("'", "&#x27;") in section for choice in OPEN)
-    assert "<html" not in section
+    text = write_section(SCOPE)
+    choices, discretisations = sensitivity_rows(SCOPE)
+    assert text.count("data:image/png;base64,") == text.count("<figcaption>") == len(paper_figures(SCOPE)) == 8
+    assert text.count("<tr>") == 15 + len(choices) + len(discretisations) + 3  # three heads
+    assert all(choice.partition(",")[0].replace("'", "&#x27;") in text for choice in OPEN)
+    assert "<html" not in text
+    assert summary(paper_rows(SCOPE)) in text
+    for variant in (*choices, *discretisations):
+        assert f"{variant.steady.periodic:.2f}</td>" in text
     hostile = Row("<b>", "a & b", "x", "not reproduced", "p|q")
-    assert "<td>&lt;b&gt;</td><td>a &amp; b</td>" in table([hostile])
+    assert '<td data-column="quantity">&lt;b&gt;</td><td data-column="paper">a &amp; b</td>' in table([hostile])
     lines = markdown([hostile]).splitlines()
     assert lines[0].count("|") == lines[1].count("|") == len(COLUMNS) + 1
     assert lines[2].endswith("| p\\|q |")
+
+
+def test_what_programs_get() -> None:
+    """JSON of the same rows and variants; a kappa that no number of ours meets is null, and said in words."""
+    found = json.loads(json.dumps(as_json(SCOPE)))
+    choices, discretisations = sensitivity_rows(SCOPE)
+    assert [row["quantity"] for row in found["rows"]] == [row.quantity for row in paper_rows(SCOPE)]
+    assert [v["periodic_temperature"] for v in found["open_choices"]] == [v.steady.periodic for v in choices]
+    assert {v["group"] for v in found["convergence"]} == {v.group for v in discretisations}
+    assert found["needed_partition"] == needed_shares(SCOPE)
+    said = needed_text({"first": 0.4321, "second": None, NEUTRAL: 0.25})
+    assert said.startswith("The kappa that each number needs: first 0.432, second no kappa of ours. Above 0.250")
+
+
+def test_convergence_in_words() -> None:
+    """The largest change between the last two of each group, over all values of kappa."""
+    _, variants = sensitivity_rows(SCOPE)
+    steps = {v.name: v.steady.periodic for v in variants if v.group == "steps" and v.share == 0.5}
+    change = abs(steps["10 time steps in a half-cycle"] / steps["5 time steps in a half-cycle"] - 1)
+    other = {v.name: v.steady.periodic for v in variants if v.group == "steps" and v.share == 0.2}
+    change = max(change, abs(other["10 time steps in a half-cycle"] / other["5 time steps in a half-cycle"] - 1))
+    assert f"temperatures change by at most {change:.1g} of their value" in convergence_text(variants).split(". ")[-1]
 
 
 @pytest.mark.slow

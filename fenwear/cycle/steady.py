@@ -60,6 +60,7 @@ class Steady:
     Attributes:
         directions: Sliding direction of each half-cycle.
         pressure: In the middle position of each half-cycle (half_cycles, n), MPa.
+        phase_pressure: In every phase, that is in every position (phases, n), MPa.
         gap: The same (half_cycles, n), mm.
         shape: Worn depth without its rigid part (n,), mm; NaN where the surfaces never touch.
         contact_width: Width in contact there (half_cycles,), mm.
@@ -72,6 +73,7 @@ class Steady:
 
     directions: tuple[int, ...]
     pressure: Array
+    phase_pressure: Array
     gap: Array
     shape: Array
     contact_width: Array
@@ -299,6 +301,7 @@ def _result(
     return Steady(
         motion.stroke_directions,
         contact.pressure[middle],
+        contact.pressure,
         contact.gap[middle],
         shape - system.facing.initial_gap,
         (contact.pressure[middle] > 0) @ weights,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fenwear import CaseError, ConvergenceError, System, jump, march, steady
+from fenwear.cycle import growth_rate
 
 COARSE = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
 MOVING = (*COARSE, "geometry.parameters.overlap=3", "motion.positions=5")
@@ -71,6 +73,29 @@ def test_without_strip_wear_positions_change_little(assemble: Callable[..., Syst
     other = steady(assemble("example1", *MOVING))
     inner = slice(1, -1)
     np.testing.assert_allclose(other.pressure[:, inner], one.pressure[:, inner], atol=0.02 * MEAN)
+
+
+def test_growth_rate_of_several_positions(assemble: Callable[..., System]) -> None:
+    """Disturbances of a strip that moves by 20 um grow as fast as of one that stays; the stroke enters linearly."""
+    motion = ("motion.amplitude=0.01", "motion.angular_frequency=1500")
+    base = (*COARSE, *motion, "geometry.parameters.overlap=3")
+    for share in (0.1, 0.5):
+        rates = []
+        for positions in (1, 5):
+            system = assemble("example1-heat", *base, f"heat.partition={share}", f"motion.positions={positions}")
+            state = steady(system)
+            assert state.phase_pressure.shape == (2 * positions, len(system.facing.x))
+            np.testing.assert_array_equal(state.phase_pressure[positions // 2 :: positions], state.pressure)
+            rates.append(growth_rate(system, state.phase_pressure))
+        assert rates[1] == pytest.approx(rates[0], rel=1e-3)
+
+
+def test_steady_command_with_positions(fenwear: Callable[..., Any]) -> None:
+    """The command follows the same state: it says whether a run comes there."""
+    settings = [part for setting in MOVING for part in ("--set", setting)]
+    done = fenwear("steady", "example1", *settings)
+    assert done.returncode == 0, done.stderr
+    assert "within 1 % of the mean pressure after" in done.stdout
 
 
 def test_no_steady_state_where_the_track_deepens(assemble: Callable[..., System]) -> None:

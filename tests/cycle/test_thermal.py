@@ -125,7 +125,7 @@ def test_march_tends_to_the_steady_state(assemble: Assemble, coefficient: float)
     """
     system = assemble("example1-heat", *COARSE, "heat.partition=0.2", f"wear.punch.coefficient={coefficient}")
     state = steady(system)
-    assert growth_rate(system, state.pressure) < 0
+    assert growth_rate(system, state.phase_pressure) < 0
     *_, last = march(system, 3000, implicit=True)
     step = 0.01 * coefficient / 4e-7  # what the wear of a half-cycle does to the pressure
     np.testing.assert_allclose(last.pressure[-2:], state.pressure, rtol=0, atol=step * MEAN)
@@ -174,7 +174,7 @@ def test_a_cycle_reproduces_the_steady_state(assemble: Assemble, partition: floa
 def test_sign_of_growth(assemble: Assemble, partition: float, sign: int) -> None:
     """Issue 4: Example 1's steady state loses its stability between kappa = 0.1 and 0.5."""
     system = assemble("example1-heat", *COARSE, f"heat.partition={partition}")
-    assert np.sign(growth_rate(system, steady(system).pressure)) == sign
+    assert np.sign(growth_rate(system, steady(system).phase_pressure)) == sign
 
 
 @pytest.mark.parametrize("coefficient", [1e-10, 4e-8])
@@ -182,7 +182,7 @@ def test_growth_of_a_disturbance(assemble: Assemble, coefficient: float) -> None
     """Two marches beside the unstable steady state part at the rate of the eigenvalue."""
     system = assemble("example1-heat", *COARSE, f"wear.punch.coefficient={coefficient}")
     moment, state = from_steady(system)
-    rate = growth_rate(system, state.pressure)
+    rate = growth_rate(system, state.phase_pressure)
     disturbed, _ = from_steady(system, 1e-9)
     one, other = (run(system, 240, implicit=True, start=m) for m in (moment, disturbed))
     apart = np.linalg.norm(one.pressure - other.pressure, axis=1)[1::2]
@@ -204,7 +204,7 @@ def test_ranks_agree(assemble: Assemble, operator: str) -> None:
         lambda s: run(s, 4).heat.terms,
         lambda s: temperatures(list(jump(s, 400, tolerance=1e-2))[-1]),
         lambda s: steady(s).heat.punch,
-        lambda s: np.array([growth_rate(s, steady(s).pressure)]),
+        lambda s: np.array([growth_rate(s, steady(s).phase_pressure)]),
     ):
         one, other = solve(alone), solve(together)
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-8 * np.abs(one).max())

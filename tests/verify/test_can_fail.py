@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import System, elasticity, interface
+from fenwear import System, elasticity, interface, system
 from fenwear.case import Model
 from fenwear.contact import CondensedContact, Sliding
 from fenwear.elasticity import ElasticBody
@@ -73,6 +73,31 @@ def lame_of_the_other_plane(patch: Patch) -> None:
 def even_weights(patch: Patch) -> None:
     """Nodes that all stand for the same length."""
     patch.setattr(Facing, "weights", property(lambda self: np.full_like(self.punch.weights, self.punch.weights.mean())))
+
+
+def smaller_gap(patch: Patch) -> None:
+    """Distances of the geometry one per cent too small."""
+    right = system.face
+
+    def face(punch: Any, strip: Any) -> Facing:
+        found = right(punch, strip)
+        return replace(found, initial_gap=0.99 * found.initial_gap)
+
+    patch.setattr(system, "face", face)
+
+
+def strip_wears_where_it_meets(patch: Patch) -> None:
+    """Depths put on the strip's nodes by interpolation, which keeps no area."""
+
+    def to_strip(self: Facing) -> Any:
+        return interpolation(self.x, self.punch.degree, self.strip.x[:, 0])
+
+    patch.setattr(Facing, "to_strip", property(to_strip))
+
+
+def strip_does_not_wear(patch: Patch) -> None:
+    """The strip's wear forgotten in the gap."""
+    patch.setattr(Facing, "opening", lambda self, punch, strip: punch)
 
 
 def collocated(patch: Patch) -> None:
@@ -170,13 +195,18 @@ def forgotten_heat(patch: Patch) -> None:
         ("sliding-cylinder", opposite_friction),
         ("sliding-punch", opposite_friction),
         ("flat-punch", even_weights),
+        ("cylinder-on-flat", punch_without_poisson),
+        ("cylinder-on-flat", smaller_gap),
+        ("rounded-punch", smaller_gap),
         ("equilibrium-of-contact", opposite_moment),
         ("optimum-table", opposite_moment),
         ("optimum-linear", opposite_moment),
         ("optimum-power", opposite_moment),
         ("wear-volume", half_distance),
+        ("wear-volume", strip_wears_where_it_meets),
         ("equilibrium", opposite_moment),
         ("galin", half_distance),
+        ("galin", strip_does_not_wear),
         ("galin", lame_of_the_other_plane),
         ("one-way", steeper_wear),
         ("cyclic", steeper_wear),

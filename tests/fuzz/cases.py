@@ -262,7 +262,12 @@ def compute(case: Case) -> None:
     def integrate(system: System, start: Any, leave: Any) -> Iterator[Block]:
         shared: dict[str, Any] = {"start": start, "leave": leave}
         if jumps:
-            return jump(system, min(case.run.half_cycles, 2 * system.motion.half_cycles), tolerance=case.run.jump_tolerance, **shared)
+            return jump(
+                system,
+                min(case.run.half_cycles, 2 * system.motion.half_cycles),
+                tolerance=case.run.jump_tolerance,
+                **shared,
+            )
         return march(system, last, implicit=implicit, block=1, **shared)
 
     def exchange(system: System) -> HeatExchange | None:

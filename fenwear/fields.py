@@ -19,6 +19,7 @@ import ufl
 import xarray
 from dolfinx import fem
 
+from fenwear.antiplane import shear_out_of_plane
 from fenwear.arrays import Array
 from fenwear.compat import interpolation_points
 from fenwear.disk import check_room, writing, writing_together
@@ -40,12 +41,14 @@ class BodyFields:
 
     Attributes:
         displacement: mm.
+        out_of_plane: Displacement along y, mm; None where no traction acts along it.
         von_mises: Equivalent stress, MPa.
         temperature: K; None without heat.
         heat_flux: -k grad theta, mW/mm²; None without heat.
     """
 
     displacement: fem.Function
+    out_of_plane: fem.Function | None
     von_mises: fem.Function
     temperature: fem.Function | None
     heat_flux: fem.Function | None
@@ -63,10 +66,10 @@ def body_fields(
         phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
     """
-    facing, slip = system.facings[phase], _slip(system, phase, pressure, temperatures)
-    normal, tangential = facing.weights * pressure, facing.weights * pressure * slip
-    to_strip = -facing.transfer.T
-    loads = ((normal, tangential), (to_strip @ normal, to_strip @ tangential))
+    facing, (slip, cross) = system.facings[phase], _tractions(system, phase, pressure, temperatures)
+    normal = facing.weights * pressure
+    nodal = np.array([normal, normal * slip, normal * cross])
+    loads = (nodal, -nodal @ facing.transfer)
     count = len(system.punch.rigid_modes)
     amplitudes = (rigid[:count], rigid[count:])
     heat_bodies = system.heat_bodies or (None, None)
@@ -86,8 +89,10 @@ def body_fields(
     return punch, strip
 
 
-def _slip(system: System, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None) -> Array:
-    """Return tau = d mu (n,) at this pressure and these temperatures; collective."""
+def _tractions(
+    system: System, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None
+) -> tuple[Array, Array]:
+    """Return the tractions on the punch along e_t and y over this pressure (n,) each; collective."""
     friction, surfaces = system.friction, None
     if not friction.constant and temperatures is not None and system.heat_bodies is not None:
         punch, strip = (
@@ -96,19 +101,20 @@ def _slip(system: System, phase: int, pressure: Array, temperatures: tuple[Array
         )
         surfaces = (punch, system.facing.transfer @ strip)
     mu = friction.values(system.conditions(phase, pressure, surfaces))
-    return friction.slip(system.motion.phases[phase].direction, mu)
+    direction = system.motion.phases[phase].direction
+    return friction.slip(direction, mu), friction.cross(direction, mu)
 
 
 def _solve(
     system: System,
     elastic: ElasticBody,
     nodes: SurfaceNodes,
-    load: tuple[Array, Array],
+    load: Array,
     rigid: Array,
     heat: HeatBody | None,
     temperature: Array | None,
 ) -> BodyFields:
-    """Return one body's fields under nodal contact loads along e_n and e_t (n,) each, N/mm; collective."""
+    """Return one body's fields under nodal contact loads along e_n, e_t and y (3, n), N/mm; collective."""
     force = elastic.load.copy()
     vectors = load[0][:, None] * nodes.normal + load[1][:, None] * nodes.tangent
     start, stop = elastic.space.dofmap.index_map.local_range
@@ -129,14 +135,16 @@ def _solve(
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
-    von_mises = _interpolated(_von_mises(system, elastic, displacement, theta), elastic, "von_mises", ())
+    out_of_plane = shear_out_of_plane(elastic, nodes.block, load[2]) if load[2].any() else None
+    equivalent = _von_mises(system, elastic, displacement, out_of_plane, theta)
+    von_mises = _interpolated(equivalent, elastic, "von_mises", ())
     flux = None
     if heat is not None and theta is not None:
         flux = _interpolated(-heat.conductivity * ufl.grad(theta), elastic, "heat_flux", (2,))
-    return BodyFields(displacement, von_mises, theta, flux)
+    return BodyFields(displacement, out_of_plane, von_mises, theta, flux)
 
 
-def _von_mises(system: System, elastic: ElasticBody, displacement: Any, theta: Any) -> Any:
+def _von_mises(system: System, elastic: ElasticBody, displacement: Any, out_of_plane: Any, theta: Any) -> Any:
     """Return sqrt(3/2 s : s) with the stress out of plane: zero in plane stress, in plane strain from eps_yy = 0."""
     sigma = stress(displacement, *elastic.lame)
     plane_stress = system.case.model.plane == "stress"
@@ -146,7 +154,11 @@ def _von_mises(system: System, elastic: ElasticBody, displacement: Any, theta: A
         sigma = sigma - thermal * ufl.Identity(2)
     out = 0.0 if plane_stress else elastic.lame[0] * ufl.tr(strain(displacement)) - thermal
     xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
-    return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * xz**2)
+    shear = xz**2
+    if out_of_plane is not None:
+        slope = elastic.lame[1] * ufl.grad(out_of_plane)
+        shear = shear + ufl.inner(slope, slope)
+    return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * shear)
 
 
 def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple[int, ...]) -> fem.Function:
@@ -200,7 +212,8 @@ def write_fields(
     data: dict[str, Any] = {}
     for elastic, body in zip((system.punch, system.strip), fields, strict=True):
         name = elastic.body.name
-        functions = [f for f in (body.displacement, body.von_mises, body.temperature, body.heat_flux) if f is not None]
+        given = (body.displacement, body.out_of_plane, body.von_mises, body.temperature, body.heat_flux)
+        functions = [f for f in given if f is not None]
         _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
         data.update(_gathered(name, elastic, functions))
     time = float(system.motion.time(np.array(half_cycle)))
@@ -256,7 +269,7 @@ def _write_vtx_or_xdmf(stem: Path, elastic: ElasticBody, functions: list[fem.Fun
 
 def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) -> dict[str, Any]:
     """Return a body's nodes, cells and nodal values as variables of a dataset, on rank 0; collective."""
-    units = {"displacement": "mm", "von_mises": "MPa", "temperature": "K", "heat_flux": "mW/mm2"}
+    units = {"von_mises": "MPa", "temperature": "K", "heat_flux": "mW/mm2"}
     comm, space = elastic.body.mesh.comm, elastic.space
     index_map, degree = space.dofmap.index_map, space.ufl_element().degree
     cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(2).size_local]
@@ -275,7 +288,7 @@ def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) ->
         joined = np.concatenate(values)
         names = [field] if joined.shape[1] == 1 else [f"{field}_{a}" for a in AXES]
         for k, component in enumerate(names):
-            data[f"{name}_{component}"] = (point, joined[:, k], {"units": units[field]})
+            data[f"{name}_{component}"] = (point, joined[:, k], {"units": units.get(field, "mm")})
     return data
 
 

@@ -23,7 +23,7 @@ def write(system: System, folder: Path, half_cycles: int) -> xarray.Dataset:
         temperatures = system.exchange.temperatures(block.end.temperature)
     direction = int(block.direction[-1])
     fields = body_fields(system, block.pressure[-1], block.rigid[-1], (half_cycles - 1) % 2, temperatures)
-    write_fields(folder, system, half_cycles, fields, direction)
+    write_fields(folder, system, half_cycles, fields, direction, block.end.worn)
     with xarray.open_dataset(folder / "fields" / f"half_cycle_{half_cycles:06d}.nc", engine="h5netcdf") as opened:
         return opened.load()
 

@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from fenwear import compat
 from fenwear.case import Body, Load, Material, Model, Support
 from fenwear.errors import CaseError, Problem
+from fenwear.factor import Factor
 from fenwear.mesh import BodyMesh
 from fenwear.parallel import assemble_in_order, total
 
@@ -115,7 +116,7 @@ class ElasticBody:
         self.stiffness = fem.petsc.assemble_matrix(fem.form(a), bcs=bcs)
         self.stiffness.assemble()
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
-        self._ksp: PETSc.KSP | None = None
+        self._factor: Factor | None = None
 
     def _set_loads(self, loads: Sequence[Load], thickness: float) -> None:
         load = self._assemble_load(loads, thickness)
@@ -131,19 +132,11 @@ class ElasticBody:
         return body
 
     @property
-    def factor(self) -> PETSc.Mat:
-        """The Cholesky factor of K by MUMPS, made once; collective at first use."""
-        if self._ksp is None:
-            ksp = PETSc.KSP().create(self.body.mesh.comm)
-            ksp.setOptionsPrefix(PREFIX)
-            ksp.setOperators(self.stiffness)
-            ksp.setType("preonly")
-            ksp.pc.setType("cholesky")
-            ksp.pc.setFactorSolverType("mumps")
-            ksp.setFromOptions()
-            ksp.setUp()
-            self._ksp = ksp
-        return self._ksp.pc.getFactorMatrix()
+    def factor(self) -> Factor:
+        """The Cholesky factor of K, made once; collective at first use."""
+        if self._factor is None:
+            self._factor = Factor(self.stiffness, PREFIX, "cholesky")
+        return self._factor
 
     def _supports(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
         key = f"{self.body.name}.supports"

@@ -27,6 +27,7 @@ from fenwear.arrays import Array
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.elasticity import region_field
 from fenwear.errors import CaseError, Problem
+from fenwear.factor import Factor
 from fenwear.mesh import BodyMesh
 
 PREFIX = "fenwear_heat_"
@@ -270,20 +271,7 @@ class HeatStep:
         self._is_held = np.zeros(body.owned, dtype=bool)
         self._is_held[body.held] = True
         self._rhs, self._solution = a.createVecLeft(), a.createVecRight()
-        self._ksp = PETSc.KSP().create(body.body.mesh.comm)
-        self._ksp.setOptionsPrefix(PREFIX)
-        self._ksp.setOperators(a)
-        self._ksp.setType("preonly")
-        self._ksp.pc.setType("lu")
-        if body.body.mesh.comm.size == 1 and duration < np.inf:
-            # Solved thousands of times: PETSc's own factor answers four times as fast as MUMPS.
-            self._ksp.pc.setFactorSolverType("petsc")
-            self._ksp.pc.setFactorOrdering("amd")
-        else:
-            self._ksp.pc.setFactorSolverType("mumps")
-        self._ksp.setFromOptions()
-        self._ksp.setUp()
-        self._factor = self._ksp.pc.getFactorMatrix()
+        self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
 
     def advance(self, theta: Array) -> Array:
         """Return the temperature at the end without any flux through the contact (owned,); collective."""

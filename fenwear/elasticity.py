@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear import compat
+from fenwear.assembly import assembled
 from fenwear.case import Body, Load, Material, Model, Support
 from fenwear.errors import CaseError, Problem
+from fenwear.factor import Factor
 from fenwear.mesh import BodyMesh
-from fenwear.parallel import assemble_in_order, total
+from fenwear.parallel import total
 
 AXES = {"x": 0, "z": 1}
 PREFIX = "fenwear_elasticity_"
@@ -111,11 +113,9 @@ class ElasticBody:
         bcs = supports + self._regularise()
         self.supported = self._owned_dofs(bcs)
         self._set_loads(description.loads, model.thickness)
-        assemble_in_order()
-        self.stiffness = fem.petsc.assemble_matrix(fem.form(a), bcs=bcs)
-        self.stiffness.assemble()
+        self.stiffness = assembled(a, bcs)
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
-        self._ksp: PETSc.KSP | None = None
+        self._factor: Factor | None = None
 
     def _set_loads(self, loads: Sequence[Load], thickness: float) -> None:
         load = self._assemble_load(loads, thickness)
@@ -131,19 +131,11 @@ class ElasticBody:
         return body
 
     @property
-    def factor(self) -> PETSc.Mat:
-        """The Cholesky factor of K by MUMPS, made once; collective at first use."""
-        if self._ksp is None:
-            ksp = PETSc.KSP().create(self.body.mesh.comm)
-            ksp.setOptionsPrefix(PREFIX)
-            ksp.setOperators(self.stiffness)
-            ksp.setType("preonly")
-            ksp.pc.setType("cholesky")
-            ksp.pc.setFactorSolverType("mumps")
-            ksp.setFromOptions()
-            ksp.setUp()
-            self._ksp = ksp
-        return self._ksp.pc.getFactorMatrix()
+    def factor(self) -> Factor:
+        """The Cholesky factor of K, made once; collective at first use."""
+        if self._factor is None:
+            self._factor = Factor(self.stiffness, PREFIX, "cholesky")
+        return self._factor
 
     def _supports(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
         key = f"{self.body.name}.supports"
@@ -262,9 +254,10 @@ class ElasticBody:
         The integral of gamma theta div v, gamma the `thermal_modulus`. Supports take no force.
         """
         gamma = self.thermal_modulus(materials)
-        theta, v = ufl.TrialFunction(temperature), ufl.TestFunction(self.space)
-        coupling = fem.petsc.assemble_matrix(fem.form(gamma * theta * ufl.div(v) * ufl.dx))
-        coupling.assemble()
+        # dolfinx assembles square blocks only: pairs of temperatures, numbered as the single ones, of which one counts.
+        element = basix.ufl.blocked_element(temperature.ufl_element(), shape=(self.body.mesh.geometry.dim,))
+        theta, v = ufl.TrialFunction(fem.functionspace(self.body.mesh, element))[0], ufl.TestFunction(self.space)
+        coupling = assembled(gamma * theta * ufl.div(v) * ufl.dx, first_column=True)
         start = 2 * self.space.dofmap.index_map.local_range[0]
         coupling.zeroRows((self.supported + start).astype(np.int32), diag=0.0)
         return coupling

@@ -18,6 +18,7 @@ from scipy.special import beta, betainc
 
 from fenwear.arrays import Array
 from fenwear.case import OneWay, Reciprocating, Tabulated
+from fenwear.errors import CaseError, Problem
 
 DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
 
@@ -167,11 +168,15 @@ class Motion:
         return (number - 1) // self.half_cycles * self.period + ends[(number - 1) % self.half_cycles]
 
     def sliding(self, exponent: float = 1.0) -> Array:
-        """Return the integral of v^a over each phase (phases,), mm^a s^(1-a); for a = 1 the sliding distance."""
+        """Return the integral of v^a over each phase (phases,), mm^a s^(1-a); for a = 1 the sliding distance.
+
+        Raises:
+            CaseError: it is beyond all numbers.
+        """
         powers = []
         for stroke in self._strokes:
             edges = itertools.pairwise(_edges(stroke, self.positions))
-            powers += [stroke.power(a, b, exponent) for a, b in edges]
+            powers += [_power(stroke, a, b, exponent) for a, b in edges]
         return np.array(powers)
 
     def mean_speeds(self, steps: int) -> Array:
@@ -179,7 +184,7 @@ class Motion:
         rows = []
         for stroke in self._strokes:
             edges = itertools.pairwise(_edges(stroke, self.positions * steps))
-            distances = np.array([stroke.power(a, b, 1.0) for a, b in edges])
+            distances = np.array([_power(stroke, a, b, 1.0) for a, b in edges])
             speeds = distances / (stroke.duration / len(distances))
             mirrored = (speeds + speeds[::-1]) / 2
             if np.abs(mirrored - speeds).max() < 1e-9 * max(speeds.max(), 1e-300):
@@ -194,6 +199,9 @@ def make_motion(description: OneWay | Reciprocating | Tabulated, *, strip_wears:
     Args:
         description: Of the case.
         strip_wears: Whether the strip wears, so that its positions matter by default.
+
+    Raises:
+        CaseError: it is faster than numbers are large.
     """
     positions = 1
     if not isinstance(description, OneWay) and description.axis == "x":
@@ -209,6 +217,16 @@ def make_motion(description: OneWay | Reciprocating | Tabulated, *, strip_wears:
     return _motion(((1, -amplitude, stroke), (-1, amplitude, stroke)), positions)
 
 
+def _power(stroke: _Stroke, begin: float, end: float, exponent: float) -> float:
+    try:
+        power = stroke.power(begin, end, exponent)
+    except (OverflowError, ZeroDivisionError):
+        power = math.inf
+    if not math.isfinite(power):
+        raise CaseError(Problem("motion", f"its speed to the power of {exponent:g} is beyond all numbers"))
+    return power
+
+
 def _edges(stroke: _Stroke, count: int) -> list[float]:
     """Return the ends of equal times of a stroke, s."""
     return [float(time) for time in np.linspace(0.0, stroke.duration, count + 1)]
@@ -220,7 +238,7 @@ def _motion(strokes: tuple[tuple[int, float, _Stroke], ...], positions: int) -> 
     phases, begin = [], 0.0
     for direction, start, stroke in strokes:
         for low, high in itertools.pairwise(_edges(stroke, positions)):
-            before, distance = stroke.power(0.0, low, 1.0), stroke.power(low, high, 1.0)
+            before, distance = _power(stroke, 0.0, low, 1.0), _power(stroke, low, high, 1.0)
             # One position alone stands for the whole stroke, punch and strip opposite each other.
             offset = 0.0 if positions == 1 else start + direction * (before + distance / 2)
             offset = round(offset, 12)  # the same on the way there and back

@@ -8,7 +8,6 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 T = TypeVar("T")
 
@@ -30,17 +29,6 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
     if error is not None:
         raise error
     return comm.bcast(result)
-
-
-def assemble_in_order() -> None:
-    """Let PETSc add what the ranks give to a row of a matrix in their order and not as it arrives: the same bits again.
-
-    PETSc has the order in its older exchange alone. Before a matrix is made; the user's own options stay.
-    """
-    options = PETSc.Options()
-    for name in ("matstash_legacy", "matstash_reproduce"):
-        if not options.hasName(name):
-            options[name] = "true"
 
 
 def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:

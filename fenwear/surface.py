@@ -16,9 +16,11 @@ import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.elasticity import ElasticBody
+from fenwear.parallel import total
 
 BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
 
@@ -144,14 +146,22 @@ def at_nodes(elastic: ElasticBody, nodes: SurfaceNodes, values: Array) -> Array:
     return picked
 
 
+def _transposed_times(matrix: PETSc.Mat, fields: Array) -> Array:
+    """Return the transpose of matrix^T fields (k, owned columns), added up in the order of the ranks; collective."""
+    starts, columns, values = matrix.getValuesCSR()
+    part = csr_array((values, columns, starts), shape=(len(fields), matrix.getSize()[1])).T @ fields
+    first, last = matrix.getOwnershipRangeColumn()
+    return np.ascontiguousarray(total(matrix.comm.tompi4py(), part)[first:last].T)
+
+
 def _respond(
     elastic: ElasticBody, nodes: SurfaceNodes, columns: slice, thermal_coupling: PETSc.Mat | None
 ) -> tuple[Array, Array | None]:
     """Return the nodes' displacements (n, 2, k) from unit normal forces at `columns`, and G^T of them; collective."""
     comm = elastic.body.mesh.comm
-    local, total = elastic.stiffness.getSizes()[0]
+    local, every = elastic.stiffness.getSizes()[0]
     chosen = range(*columns.indices(len(nodes.block)))
-    sizes = ((local, total), (PETSc.DECIDE, len(chosen)))
+    sizes = ((local, every), (PETSc.DECIDE, len(chosen)))
     forces = PETSc.Mat().createDense(sizes, comm=comm)
     forces.setUp()
     start, stop = elastic.space.dofmap.index_map.local_range
@@ -168,9 +178,7 @@ def _respond(
     result = at_nodes(elastic, nodes, displacement.getDenseArray())
     by_temperature = None
     if thermal_coupling is not None:
-        nodal = thermal_coupling.transposeMatMult(displacement)
-        by_temperature = nodal.getDenseArray().T.copy()
-        nodal.destroy()
+        by_temperature = _transposed_times(thermal_coupling, displacement.getDenseArray())
     forces.destroy()
     displacement.destroy()
     return result, by_temperature

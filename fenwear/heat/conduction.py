@@ -24,9 +24,11 @@ from scipy.sparse import csr_array
 
 from fenwear import compat
 from fenwear.arrays import Array
+from fenwear.assembly import assembled
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.elasticity import region_field
 from fenwear.errors import CaseError, Problem
+from fenwear.factor import Factor
 from fenwear.mesh import BodyMesh
 
 PREFIX = "fenwear_heat_"
@@ -164,7 +166,7 @@ class HeatBody:
         a, b, f, rate, speed = self._step_forms
         rate.value = 0.0 if math.isinf(duration) else 1 / duration
         speed.value = velocity
-        return HeatStep(self, _matrix(a), _matrix(b), self._vector(f), velocity, duration)
+        return HeatStep(self, assembled(a), assembled(b), self._vector(f), velocity, duration)
 
     def loses_heat(self) -> bool:
         """Return whether a heat sink exists: convection or a held temperature; collective."""
@@ -208,7 +210,7 @@ class HeatBody:
     @cached_property
     def _capacity_matrix(self) -> PETSc.Mat:
         theta, w = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        return _matrix(fem.form(self.capacity * theta * w * ufl.dx))
+        return assembled(self.capacity * theta * w * ufl.dx)
 
     def store(self, theta: Array) -> Array:
         """Return the heat capacity matrix times fields (owned,) or (owned, k); collective."""
@@ -234,12 +236,6 @@ class HeatBody:
         faces = fem.Constant(self.body.mesh, PETSc.ScalarType(self.face_loss))
         edges = fem.Constant(self.body.mesh, PETSc.ScalarType(self.heat.convection))
         return self._vector(faces * w * ufl.dx(self.body.mesh) + edges * w * self._ds(FREE)).array_r.copy()
-
-
-def _matrix(form: Any) -> PETSc.Mat:
-    matrix = fem.petsc.assemble_matrix(form)
-    matrix.assemble()
-    return matrix
 
 
 class HeatStep:
@@ -270,20 +266,7 @@ class HeatStep:
         self._is_held = np.zeros(body.owned, dtype=bool)
         self._is_held[body.held] = True
         self._rhs, self._solution = a.createVecLeft(), a.createVecRight()
-        self._ksp = PETSc.KSP().create(body.body.mesh.comm)
-        self._ksp.setOptionsPrefix(PREFIX)
-        self._ksp.setOperators(a)
-        self._ksp.setType("preonly")
-        self._ksp.pc.setType("lu")
-        if body.body.mesh.comm.size == 1 and duration < np.inf:
-            # Solved thousands of times: PETSc's own factor answers four times as fast as MUMPS.
-            self._ksp.pc.setFactorSolverType("petsc")
-            self._ksp.pc.setFactorOrdering("amd")
-        else:
-            self._ksp.pc.setFactorSolverType("mumps")
-        self._ksp.setFromOptions()
-        self._ksp.setUp()
-        self._factor = self._ksp.pc.getFactorMatrix()
+        self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
 
     def advance(self, theta: Array) -> Array:
         """Return the temperature at the end without any flux through the contact (owned,); collective."""

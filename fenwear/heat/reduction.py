@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.errors import ConvergenceError
 from fenwear.heat.conduction import HeatBody
 from fenwear.parallel import total
 
@@ -72,8 +73,19 @@ def _gram(body: HeatBody, fields: Array) -> Array:
 
 
 def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) -> tuple[Array, Array]:
-    """Return the principal fields (owned, kept) with their size, and their singular values; collective."""
-    values, vectors = np.linalg.eigh(_gram(body, fields))
+    """Return the principal fields (owned, kept) with their size, and their singular values; collective.
+
+    Raises:
+        ConvergenceError: there are none, or they are no numbers.
+    """
+    with np.errstate(all="ignore"):  # what overflows is told below
+        gram = _gram(body, fields)
+    if not gram.size or not np.isfinite(gram).all():
+        raise ConvergenceError(
+            f"the temperatures of the {body.body.name} are beyond all numbers: a material, a temperature or a time "
+            "is too large or too small to compute with"
+        )
+    values, vectors = np.linalg.eigh(gram)
     values = np.sqrt(np.maximum(values, 0.0))
     kept = values > tolerance * max(largest, values[-1])
     return fields @ vectors[:, kept], values[kept] if kept.any() else np.zeros(1)

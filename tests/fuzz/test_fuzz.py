@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import bases
 import cases
 
 from fenwear import CaseError, System, make_case
+from fenwear.case.dependence import evaluate, parse_expression
+from fenwear.errors import FenwearError
 
 
 @pytest.mark.parametrize(("task", "count"), [(cases.try_case, 300), (cases.try_mesh, 20)])
@@ -54,8 +60,6 @@ def misbehave(seed: int) -> tuple[str, str]:
 
 
 def changed(**tables: Any) -> dict[str, Any]:
-    import copy
-
     return {**copy.deepcopy(cases.base("example1")), **tables}
 
 
@@ -105,3 +109,89 @@ def test_doubled_element(tmp_path: Path) -> None:
     (tmp_path / "own.msh").write_text("\n".join(lines) + "\n")
     with pytest.raises(CaseError, match="there twice"):
         System(make_case(cases.mesh_tables(), tmp_path))
+
+
+# ------------------------------------------------------------------- laws, motions, loads
+
+
+@pytest.mark.parametrize("text", bases.HOSTILE)
+def test_expressions_compute_or_are_refused(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever an expression says, it is arithmetic that ends at once, or refused in words; nothing is run or opened."""
+    monkeypatch.chdir(tmp_path)
+    seen: list[str] = []
+    _watched.append(seen)
+    nodes = {"T": np.zeros(1000), "p": np.linspace(0, 100, 1000), "v": np.asarray(10.0)}
+    begin = time.process_time()
+    try:
+        values = evaluate(parse_expression(text), nodes, (1000,))
+    except ValueError as refused:
+        assert "expect" in str(refused) or "wrong number of arguments" in str(refused)
+    else:
+        assert values.shape == (1000,)
+    finally:
+        _watched.clear()
+    assert time.process_time() - begin < 0.5
+    assert not [event for event in seen if event.startswith(("open", "os.", "subprocess.", "exec", "import", "socket."))]
+    assert not list(tmp_path.iterdir())
+
+
+_watched: list[list[str]] = []
+sys.addaudithook(lambda event, _: _watched[0].append(event) if _watched else None)
+
+
+def test_the_watch_sees(tmp_path: Path) -> None:
+    """What the test above would miss if its watch saw nothing."""
+    seen: list[str] = []
+    _watched.append(seen)
+    eval("open(path, 'w').close()", {"path": tmp_path / "made"})
+    _watched.clear()
+    assert "open" in seen
+    assert "exec" in seen
+
+
+@pytest.mark.parametrize("text", ["9" * 400, "1e400", "p + 1" + "0" * 310])
+def test_numbers_in_expressions_are_finite(text: str) -> None:
+    """An integer beyond all floats was an OverflowError, and a float infinity."""
+    with pytest.raises(CaseError, match="expected finite numbers"):
+        make_case(changed(contact={"friction": {"expression": text}}))
+
+
+def test_friction_has_no_unit() -> None:
+    """Of an expression or a table it was accepted, whatever it was, and had no effect."""
+    for law in ({"expression": "0.2", "unit": "MPa"}, {"table": [[0, 20], [1, 20]], "unit": "percent"}):
+        with pytest.raises(CaseError, match=r"contact.friction: expected no unit: its values are pure numbers"):
+            make_case(changed(contact={"friction": law}))
+
+
+# What it did before: an OverflowError, a LinAlgError, an IndexError or an error of MUMPS without a word of ours.
+BEYOND = {
+    "fast": ("hardness", ("motion", "amplitude"), "1e300 mm", "its speed to the power of 1 is beyond all numbers"),
+    "dense": ("followed", ("materials", "composite", "density"), 1e300, "has no factor"),
+    "conducting": ("followed", ("materials", "composite", "conductivity"), 1e300, "are beyond all numbers"),
+    "hot": ("example2-heat", ("heat", "initial"), 1e300, "are beyond all numbers"),
+    "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "greater than or equal to 0.00000001"),
+}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_numbers_beyond_what_can_be_computed(name: str) -> None:
+    """Refused, or ended as a solver that did not converge, in words."""
+    base, path, value, expected = BEYOND[name]
+    tables = copy.deepcopy(cases.base(base))
+    cases.at(tables, path[:-1])[path[-1]] = value
+    with pytest.raises(FenwearError, match=expected):
+        cases.compute(make_case(tables))
+
+
+def test_a_stroke_faster_than_numbers_are_large() -> None:
+    """Of a table, with a wear rate that follows the square of the speed: an OverflowError."""
+    tables = copy.deepcopy(cases.base("exponents"))
+    tables["motion"] = {"kind": "table", "times": [0, 1e-300, 1], "displacements": [0, 1e-3, 0]}
+    with pytest.raises(CaseError, match="its speed to the power of 2 is beyond all numbers"):
+        cases.compute(make_case(tables))
+
+
+@pytest.mark.parametrize("name", cases.NAMES)
+def test_what_the_fuzzing_starts_from(name: str) -> None:
+    """Every base computes: without that a mutation shows nothing."""
+    cases.compute(make_case(cases.base(name)))

@@ -189,7 +189,7 @@ def mesh_command(
     settings: SetOption = [],  # noqa: B006
 ) -> None:
     """Write the mesh of a case with its physical groups."""
-    from fenwear.mesh import write_msh
+    from fenwear.bodies.mesh import write_msh
 
     loaded = _load(case, settings)
     if output.suffix != ".msh":
@@ -203,7 +203,7 @@ def plot_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
 ) -> None:
     """Draw a run: figures, pictures of the bodies, animation and report.html, into its folder."""
-    from fenwear.report import write_report
+    from fenwear.report.page import write_report
 
     for path in on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True)):
         print(path)
@@ -218,7 +218,7 @@ def compare_command(
     as_json: JsonOption = False,
 ) -> None:
     """Put several runs in one figure and one table, with the differences of their cases."""
-    from fenwear.compare import compare, draw_comparison
+    from fenwear.report.compare import compare, draw_comparison
 
     comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))
     on_root(MPI.COMM_WORLD, lambda: draw_comparison(comparison, output))

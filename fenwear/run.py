@@ -15,16 +15,16 @@ import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
-from fenwear import checkpoint
 from fenwear.case import Case
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, Problem
-from fenwear.fields import body_fields, write_fields
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
-from fenwear.report import try_report
-from fenwear.results import (
+from fenwear.report.page import try_report
+from fenwear.results import checkpoint
+from fenwear.results.fields import body_fields, write_fields
+from fenwear.results.history import (
     HISTORY,
     HistoryWriter,
     free_directory,

@@ -12,23 +12,23 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.mesh import BodyMesh, build_meshes
+from fenwear.bodies.shape import element_height, follow_wear
+from fenwear.bodies.surface import Surface, condense, respond_to_load, surface_nodes
 from fenwear.case import Body, Case, Heat, Load, OneWay, changed_case
 from fenwear.contact import CondensedContact, ContactSolver, Sliding
 from fenwear.contact.full import FullContact
-from fenwear.elasticity import ElasticBody
 from fenwear.errors import CaseError, Problem
-from fenwear.friction import ContactConditions, Friction
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Facing, Interface, Statics, check_distance, face, join, statics
-from fenwear.mesh import BodyMesh, build_meshes
-from fenwear.motion import Motion, make_motion
 from fenwear.optimum import Optimum, check_equilibrium, optimum
 from fenwear.remedies import Remedies
-from fenwear.shape import element_height, follow_wear
-from fenwear.surface import Surface, condense, respond_to_load, surface_nodes
-from fenwear.wear import PhasesWear, Wear, Worn
+from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.motion import Motion, make_motion
+from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
 
 class System:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
+from fenwear.sliding.wear import Worn
 from fenwear.system import System
-from fenwear.wear import Worn
 
 
 @dataclass(frozen=True)

@@ -22,11 +22,11 @@ from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.moment import Moment, beginning, joined, parted
 from fenwear.errors import ConvergenceError
-from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
 from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
+from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import Worn, WornLayer
 from fenwear.system import System
-from fenwear.wear import Worn, WornLayer
 
 PARTS = 8  # of a cycle that does not converge as a whole
 MAX_ITERATIONS = 60  # of contact with the nodes that conduct

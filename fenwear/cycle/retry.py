@@ -17,8 +17,8 @@ from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.remedies import SMALLER_STEPS
+from fenwear.sliding.wear import Worn
 from fenwear.system import System
-from fenwear.wear import Worn
 
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
 

@@ -29,8 +29,8 @@ from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
 from fenwear.errors import ConvergenceError
-from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
+from fenwear.sliding.friction import ContactConditions
 from fenwear.system import System
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases

@@ -15,7 +15,7 @@ from fenwear.paper.published import (
 )
 from fenwear.paper.rows import NEUTRAL, needed_shares, sensitivity_rows
 from fenwear.paper.study import FULL, HeatRun, Scope, Variant, heat_runs, no_heat
-from fenwear.style import (
+from fenwear.report.style import (
     ALONG_CONTACT,
     BLUE,
     DIRECTIONS,

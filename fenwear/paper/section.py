@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, get_args
 
-from fenwear.html_page import escape, figure
 from fenwear.paper.figures import paper_figures
 from fenwear.paper.published import OPEN
 from fenwear.paper.rows import NEUTRAL, Row, Verdict, needed_shares, paper_rows, sensitivity_rows
 from fenwear.paper.study import FULL, Scope, Variant
+from fenwear.report.html_page import escape, figure
 
 COLUMNS = ("quantity", "paper", "fenwear", "verdict", "why")
 NUMBERS = ("kappa", "one-way (K)", "periodic (K)", "growth (1/s)", "narrowest (mm)", "middle (MPa)", "centre (MPa)")

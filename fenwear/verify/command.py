@@ -13,7 +13,7 @@ from mpi4py import MPI
 from fenwear.errors import CaseError, Problem
 from fenwear.paper import FULL, Scope, paper_rows, section
 from fenwear.parallel import on_root
-from fenwear.results import CASE, free_directory, make_directory
+from fenwear.results.history import CASE, free_directory, make_directory
 from fenwear.verify.page import page
 from fenwear.verify.suite import Outcome, Row, VerificationCase, registered, run_cases
 from fenwear.versions import versions

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.html_page import document, escape, figure, section
-from fenwear.style import COLOURS, DASHES, panels
+from fenwear.report.html_page import document, escape, figure, section
+from fenwear.report.style import COLOURS, DASHES, panels
 from fenwear.verify.suite import Line, Outcome, Plot, Row
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle import Block, growth_rate
 from fenwear.cycle.jump import cycle_heat
 from fenwear.cycle.moment import Moment
-from fenwear.wear import Worn
+from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., System]
 MEAN = 1e4 / 600

@@ -10,21 +10,22 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import System, elasticity, interface, system
+from fenwear import System, system
+from fenwear.bodies import elasticity
+from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Model
 from fenwear.contact import CondensedContact, Sliding
-from fenwear.elasticity import ElasticBody
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
-from fenwear.interface import Facing, Interface, Statics, interpolation
-from fenwear.motion import Motion
+from fenwear.interface import Facing, Interface, Statics, facing, interpolation
+from fenwear.sliding.motion import Motion
+from fenwear.sliding.wear import Wear
 from fenwear.verify import registered, run_cases
 from fenwear.verify import wear as wear_cases
 from fenwear.verify.bodies import builtin, rigid_punch
 from fenwear.verify.conduction import conducting_square
 from fenwear.verify.contact import half_planes
 from fenwear.verify.thermal import conductor
-from fenwear.wear import Wear
 
 Patch = pytest.MonkeyPatch
 CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor)
@@ -102,7 +103,7 @@ def strip_does_not_wear(patch: Patch) -> None:
 
 def collocated(patch: Patch) -> None:
     """Values picked at the punch's nodes in place of the mortar."""
-    patch.setattr(interface, "transfer_matrix", lambda x, degree, other, own: interpolation(other, own, x))
+    patch.setattr(facing, "transfer_matrix", lambda x, degree, other, own: interpolation(other, own, x))
 
 
 def half_distance(patch: Patch) -> None:

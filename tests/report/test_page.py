@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from fenwear import load_case, report
+from fenwear import load_case
 from fenwear.report.page import numbers_of, page, write_report
 from fenwear.run import run_case
 
@@ -138,7 +138,7 @@ def test_a_run_outlives_its_drawing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     def fail(*arguments: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(report, "draw_figures", fail)
+    monkeypatch.setattr("fenwear.report.page.draw_figures", fail)
     messages: list[str] = []
     summary, directory = run_case(load_case("example1", SMALL), "run", tmp_path / "run", messages.append)
     assert summary["half_cycles"] == 6

@@ -44,7 +44,7 @@ def test_the_same_bits_again(fenwear: Run, tmp_path: Path, name: str, ranks: int
 
 @pytest.mark.parametrize("name", CASES)
 def test_other_ranks_give_the_same_numbers(fenwear: Run, tmp_path: Path, name: str) -> None:
-    """1, 2 and 3 ranks to 1e-9 of each variable's largest value; gaps of that of the depths, heats of the friction's."""
+    """1, 2 and 3 ranks to 1e-9 of each variable's largest value; for gaps of the worn depth, for heats of friction's."""
     one, *others = (run(fenwear, tmp_path / str(ranks), name, ranks) for ranks in (1, 2, 3))
     measures = ("equilibrium_error", "heat_balance_error")  # of rounding itself
     for other in others:

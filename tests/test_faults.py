@@ -460,8 +460,8 @@ def test_damaged_history(fenwear: Run, tmp_path: Path) -> None:
 def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str, follow: str, expected: str) -> None:
     """Numbers that overflow end as a solver that did not converge; no NaN gets into the history."""
     folder = tmp_path / "run"
-    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=6", f"geometry.follow_wear={follow}"),
-                   "--set", f"wear.punch.coefficient={coefficient}")  # fmt: skip
+    settings = ("run.half_cycles=6", f"geometry.follow_wear={follow}", f"wear.punch.coefficient={coefficient}")
+    done = fenwear("run", "example1-heat", "-o", folder, *options(*settings))
     assert done.returncode == 3, done.stderr
     assert expected in done.stderr
     check_history(folder)

@@ -199,7 +199,10 @@ KEYS: tuple[Any, ...] = (
     lambda r: (("motion", "axis"), r.choice(("x", "y", "z"))),
     lambda r: (("motion", "track"), r.choice((600, "600 mm", 0, 1e-300, 1e300, "1 s"))),
     lambda r: (("motion", "amplitude"), r.choice(("1 um", "1 mm", "10 mm", "1 km", "1e-300 mm", "1e300 mm"))),
-    lambda r: (("motion",), dict(kind="table", **dict(zip(("times", "displacements"), r.choice(bases.STROKE_TABLES))))),
+    lambda r: (
+        ("motion",),
+        dict(kind="table", **dict(zip(("times", "displacements"), r.choice(bases.STROKE_TABLES), strict=True))),
+    ),
     lambda r: ((r.choice(("punch", "strip")), "loads", "over_cycle"), r.choice(bases.CYCLES)),
     lambda r: (("geometry", "order"), r.choice((1, 2, 3, 0, "2", True))),
     lambda r: (("geometry", "follow_wear"), r.choice(("never", 1e-9, 1e-6, 0.5, 0, -1, 1e300, "always", 1e-300))),
@@ -262,7 +265,12 @@ def compute(case: Case) -> None:
     def integrate(system: System, start: Any, leave: Any) -> Iterator[Block]:
         shared: dict[str, Any] = {"start": start, "leave": leave}
         if jumps:
-            return jump(system, min(case.run.half_cycles, 2 * system.motion.half_cycles), tolerance=case.run.jump_tolerance, **shared)
+            return jump(
+                system,
+                min(case.run.half_cycles, 2 * system.motion.half_cycles),
+                tolerance=case.run.jump_tolerance,
+                **shared,
+            )
         return march(system, last, implicit=implicit, block=1, **shared)
 
     def exchange(system: System) -> HeatExchange | None:

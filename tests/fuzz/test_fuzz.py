@@ -116,20 +116,20 @@ def test_doubled_element(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", bases.HOSTILE)
 def test_expressions_compute_or_are_refused(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever an expression says, it is arithmetic that ends at once, or refused in words; nothing runs or opens."""
+    """Whatever it says, it is arithmetic that ends at once, or refused in words; nothing is run or opened."""
     monkeypatch.chdir(tmp_path)
     seen: list[str] = []
     _watched.append(seen)
     nodes = {"T": np.zeros(1000), "p": np.linspace(0, 100, 1000), "v": np.asarray(10.0)}
     begin = time.process_time()
-    answer = ""
+    message, shape = "", (0,)
     try:
-        answer = "" if evaluate(parse_expression(text), nodes, (1000,)).shape == (1000,) else "another shape"
+        shape = evaluate(parse_expression(text), nodes, (1000,)).shape
     except ValueError as refused:
-        answer = str(refused)
+        message = str(refused)
     finally:
         _watched.clear()
-    assert answer == "" or "expect" in answer or "wrong number of arguments" in answer
+    assert shape == (1000,) or "expected" in message or "wrong number of arguments" in message
     assert time.process_time() - begin < 0.5
     assert not [
         event for event in seen if event.startswith(("open", "os.", "subprocess.", "exec", "import", "socket."))
@@ -171,12 +171,7 @@ BEYOND = {
     "dense": ("followed", ("materials", "composite", "density"), 1e300, "has no factor"),
     "conducting": ("followed", ("materials", "composite", "conductivity"), 1e300, "are beyond all numbers"),
     "hot": ("example2-heat", ("heat", "initial"), 1e300, "are beyond all numbers"),
-    "finer than rounding": (
-        "example1-heat",
-        ("heat", "reduction_tolerance"),
-        5e-324,
-        "greater than or equal to 0.00000001",
-    ),
+    "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "or equal to 0.00000001"),
 }
 
 

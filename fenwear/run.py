@@ -252,7 +252,7 @@ class _Run:
         if self.moment.half_cycle > 0:
             self._save()
         contacts = joined(self.moment.contacts)
-        if self.last.heat is not None and contacts is not None and self.case.wear.strip is None:
+        if self.last.heat is not None and contacts is not None and not self.system.track_deepens:
             self.extremes["growth_rate_per_s"] = growth_rate(self.system, contacts.pressure)
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))

@@ -341,6 +341,12 @@ class System:
         )
 
     @property
+    def track_deepens(self) -> bool:
+        """Whether the strip wears to and fro under the punch, so that no shape of its track stays."""
+        motion = self.case.motion
+        return self.case.wear.strip is not None and motion.axis == "x" and not isinstance(motion, OneWay)
+
+    @property
     def constant_coefficients(self) -> bool:
         """Whether friction and wear are the same at any temperature, pressure and speed."""
         return self.friction.constant and self.wear.constant

@@ -24,7 +24,6 @@ import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
-from fenwear.case import OneWay
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
@@ -240,8 +239,7 @@ def steady(system: System) -> Steady:
 
 def _check_exists(system: System) -> None:
     """Raise where the strip's wear never comes to a shape that stays."""
-    motion = system.case.motion
-    if system.case.wear.strip is not None and motion.axis == "x" and not isinstance(motion, OneWay):
+    if system.track_deepens:
         raise ConvergenceError(
             "no cyclic steady state exists: the strip wears, and under a punch that goes to and fro its track deepens "
             "for ever, most where every position touches it. Follow the wear by `run` with run.integration = "

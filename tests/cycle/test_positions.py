@@ -194,6 +194,18 @@ def test_temperature_dependent_wear(assemble: Callable[..., System]) -> None:
     assert (np.diff(block.worn_area) > 0).all()
 
 
+def test_growth_rate_with_the_strip_worn(assemble: Callable[..., System]) -> None:
+    """Out of the plane both bodies wear at the same places: a disturbance dies as if the punch took both rates."""
+    both = ("wear.punch.coefficient=3e-8", "wear.strip.coefficient=2e-8")
+    alone = ("wear.punch.coefficient=5e-8",)
+    rates = []
+    for wear in (both, alone):
+        system = assemble("example2", *COARSE, "motion.axis=y", *wear)
+        rates.append(growth_rate(system, steady(system).phase_pressure))
+    assert rates[0] == pytest.approx(rates[1], rel=1e-9)
+    assert rates[0] < 0
+
+
 @pytest.mark.mpi
 def test_heat_under_a_strip_that_moves(assemble: Callable[..., System]) -> None:
     """With heat and both bodies worn: areas and friction heat exact, the balance closed; nearly as in one position."""

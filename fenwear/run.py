@@ -73,7 +73,8 @@ def run_case(
     begin = time.perf_counter()
     system = System(case, comm)
     system.prepare()
-    system.check_touching()
+    if not resume:
+        system.check_touching()
     setup = time.perf_counter() - begin
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
     try:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ settings.load_profile("same")
 Edit = Callable[[dict[str, Any]], object]
 
 
-@cache
+@lru_cache(maxsize=24)  # the largest hold some hundred MB
 def _assembled(name: str, settings: tuple[str, ...]) -> System:
     return System(load_case(name, settings))
 

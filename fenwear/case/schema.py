@@ -458,7 +458,7 @@ class Heat(_Part):
     )
 
     # Finer than 1e-8 the basis, found by squares, would be made of rounding.
-    reduction_tolerance: Annotated[Number, Field(ge=1e-8, lt=1)] = Field(
+    reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
         default=3e-5, description="of the reduced operator's basis, relative"
     )
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
@@ -18,6 +19,7 @@ from fenwear.parallel import total
 
 RATIO = 4.0  # of one time scale to the next
 SCALES = 9  # of them, from a step on; then come the last ones, to the steady state
+ROUNDING = 1e-7  # of the largest singular value: what is left of a dependent field, squared in the Gram matrix
 FAST = 4  # scales over which a motion to and fro does not average out
 
 
@@ -55,17 +57,18 @@ def reduced_basis(
                 relaxed.append(step.advance_linear((body.initial() - lift)[:, None]))
     uniform = np.ones((body.owned, 1))  # carries the balance of energy
     start = (body.initial() - lift)[:, None]
-    warm = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0))) > 0
-    exact = np.hstack([uniform, start]) if warm else uniform
+    hottest = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0)), MPI.MAX)
+    warm = hottest > 0
+    exact = np.hstack([uniform, start / hottest]) if warm else uniform
     exact[body.held] = 0.0
-    exact = _orthonormal(body, exact, 1e-12)
+    exact = _orthonormal(body, exact, 0.0)
     if warm:  # how the initial temperature dies out
         rest = np.hstack(relaxed)
         rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
-        exact = _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 1e-12)
+        exact = _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0)
     rest = np.hstack(snapshots)
     rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
-    return lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 1e-12)
+    return lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0)
 
 
 def _gram(body: HeatBody, fields: Array) -> Array:
@@ -87,7 +90,7 @@ def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) 
         )
     values, vectors = np.linalg.eigh(gram)
     values = np.sqrt(np.maximum(values, 0.0))
-    kept = values > tolerance * max(largest, values[-1])
+    kept = values > max(tolerance, ROUNDING) * max(largest, values[-1])
     return fields @ vectors[:, kept], values[kept] if kept.any() else np.zeros(1)
 
 

@@ -171,7 +171,7 @@ BEYOND = {
     "dense": ("followed", ("materials", "composite", "density"), 1e300, "has no factor"),
     "conducting": ("followed", ("materials", "composite", "conductivity"), 1e300, "are beyond all numbers"),
     "hot": ("example2-heat", ("heat", "initial"), 1e300, "are beyond all numbers"),
-    "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "or equal to 0.00000001"),
+    "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "or equal to 0.0000001"),
 }
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 import time
 from pathlib import Path
@@ -97,7 +98,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     system.prepare()  # here, so that the two times are told apart
     setup = time.perf_counter() - begin
     state = steady(system)
-    rate = growth_rate(system, state.pressure)
+    rate = growth_rate(system, state.phase_pressure)
     cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
     if as_json:
         pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
@@ -144,19 +145,25 @@ def _velocities(velocity: dict[str, float], per: str) -> str:
 
 @app.command("optimum")
 def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
-    """Print lambda_F, lambda_M and the optimal pressure of both directions."""
+    """Print lambda_F, lambda_M, the optimal pressure and the angle chi of the wear velocity in both directions."""
     from fenwear.system import System
 
     system = System(_load(case, settings))
     found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
     if as_json:
         x = system.facing.x.tolist()
-        _print_json({n: {**o.velocity, "x": x, "pressure": o.pressure.tolist()} for n, o in found.items()})
+        _print_json(
+            {
+                n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
+                for n, o in found.items()
+            }
+        )
         return
     for name, state in found.items():
         print(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):
-            print(f"           p = {state.pressure[end]:.4f} MPa at x = {system.facing.x[end]:g} mm")
+            chi = math.degrees(state.tilt[end])
+            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at x = {system.facing.x[end]:g} mm")
 
 
 @app.command("check")
@@ -167,10 +174,12 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
 
     loaded = _load(case, settings)
     system = System(loaded)
+    number = stability_number(system)
+    system.check_touching()
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.facing.x)} contact nodes, "
         f"{system.punch.stiffness.size[0] + system.strip.stiffness.size[0]:,} displacement degrees of freedom, "
-        f"wear step {100 * stability_number(system):.3g} % of the explicit limit")  # fmt: skip
+        f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
 
 
 @app.command("mesh")
@@ -180,7 +189,7 @@ def mesh_command(
     settings: SetOption = [],  # noqa: B006
 ) -> None:
     """Write the mesh of a case with its physical groups."""
-    from fenwear.mesh import write_msh
+    from fenwear.bodies.mesh import write_msh
 
     loaded = _load(case, settings)
     if output.suffix != ".msh":
@@ -194,7 +203,7 @@ def plot_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
 ) -> None:
     """Draw a run: figures, pictures of the bodies, animation and report.html, into its folder."""
-    from fenwear.report import write_report
+    from fenwear.report.page import write_report
 
     for path in on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True)):
         print(path)
@@ -209,7 +218,7 @@ def compare_command(
     as_json: JsonOption = False,
 ) -> None:
     """Put several runs in one figure and one table, with the differences of their cases."""
-    from fenwear.compare import compare, draw_comparison
+    from fenwear.report.compare import compare, draw_comparison
 
     comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))
     on_root(MPI.COMM_WORLD, lambda: draw_comparison(comparison, output))
@@ -230,15 +239,15 @@ def verify_command(
     as_json: JsonOption = False,
 ) -> None:
     """Solve problems whose answer is known, and compare: a table, a page and an exit status of 1 where they differ."""
-    from fenwear.verify import registered
-    from fenwear.verify.command import verify
+    from fenwear.verify.command import choose, titles, verify
 
-    cases = registered(only)
+    cases, paper = choose(only)
     if list_cases:
-        for case in cases:
-            print(f"{case.name:24} {case.title}")
+        for name, title in titles().items():
+            if not only or name in only:
+                print(f"{name:24} {title}")
         return
-    found, directory = verify(cases, output, log if as_json else print)
+    found, directory = verify(cases, paper, output, log if as_json else print)
     if as_json:
         _print_json(found)
     log(f"page in {directory}/verification.html")

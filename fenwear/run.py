@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType, TracebackType
@@ -14,16 +15,16 @@ import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
-from fenwear import checkpoint
 from fenwear.case import Case
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, Problem
-from fenwear.fields import body_fields, write_fields
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
-from fenwear.report import try_report
-from fenwear.results import (
+from fenwear.report.page import try_report
+from fenwear.results import checkpoint
+from fenwear.results.fields import body_fields, write_fields
+from fenwear.results.history import (
     HISTORY,
     HistoryWriter,
     free_directory,
@@ -72,6 +73,8 @@ def run_case(
     begin = time.perf_counter()
     system = System(case, comm)
     system.prepare()
+    if not resume:
+        system.check_touching()
     setup = time.perf_counter() - begin
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
     try:
@@ -91,7 +94,7 @@ def _run(
     except (ConvergenceError, InterruptedRunError) as error:
         failure = error
     times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
-    summary = run.finish({"stop": run.stop(failure), **times, "warnings": run.warnings})
+    summary = run.finish({"stop": run.stop(failure), **times, "warnings": run.warnings, "retries": run.remedies})
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -132,6 +135,7 @@ class _Run:
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []
+        self.remedies: Counter[str] = Counter()
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
@@ -191,9 +195,19 @@ class _Run:
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
+        self._tell_remedies(block)
         self._on_history(lambda writer: writer.add(block))
         if int(block.half_cycle[-1]) in self._fields_at:
             self._write_fields(block)
+
+    def _tell_remedies(self, block: Block) -> None:
+        for name, count in block.remedies.items():
+            times = "once" if count == 1 else f"{count} times"
+            which = block.half_cycle[block.retries > 0]
+            self.log(
+                f"half-cycles {which[0]:,} to {which[-1]:,}: {name}, {times}, where the usual way did not converge"
+            )
+        self.remedies += block.remedies
 
     def _note(self, name: str, values: Any) -> None:
         self.extremes[name] = max(self.extremes.get(name, 0.0), float(values.max()))
@@ -208,7 +222,7 @@ class _Run:
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
         fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], phase, temperatures)
-        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]))
+        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]), block.end.worn)
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
@@ -239,7 +253,7 @@ class _Run:
         if self.moment.half_cycle > 0:
             self._save()
         contacts = joined(self.moment.contacts)
-        if self.last.heat is not None and contacts is not None and self.case.wear.strip is None:
+        if self.last.heat is not None and contacts is not None and not self.system.track_deepens:
             self.extremes["growth_rate_per_s"] = growth_rate(self.system, contacts.pressure)
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))

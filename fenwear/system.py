@@ -12,22 +12,23 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear.arrays import Array, Mask
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.mesh import BodyMesh, build_meshes
+from fenwear.bodies.shape import element_height, follow_wear
+from fenwear.bodies.surface import Surface, condense, respond_to_load, surface_nodes
 from fenwear.case import Body, Case, Heat, Load, OneWay, changed_case
 from fenwear.contact import CondensedContact, ContactSolver, Sliding
 from fenwear.contact.full import FullContact
-from fenwear.elasticity import ElasticBody
 from fenwear.errors import CaseError, Problem
-from fenwear.friction import ContactConditions, Friction
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Facing, Interface, Statics, check_distance, face, join, statics
-from fenwear.mesh import BodyMesh, build_meshes
-from fenwear.motion import Motion, make_motion
 from fenwear.optimum import Optimum, check_equilibrium, optimum
-from fenwear.shape import element_height, follow_wear
-from fenwear.surface import Surface, condense, respond_to_load, surface_nodes
-from fenwear.wear import PhasesWear, Wear, Worn
+from fenwear.remedies import Remedies
+from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.motion import Motion, make_motion
+from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
 
 class System:
@@ -50,6 +51,8 @@ class System:
             MeshQualityError: an element does not survive the motion.
         """
         self.case, self.comm, self.followed = case, comm, followed
+        self.remedies = Remedies()
+        self._parts = 1  # into which each phase of the motion is cut
         meshes = build_meshes(case.geometry, case.folder, comm)
         self.moved: Worn | None = None if followed is None else self._move(meshes, followed)
         self.punch, self.strip = (self._body(m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
@@ -101,16 +104,23 @@ class System:
         """
         return self.with_case(changed_case(self.case, *settings))
 
+    def in_parts(self, parts: int) -> System:
+        """Return the system with each phase of the motion cut into parts of equal time; collective."""
+        return self._changed(self.case, parts)
+
     def with_case(self, case: Case) -> System:
         """Return the system of another case, as `vary`; collective."""
         if not _same_bodies(self.case, case):
             return System(case, self.comm, self.followed)
+        return self._changed(case, 1)
+
+    def _changed(self, case: Case, parts: int) -> System:
         self.prepare()  # what is not made yet would be made anew in every variant
         other = copy.copy(self)
         kept = {"facing", "punch", "strip", "statics", "comm"}
         for name in [n for n, member in vars(System).items() if isinstance(member, cached_property) and n not in kept]:
             other.__dict__.pop(name, None)
-        other.case = case
+        other.case, other._parts = case, parts
         other._share_elasticity(self)
         other._share_heat(self)
         other._check_equilibrium()
@@ -294,7 +304,7 @@ class System:
     @cached_property
     def motion(self) -> Motion:
         """The sliding motion."""
-        return make_motion(self.case.motion, strip_wears=self.case.wear.strip is not None)
+        return make_motion(self.case.motion, strip_wears=self.case.wear.strip is not None).in_parts(self._parts)
 
     @cached_property
     def friction(self) -> Friction:
@@ -308,6 +318,33 @@ class System:
         sliding = [self.motion.sliding(1.0 if law is None else law.speed_exponent) for law in laws]
         track = self.case.motion.track if isinstance(self.case.motion, OneWay) else None
         return Wear(*laws, (sliding[0], sliding[1]), self.facings, self.friction, track)
+
+    def check_touching(self) -> None:
+        """Make sure that the surfaces touch in some phase; collective.
+
+        Raises:
+            CaseError: they never meet: no pressure, no wear, nothing to follow.
+            ConvergenceError: the contact of a phase did not converge.
+        """
+        gaps = []
+        for phase in range(len(self.motion.phases)):
+            contact = self.phase_contact((phase,)).solve(self.gap(phase, self.unworn()))
+            if contact.pressure.max() > 0:
+                return
+            gaps.append(float(contact.gap.min()))
+        raise CaseError(
+            Problem(
+                "geometry",
+                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
+                "expected a punch that its supports let come down, or that starts in contact",
+            )
+        )
+
+    @property
+    def track_deepens(self) -> bool:
+        """Whether the strip wears to and fro under the punch, so that no shape of its track stays."""
+        motion = self.case.motion
+        return self.case.wear.strip is not None and motion.axis == "x" and not isinstance(motion, OneWay)
 
     @property
     def constant_coefficients(self) -> bool:
@@ -396,7 +433,7 @@ class System:
     def _contact(self, phases: list[Sliding]) -> ContactSolver:
         if self.case.contact.solver == "full":
             return FullContact(self.punch, self.strip, phases[0].interface, phases[0].slip)
-        return CondensedContact(phases)
+        return CondensedContact(phases, self.remedies)
 
     def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.

@@ -170,9 +170,10 @@ def test_output_folder_in_the_way(fenwear: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize("command", ["run", "steady"])
 def test_no_convergence(fenwear: Run, tmp_path: Path, command: str) -> None:
     """Exit status 3 with PETSc's reason; what follows -- goes to PETSc."""
-    prefix = {"run": "fenwear_contact", "steady": "fenwear_steady"}[command]
+    prefixes = {"run": ("fenwear_contact", "fenwear_contact_search"), "steady": ("fenwear_steady",)}[command]
     output = ["-o", tmp_path / "run"] if command == "run" else []
-    done = fenwear(command, "example1", *output, *options(), "--", f"-{prefix}_snes_max_it", "1")
+    limits = [word for prefix in prefixes for word in (f"-{prefix}_snes_max_it", "1")]
+    done = fenwear(command, "example1", *output, *options(), "--", *limits)
     refused(done, 3, "DIVERGED_MAX_IT")
 
 

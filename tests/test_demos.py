@@ -22,6 +22,7 @@ NAMES = [
     "04_mpi_and_restart",
     "05_own_material_and_geometry",
     "06_the_paper",
+    "07_fretting",
 ]
 SECONDS = 300
 

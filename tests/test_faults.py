@@ -377,7 +377,8 @@ def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     words = ("run", "example1-heat", "-o", folder, *options("output.every=10"))
     assert fenwear(*words, "--set", "run.half_cycles=40").returncode == 0
-    failing = (*words, "--set", "run.half_cycles=60", "--resume", "--", "-fenwear_contact_snes_max_it", "0")
+    limits = [word for name in ("contact", "contact_search") for word in (f"-fenwear_{name}_snes_max_it", "0")]
+    failing = (*words, "--set", "run.half_cycles=60", "--resume", "--", *limits)
     for ranks in (1, 2):
         done = fenwear(*failing, ranks=ranks)
         assert done.returncode == 3, done.stderr

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -21,9 +22,9 @@ from fenwear.paper import (
     write_section,
 )
 from fenwear.paper.published import OPEN, VELOCITIES, last_digit
-from fenwear.paper.rows import _is_bell, _share_at
-from fenwear.paper.section import COLUMNS, markdown, table
-from fenwear.paper.study import heat_runs, neutral_share, no_heat
+from fenwear.paper.rows import NEUTRAL, _is_bell, _share_at
+from fenwear.paper.section import COLUMNS, as_json, convergence_text, markdown, needed_text, summary, table
+from fenwear.paper.study import heat_runs, neutral_share, no_heat, steady_heat
 
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 SCOPE = Scope(COARSE, shares=(0.2, 0.5), cycles=2_000, variants=110, meshes=((8, 1), (8, 2)), steps=(5, 10))
@@ -151,33 +152,64 @@ def test_sensitivity() -> None:
 
 def test_page() -> None:
     """A section without head or style: the table, then every picture inline with its caption; text escaped."""
-    section = write_section(SCOPE)
-    assert section.count("data:image/png;base64,") == section.count("<figcaption>") == len(paper_figures(SCOPE)) == 8
-    assert section.count("<tr>") == 16
-    assert all(choice.partition(",")[0].replace("'", "&#x27;") in section for choice in OPEN)
-    assert "<html" not in section
+    text = write_section(SCOPE)
+    choices, discretisations = sensitivity_rows(SCOPE)
+    assert text.count("data:image/png;base64,") == text.count("<figcaption>") == len(paper_figures(SCOPE)) == 8
+    assert text.count("<tr>") == 15 + len(choices) + len(discretisations) + 3  # three heads
+    assert all(choice.partition(",")[0].replace("'", "&#x27;") in text for choice in OPEN)
+    assert "<html" not in text
+    assert summary(paper_rows(SCOPE)) in text
+    for variant in (*choices, *discretisations):
+        assert f"{variant.steady.periodic:.2f}</td>" in text
     hostile = Row("<b>", "a & b", "x", "not reproduced", "p|q")
-    assert "<td>&lt;b&gt;</td><td>a &amp; b</td>" in table([hostile])
+    assert '<td data-column="quantity">&lt;b&gt;</td><td data-column="paper">a &amp; b</td>' in table([hostile])
     lines = markdown([hostile]).splitlines()
     assert lines[0].count("|") == lines[1].count("|") == len(COLUMNS) + 1
     assert lines[2].endswith("| p\\|q |")
 
 
+def test_what_programs_get() -> None:
+    """JSON of the same rows and variants; a kappa that no number of ours meets is null, and said in words."""
+    found = json.loads(json.dumps(as_json(SCOPE)))
+    choices, discretisations = sensitivity_rows(SCOPE)
+    assert [row["quantity"] for row in found["rows"]] == [row.quantity for row in paper_rows(SCOPE)]
+    assert [v["periodic_temperature"] for v in found["open_choices"]] == [v.steady.periodic for v in choices]
+    assert {v["group"] for v in found["convergence"]} == {v.group for v in discretisations}
+    assert found["needed_partition"] == needed_shares(SCOPE)
+    said = needed_text({"first": 0.4321, "second": None, NEUTRAL: 0.25})
+    assert said.startswith("The kappa that each number needs: first 0.432, second no kappa of ours. Above 0.250")
+
+
+def test_convergence_in_words() -> None:
+    """The largest change between the last two of each group, over all values of kappa."""
+    _, variants = sensitivity_rows(SCOPE)
+    steps = {v.name: v.steady.periodic for v in variants if v.group == "steps" and v.share == 0.5}
+    change = abs(steps["10 time steps in a half-cycle"] / steps["5 time steps in a half-cycle"] - 1)
+    other = {v.name: v.steady.periodic for v in variants if v.group == "steps" and v.share == 0.2}
+    change = max(change, abs(other["10 time steps in a half-cycle"] / other["5 time steps in a half-cycle"] - 1))
+    assert f"temperatures change by at most {change:.1g} of their value" in convergence_text(variants).split(". ")[-1]
+
+
 @pytest.mark.slow
 def test_the_full_comparison() -> None:
     """The numbers that the README prints, on the built-in cases' own meshes."""
-    rows = paper_rows(FULL)
+    scope = Scope(shares=(0.1, 0.5))  # runs with one stable and one unstable kappa, on the full mesh
+    rows = paper_rows(scope)
     verdicts = [row.verdict for row in rows]
     assert [verdicts.count(v) for v in get_args(Verdict)] == [3, 9, 3]
-    expected: dict[str, list[Any]] = {
-        "one-way motions": [11.1, 20.9, 30.7, 40.5, 50.3, 60.1],
-        "repeats from cycle to cycle (K)": [13.8, 23.2, 32.7, 42.1, 51.5, 61.0],
-        "how far": [19.7, 10.1, 6.1, 3.8, 2.4, 1.4],
+    hot = System(load_case("example1-heat"))
+    states = [steady_heat(hot.vary(f"heat.partition={share}")) for share in FULL.shares]
+    expected = {
+        "monotonic": [11.1, 20.9, 30.7, 40.5, 50.3, 60.1],
+        "periodic": [13.8, 23.2, 32.7, 42.1, 51.5, 61.0],
+        "difference": [19.7, 10.1, 6.1, 3.8, 2.4, 1.4],
     }
-    for words, values in expected.items():
-        assert numbers(by_quantity(rows, words).ours.partition(" for")[0]) == values
-    assert neutral_share(FULL) == pytest.approx(0.256, abs=1e-3)
-    needed = needed_shares(FULL)
+    for name, values in expected.items():
+        assert [round(getattr(state, name), 1) for state in states] == values
+    for words, name in (("one-way", "monotonic"), ("repeats from cycle to cycle (K)", "periodic")):
+        printed = numbers(by_quantity(rows, words).ours.partition(" for")[0])
+        assert printed == [expected[name][FULL.shares.index(share)] for share in scope.shares]
+    assert neutral_share(scope) == pytest.approx(0.256, abs=1e-3)
+    needed = needed_shares(scope)
     assert needed["monotonic temperature"] == pytest.approx(0.468, abs=2e-3)
     assert needed["periodic temperature"] == pytest.approx(0.485, abs=2e-3)
-    assert needed["their difference"] == pytest.approx(0.306, abs=2e-3)

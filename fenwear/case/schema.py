@@ -469,7 +469,8 @@ class Run(_Part):
     half_cycles: Annotated[int, Field(ge=1, strict=True)]
     integration: Literal["explicit", "implicit", "jump"] = "explicit"
     jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
-        default=3e-3, description="largest error of pressure in a cycle jump, over the mean pressure"
+        default=3e-3,
+        description="error of pressure in a cycle jump, root mean square over the contact and over the mean pressure",
     )
     periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
         default=None, description="stop when pressure repeats within this fraction of the mean pressure"

@@ -22,7 +22,9 @@ import scipy.linalg
 
 from fenwear.arrays import Array
 from fenwear.contact.inequality import Bordered, BorderedInequality, DenseInequality
+from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
+from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedies
 
 DENSE = 400  # unknowns up to which one dense elimination beats one for each phase
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
@@ -90,8 +92,10 @@ class CondensedContact:
     there are many, one small elimination for each of them takes the place of one of all.
     """
 
-    def __init__(self, phases: Sequence[Sliding]) -> None:
+    def __init__(self, phases: Sequence[Sliding], remedies: Remedies | None = None) -> None:
+        """Take the phases, and where to note that a contact was solved in another way than usual."""
         self.phases = list(phases)
+        self._remedies = remedies or Remedies()
         interface = phases[0].interface
         statics = interface.statics
         n, r, m = len(statics.facing.weights), len(statics.resultant), len(self.phases)
@@ -205,18 +209,12 @@ class CondensedContact:
         n = self.shape[1]
         offset = self._offset
         offset[:, :n] = (gap + self._loads) / self._gap_scale
-        guess = np.zeros_like(offset)
-        if start is None:
-            guess[:, :n] = 1.0
-        else:
-            guess[:, :n] = start.pressure / self._pressure_scale
-            guess[:, n:] = start.rigid / self._rigid_scale
         if coupling is not self._coupling:
             self._coupling, self._filled = coupling, False
         self._layer = layer
         alone = coupling is None and layer is not None and offset.size > DENSE
         inequality = self._bordered if alone else self._dense
-        x = inequality.solve(guess.ravel()).reshape(offset.shape)
+        x = self._solve(inequality, start).reshape(offset.shape)
         pressure = np.where(x[:, :n] > ZERO, x[:, :n], 0.0) * self._pressure_scale
         residual = np.empty_like(offset)
         self._residual(x.ravel(), residual.ravel())
@@ -224,5 +222,26 @@ class CondensedContact:
             pressure,
             residual[:, :n] * self._gap_scale,
             x[:, n:] * self._rigid_scale,
-            inequality.snes.getIterationNumber(),
+            inequality.iterations,
         )
+
+    def _solve(self, inequality: DenseInequality | BorderedInequality, start: ContactState | None) -> Array:
+        """Return the solution by the first way that finds it."""
+        n = self.shape[1]
+        full = np.zeros_like(self._offset)
+        full[:, :n] = 1.0
+        ways = [(full, False, FULL_START), (full, True, FULL_START_SEARCH)]
+        if start is not None:
+            near = np.concatenate([start.pressure / self._pressure_scale, start.rigid / self._rigid_scale], axis=1)
+            ways = [(near, False, ""), (near, True, LINE_SEARCH), *ways]
+        failure: ConvergenceError | None = None
+        for guess, line_search, name in ways:
+            try:
+                x = inequality.solve(guess.ravel(), line_search=line_search)
+            except ConvergenceError as error:
+                failure = failure or error  # the usual way's says most
+                continue
+            if failure is not None:
+                self._remedies.note(name)
+            return x
+        raise failure or ConvergenceError(inequality.name)

@@ -14,11 +14,11 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.surface import SurfaceNodes
 from fenwear.contact.condensed import ContactState, Layer
 from fenwear.contact.inequality import check, configure
-from fenwear.elasticity import ElasticBody
 from fenwear.interface import Interface
-from fenwear.surface import SurfaceNodes
 
 
 class FullContact:

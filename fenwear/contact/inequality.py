@@ -2,13 +2,14 @@
 
 Find x within its bounds with F_i(x) = 0 where x_i is free, F_i >= 0 where x_i is at its lower and
 F_i <= 0 where it is at its upper bound: reduced-space active-set Newton (vinewtonrsls). These
-systems are piecewise linear or nearly so, hence full steps, without line search.
+systems are piecewise linear or nearly so, hence full steps, without line search unless asked for.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
@@ -22,14 +23,14 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 ZERO_PIVOT = 71  # PETSC_ERR_MAT_LU_ZRPVT
 
 
-def configure(snes: PETSc.SNES, prefix: str) -> None:
+def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None:
     """Set what all of fenwear's inequalities share; options with `prefix` override it."""
     snes.setOptionsPrefix(prefix)
     snes.setType("vinewtonrsls")
     # Residuals are scaled to 1 and need few steps; a step that changes nothing ends the iteration.
     snes.setTolerances(rtol=0.0, atol=1e-11, stol=0.0, max_it=100)
     options = PETSc.Options()
-    for name, value in (("snes_linesearch_type", "basic"), ("snes_vi_zero_tolerance", 1e-12)):
+    for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", 1e-12)):
         if not options.hasName(f"{prefix}{name}"):
             options[f"{prefix}{name}"] = value
     snes.ksp.setType("preonly")
@@ -64,40 +65,61 @@ class _Inequality:
         name: str,
     ) -> None:
         size, comm = len(lower), PETSc.COMM_SELF
+        self.iterations = 0  # of the last solve
         self.x = np.zeros(size)
         self.name = name
         self._bounds = [np.clip(b, PETSc.NINFINITY, PETSc.INFINITY) for b in (lower, upper)]
         self._x = PETSc.Vec().createWithArray(self.x, comm=comm)
-        self._f = PETSc.Vec().createSeq(size, comm=comm)
-        self.snes = PETSc.SNES().create(comm)
-        self.snes.setFunction(lambda snes, x, f: residual(x.array_r, f.array_w), self._f)
+        self._residual, self._jacobian, self._fill, self._prefix = residual, jacobian, fill, prefix
+        self.snes = self._make(prefix, "basic")
+
+    @cached_property
+    def _searching(self) -> PETSc.SNES:
+        return self._make(f"{self._prefix}search_", "l2")
+
+    def _make(self, prefix: str, line_search: str) -> PETSc.SNES:
+        comm = PETSc.COMM_SELF
+        snes = PETSc.SNES().create(comm)
+        vector = PETSc.Vec().createSeq(len(self.x), comm=comm)
+        snes.setFunction(lambda snes, x, f: self._residual(x.array_r, f.array_w), vector)
 
         def update(_snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, _P: PETSc.Mat) -> None:
-            fill(x.array_r)
+            self._fill(x.array_r)
             J.assemble()
 
-        self.snes.setJacobian(update, jacobian)
-        configure(self.snes, prefix)
-        self._bound_vectors = [PETSc.Vec().createWithArray(b, comm=comm) for b in self._bounds]
-        self.snes.setVariableBounds(*self._bound_vectors)
-        self.snes.setFromOptions()
+        snes.setJacobian(update, self._jacobian)
+        configure(snes, prefix, line_search)
+        snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in self._bounds))
+        self._set_solver(snes.ksp.pc)
+        snes.setFromOptions()
+        return snes
 
-    def solve(self, start: Array) -> Array:
+    def _set_solver(self, pc: PETSc.PC) -> None:
+        """Choose how the Newton steps are solved for."""
+
+    def solve(self, start: Array, *, line_search: bool = False) -> Array:
         """Return the solution (size,), valid until the next solve.
+
+        Args:
+            start: Where Newton starts (size,).
+            line_search: Whether steps are cut to where the residual is least: slower, but it ends where
+                full steps go to and fro between two sets of nodes in contact.
 
         Raises:
             ConvergenceError: SNES did not converge.
         """
+        snes = self._searching if line_search else self.snes
         self.x[:] = start
         try:
-            self.snes.solve(None, self._x)
+            snes.solve(None, self._x)
         except PETSc.Error as error:
             if error.ierr != ZERO_PIVOT:
                 raise
             raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular") from None
         except np.linalg.LinAlgError as error:
             raise ConvergenceError(f"{self.name} did not converge: {error}") from None
-        check(self.snes, self.name)
+        check(snes, self.name)
+        self.iterations = snes.getIterationNumber()
         return self.x
 
 
@@ -244,5 +266,7 @@ class BorderedInequality(_Inequality):
         shell = PETSc.Mat().createPython((size, size), _BorderedMatrix(matrix), comm=PETSc.COMM_SELF)
         shell.setUp()
         super().__init__(lower, upper, residual, shell, lambda x: jacobian(x, matrix), prefix, name)
-        self.snes.ksp.pc.setType("python")
-        self.snes.ksp.pc.setPythonContext(_BorderedSolver())
+
+    def _set_solver(self, pc: PETSc.PC) -> None:
+        pc.setType("python")
+        pc.setPythonContext(_BorderedSolver())

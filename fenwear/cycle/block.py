@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
+from fenwear.sliding.wear import Worn
 from fenwear.system import System
-from fenwear.wear import Worn
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,9 @@ class Block:
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
             mean pressure (k,); NaN in the first cycle.
         equilibrium_error: Largest error of the force and moment balance relative to the load (k,).
+        retries: What had to be solved in another way in it, a count (k,).
         heat: Temperatures and heat balance; None without heat.
+        remedies: How it was solved then, and how often.
         end: From where the run goes on.
     """
 
@@ -95,7 +98,9 @@ class Block:
     optimum_distance: Array
     periodicity: Array
     equilibrium_error: Array
+    retries: NDArray[np.int64]
     heat: BlockHeat | None = field(default=None, kw_only=True)
+    remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
     end: Moment = field(kw_only=True)
 
     def __len__(self) -> int:
@@ -144,6 +149,7 @@ class Recorder:
     size: int
     _rows: list[tuple[object, ...]] = field(default_factory=list)
     _heat: list[HalfCycleHeat] = field(default_factory=list)
+    _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
     _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last slip
 
@@ -167,7 +173,10 @@ class Recorder:
         distance = float(np.abs(pressure - self._optimum(direction, pressure)).max()) / scale
         row = (half_cycle, direction, pressure, state.gap[0], worn.punch, worn.strip, state.rigid[0])
         areas = np.sum([p.areas for p in phases], axis=0).tolist()
-        self._rows.append((*row, *areas, distance, change, max(self._balance(p) for p in phases)))
+        taken = self.system.remedies.take()
+        self._remedies += taken
+        balance = max(self._balance(p) for p in phases)
+        self._rows.append((*row, *areas, distance, change, balance, taken.total()))
         if heat is not None:
             self._heat.append(heat)
         return change
@@ -195,8 +204,9 @@ class Recorder:
         if self._heat:
             names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
             heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
-        self._rows, self._heat = [], []
-        return Block(self.system, *columns, heat=heat, end=end)
+        remedies = self._remedies
+        self._rows, self._heat, self._remedies = [], [], Counter()
+        return Block(self.system, *columns, heat=heat, remedies=remedies, end=end)
 
     def __bool__(self) -> bool:
         return bool(self._rows)

@@ -22,11 +22,13 @@ from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.moment import Moment, beginning, joined, parted
 from fenwear.errors import ConvergenceError
-from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
+from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
+from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import Worn, WornLayer
 from fenwear.system import System
-from fenwear.wear import Worn, WornLayer
 
+PARTS = 8  # of a cycle that does not converge as a whole
 MAX_ITERATIONS = 60  # of contact with the nodes that conduct
 CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
 
@@ -50,7 +52,7 @@ def jump(
     Args:
         system: The assembled problem.
         half_cycles: Where to end, a whole number of cycles.
-        tolerance: Largest error of pressure in one jump, as a fraction of the mean pressure.
+        tolerance: Largest error of pressure in one jump, root mean square over the contact and over the mean pressure.
         periodic_within: Stop when the pressure changes per cycle by less than this fraction of the
             mean pressure.
         block: Half-cycles in a block.
@@ -71,18 +73,17 @@ def jump(
     while done < cycles:
         tried = min(length, next(end for end in ends if end > done) - done)
         try:
-            whole = stepper.step(moment, tried)
-            end = stepper.step(stepper.step(moment, tried / 2), tried / 2)
+            end, estimate = stepper.attempt(moment, tried, tolerance)
         except ConvergenceError as error:
             if tried > 1:
+                system.remedies.note(SHORTER_JUMPS)
                 length = max(1, tried // 4)
                 continue
             if recorder:
                 yield recorder.take(moment)
             raise ConvergenceError(f"half-cycle {done * strokes + 1}: {error}") from error
-        error_estimate = _largest_change(whole, end) / _present_mean(system, end)
-        factor = 0.9 * np.sqrt(tolerance / max(error_estimate, 1e-300))
-        if error_estimate > tolerance and tried > 1:
+        factor = 0.9 * np.sqrt(tolerance / max(estimate, 1e-300))
+        if estimate > tolerance and tried > 1:
             length = max(1, int(tried * max(0.2, factor)))
             continue
         done += tried
@@ -111,6 +112,31 @@ class _Stepper:
     def beginning(self) -> Moment:
         """Return the unworn bodies at their initial temperature."""
         return beginning(self.system, None if self.heat is None else self.heat.exchange.initial())
+
+    def attempt(self, moment: Moment, cycles: int, tolerance: float) -> tuple[Moment, float]:
+        """Return the moment `cycles` cycles later, by two steps, and an estimate of its error.
+
+        Raises:
+            ConvergenceError: it did not converge; a single cycle not in smaller steps either.
+        """
+        try:
+            whole, halves = self.step(moment, cycles), self.steps(moment, cycles, 2)
+        except ConvergenceError as error:
+            if cycles > 1:
+                raise
+            try:
+                parts = self.steps(moment, cycles, PARTS)
+            except ConvergenceError:
+                raise error from None
+            self.system.remedies.note(SMALLER_STEPS.format(PARTS))
+            return parts, tolerance
+        return halves, _difference(self.system, whole, halves)
+
+    def steps(self, moment: Moment, cycles: float, count: int) -> Moment:
+        """Return the moment `cycles` cycles later, by that many equal steps."""
+        for _ in range(count):
+            moment = self.step(moment, cycles / count)
+        return moment
 
     def step(self, moment: Moment, cycles: float) -> Moment:
         """Return the moment `cycles` cycles later."""
@@ -238,16 +264,17 @@ def solve_with_heat(
     )
 
 
-def _largest_change(one: Moment, other: Moment) -> float:
-    pairs = zip(one.contacts, other.contacts, strict=True)
-    return max(float(np.abs(_present(a).pressure - _present(b).pressure).max()) for a, b in pairs)
+def _difference(system: System, one: Moment, other: Moment) -> float:
+    """Return the root mean square of the pressures' difference over what is in contact, over the mean pressure there.
 
-
-def _present_mean(system: System, moment: Moment) -> float:
-    """Return the mean pressure over what is in contact, at least that over the nominal contact, MPa."""
-    mean, weights = system.statics.mean_pressure, system.facing.weights
-    widths = [float(weights @ (_present(contact).pressure[0] > 0)) for contact in moment.contacts]
-    return mean * max(1.0, float(weights.sum()) / max(*widths, weights.min()))
+    Not the largest: that is the whole pressure of the one node which is in contact here and not there.
+    """
+    weights, largest = system.facing.weights, 0.0
+    for a, b in zip(one.contacts, other.contacts, strict=True):
+        first, second = _present(a).pressure[0], _present(b).pressure[0]
+        width = float(weights @ (np.maximum(first, second) > 0))
+        largest = max(largest, float(weights @ (first - second) ** 2) * width)
+    return float(np.sqrt(largest) / (system.statics.mean_pressure * weights.sum()))
 
 
 def _present(contact: ContactState | None) -> ContactState:

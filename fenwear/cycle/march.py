@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 
-from fenwear.contact import ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
 from fenwear.cycle.moment import Moment, beginning
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
+from fenwear.cycle.retry import SmallerSteps
 from fenwear.errors import ConvergenceError
-from fenwear.motion import Motion
 from fenwear.system import System
-from fenwear.wear import Worn
 
 BLOCK = 200
 
@@ -50,20 +48,26 @@ def march(
     motion, exchange = system.motion, system.exchange
     steps = [PhaseStep(system, phase, implicit=implicit) for phase in range(len(motion.phases))]
     moment = start or beginning(system, None if exchange is None else exchange.initial())
+    smaller = SmallerSteps(system, implicit=implicit)
     recorder = Recorder(system, block)
     for half_cycle in range(moment.half_cycle + 1, half_cycles + 1):
+        first = (half_cycle - 1) % motion.half_cycles * motion.positions
+        phases = range(first, first + motion.positions)
         try:
-            ends, worn, contacts = _half_cycle(steps, motion, moment, half_cycle)
+            ends = _half_cycle(steps, moment, phases, smaller)
         except ConvergenceError as error:
             if recorder:
                 yield recorder.take(moment)
             raise ConvergenceError(f"half-cycle {half_cycle}: {error}") from error
+        worn, contacts = moment.worn, list(moment.contacts)
+        for phase, end in zip(phases, ends, strict=True):
+            worn, contacts[phase] = worn + end.worn, end.record.contact
         heats = [end.heat for end in ends if end.heat is not None]
         heat = reduce(HalfCycleHeat.then, heats) if heats else None
         change = recorder.add(half_cycle, [end.record for end in ends], worn, heat)
         repeats = periodic_within is not None and change < periodic_within
         periodic = moment.periodic_phases + 1 if repeats else 0
-        moment = Moment(half_cycle, worn, contacts, ends[-1].temperature, periodic_phases=periodic)
+        moment = Moment(half_cycle, worn, tuple(contacts), ends[-1].temperature, periodic_phases=periodic)
         finished = periodic >= motion.half_cycles or leave(moment)
         if recorder.full or finished or half_cycle == half_cycles or half_cycle in stops:
             yield recorder.take(moment)
@@ -71,15 +75,14 @@ def march(
             return
 
 
-def _half_cycle(
-    steps: Sequence[PhaseStep], motion: Motion, moment: Moment, half_cycle: int
-) -> tuple[list[PhaseEnd], Worn, tuple[ContactState | None, ...]]:
-    """Return the ends of the phases of a half-cycle, the worn depths and the last contact of every phase."""
-    first = (half_cycle - 1) % motion.half_cycles * motion.positions
-    worn, temperature, contacts = moment.worn, moment.temperature, list(moment.contacts)
-    ends = []
-    for phase in range(first, first + motion.positions):
-        end = steps[phase].solve(temperature, worn, contacts[phase])
-        worn, temperature, contacts[phase] = worn + end.worn, end.temperature, end.record.contact
-        ends.append(end)
-    return ends, worn, tuple(contacts)
+def _half_cycle(steps: Sequence[PhaseStep], moment: Moment, phases: range, smaller: SmallerSteps) -> list[PhaseEnd]:
+    """Return the ends of the phases of a half-cycle, in smaller steps where it must be."""
+    worn, temperature, ends = moment.worn, moment.temperature, []
+    try:
+        for phase in phases:
+            end = steps[phase].solve(temperature, worn, moment.contacts[phase])
+            worn, temperature = worn + end.worn, end.temperature
+            ends.append(end)
+    except ConvergenceError as error:
+        return smaller.half_cycle(moment, phases, error)
+    return ends

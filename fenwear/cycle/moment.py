@@ -8,8 +8,8 @@ import numpy as np
 
 from fenwear.contact import ContactState
 from fenwear.heat.exchange import State
+from fenwear.sliding.wear import Worn
 from fenwear.system import System
-from fenwear.wear import Worn
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.thermal import ThermalContact
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
+from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
 from fenwear.system import System
-from fenwear.wear import PhasesWear, Worn, WornLayer
 
 MAX_ITERATIONS = 60  # of coefficients and the pressure they depend on
 CLOSE = 1e-9  # change of pressure over the mean pressure that ends them

@@ -49,11 +49,11 @@ def stability_number(system: System) -> float:
 def growth_rate(system: System, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
-    Negative: every disturbance dies out. The strip does not wear. The cycle's map of temperature and
-    worn depth is linearised around the given pressures with the same nodes in contact and implicit wear,
-    and its eigenvalue largest in size taken: ln |lambda| over the duration of a cycle. A rigid motion of
-    the worn shape changes nothing, nor does the shape where nothing touches; these disturbances
-    (lambda = 1) do not count.
+    Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
+    cycle's map of temperature and worn depth is linearised around the given pressures with the same
+    nodes in contact and implicit wear, and its eigenvalue largest in size taken: ln |lambda| over the
+    duration of a cycle. A rigid motion of the worn shape changes nothing, nor does the shape where
+    nothing touches; these disturbances (lambda = 1) do not count.
 
     Args:
         system: The assembled problem.
@@ -63,8 +63,7 @@ def growth_rate(system: System, pressure: Array) -> float:
     n = pressure.shape[1]
     dim = 0 if heat is None else heat.gap_rows.shape[1]
     maps = None if heat is None else heat.maps(heat.conductances(pressure))
-    punch = system.phases_wear.punch
-    slopes = np.zeros_like(pressure) if punch is None else punch.slope(pressure)
+    left, right = system.phases_wear.border(pressure)
     slips = system.slips()
     cycle = np.eye(dim + n)
     for phase, interface in enumerate(system.interfaces):
@@ -77,12 +76,13 @@ def growth_rate(system: System, pressure: Array) -> float:
             disturbance[:, :dim] = heat.gap_rows @ one.propagator
             compliance = compliance + heat.gap_rows @ one.response
             change[:dim, :dim] = one.propagator
-        compliance = compliance + np.diag(slopes[phase])  # wear at the end of the phase: no step is too long
+        wear = left[phase] @ right[phase]  # depth by pressure
+        compliance = compliance + wear  # wear at the end of the phase: no step is too long
         answer = -_restricted_stiffness(system, slips[phase], compliance, pressure[phase] > 0) @ disturbance
         if maps is not None:
             change[:dim] += maps[phase].response @ answer
         change[dim:, dim:] = np.eye(n)
-        change[dim:] += slopes[phase][:, None] * answer
+        change[dim:] += wear @ answer
         cycle = change @ cycle
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL

@@ -24,13 +24,12 @@ import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
-from fenwear.case import OneWay
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
 from fenwear.errors import ConvergenceError
-from fenwear.friction import ContactConditions
 from fenwear.heat.periodic import CycleHeat
+from fenwear.sliding.friction import ContactConditions
 from fenwear.system import System
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
@@ -60,6 +59,7 @@ class Steady:
     Attributes:
         directions: Sliding direction of each half-cycle.
         pressure: In the middle position of each half-cycle (half_cycles, n), MPa.
+        phase_pressure: In every phase, that is in every position (phases, n), MPa.
         gap: The same (half_cycles, n), mm.
         shape: Worn depth without its rigid part (n,), mm; NaN where the surfaces never touch.
         contact_width: Width in contact there (half_cycles,), mm.
@@ -72,6 +72,7 @@ class Steady:
 
     directions: tuple[int, ...]
     pressure: Array
+    phase_pressure: Array
     gap: Array
     shape: Array
     contact_width: Array
@@ -175,7 +176,7 @@ class _SteadyInequality:
         f = np.empty_like(self.x)
         self._residual(self.x, f)
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
-        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.snes.getIterationNumber())
+        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.iterations)
 
     def _start(self) -> Array:
         """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""
@@ -238,8 +239,7 @@ def steady(system: System) -> Steady:
 
 def _check_exists(system: System) -> None:
     """Raise where the strip's wear never comes to a shape that stays."""
-    motion = system.case.motion
-    if system.case.wear.strip is not None and motion.axis == "x" and not isinstance(motion, OneWay):
+    if system.track_deepens:
         raise ConvergenceError(
             "no cyclic steady state exists: the strip wears, and under a punch that goes to and fro its track deepens "
             "for ever, most where every position touches it. Follow the wear by `run` with run.integration = "
@@ -299,6 +299,7 @@ def _result(
     return Steady(
         motion.stroke_directions,
         contact.pressure[middle],
+        contact.pressure,
         contact.gap[middle],
         shape - system.facing.initial_gap,
         (contact.pressure[middle] > 0) @ weights,

@@ -24,12 +24,12 @@ from scipy.sparse import csr_array
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.assembly import assembled
+from fenwear.bodies.assembly import assembled
+from fenwear.bodies.elasticity import region_field
+from fenwear.bodies.factor import Factor
+from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Heat, Material, Model
-from fenwear.elasticity import region_field
 from fenwear.errors import CaseError, Problem
-from fenwear.factor import Factor
-from fenwear.mesh import BodyMesh
 
 PREFIX = "fenwear_heat_"
 FREE, CONTACT, HELD = 1, 2, 3

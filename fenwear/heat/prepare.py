@@ -15,8 +15,8 @@ from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.reduction import reduced_basis
 from fenwear.interface import Facing
-from fenwear.motion import Motion
 from fenwear.parallel import total
+from fenwear.sliding.motion import Motion
 
 
 def prepare_exchange(

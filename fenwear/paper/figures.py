@@ -13,9 +13,9 @@ from fenwear.paper.published import (
     PEAK_HALF_CYCLE,
     PERIODIC_TEMPERATURE,
 )
-from fenwear.paper.rows import needed_shares, sensitivity_rows
+from fenwear.paper.rows import NEUTRAL, needed_shares, sensitivity_rows
 from fenwear.paper.study import FULL, HeatRun, Scope, Variant, heat_runs, no_heat
-from fenwear.style import (
+from fenwear.report.style import (
     ALONG_CONTACT,
     BLUE,
     DIRECTIONS,
@@ -136,7 +136,7 @@ def _over_share(runs: Sequence[HeatRun]) -> Figure:
 
 def _needed(scope: Scope) -> Figure:
     needed = needed_shares(scope)
-    neutral = needed.pop("neutral stability")
+    neutral = needed.pop(NEUTRAL)
     names = {
         "monotonic temperature": f"{MONOTONIC_TEMPERATURE} K, one-way motions",
         "periodic temperature": f"{PERIODIC_TEMPERATURE} K, periodic motion",
@@ -153,7 +153,7 @@ def _needed(scope: Scope) -> Figure:
             ax.plot(share, level, "o", color=BLUE)
             ax.annotate(f"{share:.2f}", (share, level), xytext=(6, 0), textcoords="offset points", va="center")
     ax.set_yticks(range(len(needed)), [names[key] for key in needed])
-    ax.invert_yaxis()
+    ax.set_ylim(len(needed) - 0.5, -0.5)
     ax.set_xlim(min(scope.shares), max(scope.shares))
     ax.set(xlabel=KAPPA)
     return figure
@@ -199,7 +199,7 @@ def _central(runs: Sequence[HeatRun]) -> Figure:
     figure, (ax,) = panels(1, 3.0)
     for number, run in enumerate(runs):
         ax.plot(run.half_cycle[1:], run.central_pressure, linewidth=1, label=f"{run.share:g}", **run_style(number))
-    reference_line(ax, float(LARGEST_PRESSURE), "paper")
+    reference_line(ax, float(LARGEST_PRESSURE), "paper", at=0.42)  # where no line runs
     ax.set(xlabel="half-cycle", ylabel="pressure (MPa)")
     ax.set_ylim(bottom=0)
     legend_beside(ax, "kappa")

@@ -219,7 +219,7 @@ def steady_heat(system: System) -> SteadyHeat:
         raise ValueError("expected a case with heat")
     at_middle = float(state.heat.punch[:, centre].max())
     alone = float(monotonic(system).periodic_punch[centre])
-    return SteadyHeat(alone, at_middle, growth_rate(system, state.pressure), state)
+    return SteadyHeat(alone, at_middle, growth_rate(system, state.phase_pressure), state)
 
 
 @cache
@@ -232,7 +232,7 @@ def neutral_share(scope: Scope = FULL) -> float | None:
 
     def grows(share: float) -> bool:
         varied = system.vary(f"heat.partition={share}")
-        return growth_rate(varied, steady(varied).pressure) > 0
+        return growth_rate(varied, steady(varied).phase_pressure) > 0
 
     if grows(low) or not grows(high):
         return None
@@ -273,11 +273,12 @@ def heat_runs(name: str, scope: Scope = FULL) -> tuple[HeatRun, ...]:
 
 HINGES = ((40, 80), (20, 40), (20, 60), (60, 90))  # mm above the contact; first the built-in case's
 SUPPORTS = {
-    "strip fixed at the bottom only": "strip.supports=[{on='strip_bottom', fix=['x', 'z']}]",
+    "strip fixed at the bottom only": ("strip.supports=[{on='strip_bottom', fix=['x', 'z']}]",),
     "strip's bottom free to slide, ends fixed": (
-        "strip.supports=[{on='strip_bottom', fix=['z']}, {on='strip_ends', fix=['x']}]"
+        "strip.supports=[{on='strip_bottom', fix=['z']}, {on='strip_ends', fix=['x']}]",
     ),
 }
+MOVING = {"strip in 5 positions of its stroke": ("geometry.parameters.overlap=3", "motion.positions=5")}
 AS_BUILT_IN = "Example 1 as it is"
 
 
@@ -293,8 +294,8 @@ def open_choices(scope: Scope = FULL) -> tuple[Variant, ...]:
         ("heat.coupling=split", "heat and contact in turn, relaxed by 0.5"),
     ):
         variants += _variants(base.vary(key), scope, "example 1", name)
-    for name, key in {"plane strain": "model.plane=strain", **SUPPORTS}.items():
-        variants += _variants(System(load_case("example1-heat", (*scope.settings, key))), scope, "example 1", name)
+    for name, keys in {"plane strain": ("model.plane=strain",), **SUPPORTS, **MOVING}.items():
+        variants += _variants(System(load_case("example1-heat", (*scope.settings, *keys))), scope, "example 1", name)
     built_in = _prepared("example2-heat", scope.settings)
     variants += _variants(built_in, scope, "example 2", f"Example 2, hinges at {HINGES[0][0]} and {HINGES[0][1]} mm")
     for low, high in HINGES[1:]:

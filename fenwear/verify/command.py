@@ -1,8 +1,9 @@
-"""What `fenwear verify` does: runs the cases, says what they find as it goes, writes the page and the numbers."""
+"""What `fenwear verify` does: cases and comparison with the paper, what they find as it goes, page and numbers."""
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,24 +11,41 @@ from typing import Any
 from mpi4py import MPI
 
 from fenwear.errors import CaseError, Problem
+from fenwear.paper import FULL, Scope, paper_rows, section
 from fenwear.parallel import on_root
-from fenwear.results import CASE, free_directory, make_directory
+from fenwear.results.history import CASE, free_directory, make_directory
 from fenwear.verify.page import page
-from fenwear.verify.suite import Outcome, Row, VerificationCase, run_cases
+from fenwear.verify.suite import Outcome, Row, VerificationCase, registered, run_cases
 from fenwear.versions import versions
 
+PAPER, PAPER_TITLE = "paper", "Every number of the paper beside fenwear's, with its verdict (about 3 minutes)"
 PAGE, NUMBERS = "verification.html", "verification.json"
 DEFAULT = Path("results") / "verification"
 WIDTH = 78
 
 
+def choose(names: Sequence[str]) -> tuple[list[VerificationCase], Scope | None]:
+    """Return the cases of these names and how much of the comparison with the paper, by default all of both.
+
+    Raises:
+        CaseError: a name that nothing has.
+    """
+    return registered(names, besides=(PAPER,)), FULL if not names or PAPER in names else None
+
+
+def titles() -> dict[str, str]:
+    """Return everything that can be asked for, with its title."""
+    return {**{case.name: case.title for case in registered()}, PAPER: PAPER_TITLE}
+
+
 def verify(
-    cases: Sequence[VerificationCase], output: Path | None, say: Callable[[str], None]
+    cases: Sequence[VerificationCase], paper: Scope | None, output: Path | None, say: Callable[[str], None]
 ) -> tuple[dict[str, Any], Path]:
-    """Run the cases and write verification.html and verification.json; collective.
+    """Run the cases, compare with the paper, and write verification.html and verification.json; collective.
 
     Args:
         cases: What to run.
+        paper: How much of the comparison with the paper, None for nothing of it.
         output: New folder of the results; by default results/verification, or -2, -3, ...
         say: Called with each line of the table.
 
@@ -44,12 +62,20 @@ def verify(
         outcomes.append(outcome)
         say("\n".join(_lines(outcome)))
     found = as_json(outcomes)
-    on_root(comm, lambda: _write(directory, found, page(outcomes, comm.size, versions())))
+    beside = None
+    if paper is not None:
+        begin = time.perf_counter()
+        rows = paper_rows(paper)
+        say("\n".join(section.lines(rows)))
+        beside = section.write_section(paper)
+        found["paper"] = {**section.as_json(paper), "seconds": round(time.perf_counter() - begin, 3)}
+        say(section.summary(rows))
+    on_root(comm, lambda: _write(directory, found, page(outcomes, beside, comm.size, versions())))
     return found, directory
 
 
 def as_json(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Return what verification.json holds."""
+    """Return what verification.json holds of the cases: what they agree with is exact or published, never open."""
     return {
         "agree": all(outcome.verdict != "differs" for outcome in outcomes),
         "differing": [outcome.case.name for outcome in outcomes if outcome.verdict == "differs"],
@@ -57,6 +83,7 @@ def as_json(outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "seconds": round(sum(outcome.seconds for outcome in outcomes), 3),
         "versions": versions(),
         "cases": [outcome.as_json() for outcome in outcomes],
+        "paper": None,
     }
 
 

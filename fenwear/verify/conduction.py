@@ -11,9 +11,9 @@ from scipy.integrate import quad
 from scipy.special import k0e
 
 from fenwear.arrays import Array
-from fenwear.fields import body_fields
 from fenwear.heat.conduction import HeatBody
 from fenwear.parallel import total
+from fenwear.results.fields import body_fields
 from fenwear.verify.bodies import builtin, clamped, two_blocks
 from fenwear.verify.manufactured import (
     DEGREES,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy import cos, pi, sin
 
 from fenwear.arrays import Array
-from fenwear.fields import body_fields
+from fenwear.results.fields import body_fields
 from fenwear.verify.bodies import clamped, two_blocks
 from fenwear.verify.manufactured import (
     DEGREES,

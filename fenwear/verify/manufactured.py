@@ -14,7 +14,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
-from fenwear.elasticity import ElasticBody
+from fenwear.bodies.elasticity import ElasticBody
 from fenwear.verify.suite import Line, Plot
 
 DEGREES = (1, 2, 3, 4)

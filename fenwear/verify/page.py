@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.html_page import document, escape, figure, section
-from fenwear.style import COLOURS, DASHES, panels
+from fenwear.report.html_page import document, escape, figure, section
+from fenwear.report.style import COLOURS, DASHES, panels
 from fenwear.verify.suite import Line, Outcome, Plot, Row
 
 if TYPE_CHECKING:
@@ -23,33 +23,46 @@ MARKERS = "os^Dvx+"
 WORDS = {"agrees": "agrees", "differs": "DIFFERS", "not run": "not run"}
 
 
-def page(outcomes: Sequence[Outcome], ranks: int, versions: dict[str, str]) -> str:
-    """Return the page of what the cases found."""
-    found = {word: sum(o.verdict == word for o in outcomes) for word in WORDS}
-    comparisons = sum(len(o.result.rows) for o in outcomes)
-    differing = [o for o in outcomes if o.verdict == "differs"]
+def page(outcomes: Sequence[Outcome], beside_paper: str | None, ranks: int, versions: dict[str, str]) -> str:
+    """Return the page of what the cases found, and of the comparison with the paper where there is one."""
     now = datetime.now().astimezone()
-    seconds = sum(o.seconds for o in outcomes)
+    when = f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>'
+    paper = "" if beside_paper is None else "<p><a href=\"#paper\">The paper's numbers beside fenwear's</a>.</p>"
     head = (
         "<header>\n<h1>Verification of fenwear</h1>\n"
-        f"<p>Of {len(outcomes)} cases {found['agrees']} agree with exact solutions and published results, "
-        f"{found['differs']} differ and {found['not run']} were not run; {comparisons} comparisons in all. "
-        f"{seconds:.0f} s on {ranks} rank{'s' if ranks > 1 else ''}, "
-        f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>.</p>\n</header>\n<main>'
+        f"<p>{_found(outcomes)}On {ranks} rank{'s' if ranks > 1 else ''}, {when}.</p>\n{paper}</header>\n<main>"
     )
     warning = "".join(
         f'<p class="warning"><strong>Differs:</strong> <a href="#{o.case.name}">{escape(o.case.title)}</a></p>'
-        for o in differing
+        for o in outcomes
+        if o.verdict == "differs"
     )
     stack = ", ".join(f"{escape(name)} {escape(version)}" for name, version in versions.items())
     parts = [
         head,
         warning,
-        section("Cases", _overview(outcomes)),
+        section("Cases", _overview(outcomes) if outcomes else ""),
         *(_case(outcome) for outcome in outcomes),
+        _named(section("The paper's numbers beside fenwear's", beside_paper or ""), "paper"),
         section("Versions", f"<p>{stack}</p>"),
     ]
     return document("Verification of fenwear", "\n".join(parts) + "\n</main>")
+
+
+def _found(outcomes: Sequence[Outcome]) -> str:
+    if not outcomes:
+        return ""
+    found = {word: sum(o.verdict == word for o in outcomes) for word in WORDS}
+    comparisons = sum(len(o.result.rows) for o in outcomes)
+    return (
+        f"Of {len(outcomes)} cases {found['agrees']} agree with exact solutions and published results, "
+        f"{found['differs']} differ and {found['not run']} were not run; {comparisons} comparisons in all, in "
+        f"{sum(o.seconds for o in outcomes):.0f} s. "
+    )
+
+
+def _named(part: str, name: str) -> str:
+    return part.replace("<section>", f'<section id="{name}">', 1)
 
 
 def _overview(outcomes: Sequence[Outcome]) -> str:
@@ -73,7 +86,7 @@ def _case(outcome: Outcome) -> str:
     table = _table(case.title, COLUMNS, rows) if rows else ""
     plots = "".join(figure(draw(plot), "png", _alt(plot), plot.title) for plot in result.plots)
     content = f'<p>Reference: {escape(case.source)}. <span class="note">{case.name}</span></p>{note}{table}{plots}'
-    return section(case.title, content).replace("<section>", f'<section id="{case.name}">', 1)
+    return _named(section(case.title, content), case.name)
 
 
 def _row(row: Row) -> str:

@@ -202,21 +202,26 @@ def verification(
     return register
 
 
-def registered(names: Sequence[str] = ()) -> list[VerificationCase]:
+def registered(names: Sequence[str] = (), besides: Sequence[str] = ()) -> list[VerificationCase]:
     """Return the cases of these names, by default all that are registered.
+
+    Args:
+        names: Asked for, with --only.
+        besides: Names among them that the caller knows and no case has.
 
     Raises:
         CaseError: a name that no case has.
     """
-    problems = [Problem("--only", _unknown(name)) for name in names if name not in _CASES]
+    known = [*_CASES, *besides]
+    problems = [Problem("--only", _unknown(name, known)) for name in names if name not in known]
     if problems:
         raise CaseError(problems)
-    return [_CASES[name] for name in names] if names else list(_CASES.values())
+    return [_CASES[name] for name in names if name in _CASES] if names else list(_CASES.values())
 
 
-def _unknown(name: str) -> str:
-    close = difflib.get_close_matches(name, _CASES, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(_CASES)}"
+def _unknown(name: str, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else f"expected one of {', '.join(known)}"
     return f"no verification case {name!r}; {hint}"
 
 

@@ -21,11 +21,14 @@ OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # the
 
 @verification(
     "wear-volume",
-    "Worn area of every half-cycle for a = b = 1",
+    "Worn areas of both bodies in every half-cycle for a = b = 1",
     "beta~ F0 2 u0 / t, whatever the pressure: the integral of p over the contact is F0 / t",
 )
 def wear_volume() -> Result:
-    """Example 1 with full and with partial contact: explicit and implicit half-cycles, and jumps over 20,000."""
+    """Example 1 with full and with partial contact: explicit and implicit half-cycles, and jumps over 20,000.
+
+    Once more with a strip that wears, too, in five positions of its stroke whose nodes do not face the punch's.
+    """
     exact = COEFFICIENT * 1e4 * STROKE / 10
     rows: list[Row] = []
     for contact, settings in (("full contact", ()), ("partial contact", OPENING)):
@@ -44,7 +47,30 @@ def wear_volume() -> Result:
             rows.append(
                 number(f"{contact}, {name}: in all (mm²)", total, run[-1].wear[-1] @ system.facing.weights, 1e-9)
             )
-    return Result(rows)
+    return Result([*rows, *_areas_of_both()])
+
+
+def _areas_of_both() -> list[Row]:
+    """Return the comparisons where both bodies wear; what is worn off the strip is counted on its own surface."""
+    moving = ("geometry.degree=2", "geometry.parameters.overlap=3", "motion.positions=5")
+    strip = 2e-8
+    system = builtin("example1", *moving, f"wear.strip.coefficient={strip}")
+    exact = {"punch": COEFFICIENT * 1e4 * STROKE / 10, "strip": strip * 1e4 * STROKE / 10}
+    weights = {"punch": system.facing.weights, "strip": system.facing.strip.weights}
+    rows: list[Row] = []
+    for name, run in (
+        ("implicit", list(march(system, 20, implicit=True))),
+        ("jumps", list(jump(system, 20_000, tolerance=3e-2))),
+    ):
+        depths = {"punch": run[-1].wear[-1], "strip": run[-1].wear_strip[-1]}
+        areas = {"punch": [b.worn_area for b in run], "strip": [b.worn_area_strip for b in run]}
+        for body, one in exact.items():
+            area = np.concatenate(areas[body])
+            what = f"both wear, {name}, {body}"
+            rows.append(profile(f"{what}: per half-cycle (mm²)", np.full_like(area, one), area, 1e-9, scale=one))
+            total = one * run[-1].half_cycle[-1]
+            rows.append(number(f"{what}: in all (mm²)", total, depths[body] @ weights[body], 1e-9))
+    return rows
 
 
 @verification(
@@ -107,6 +133,15 @@ def stiffness_rates(system: System, effective: float) -> Array:
     return np.sort(values[values > 1e-6])
 
 
+def shared_wear(coefficient: float) -> tuple[str, ...]:
+    """Return the settings of sliding out of the plane with the wear shared by punch and strip, 2 to 1."""
+    return (
+        "motion.axis=y",
+        f"wear.punch.coefficient={2 * coefficient / 3!r}",
+        f"wear.strip.coefficient={coefficient / 3!r}",
+    )
+
+
 @verification(
     "galin",
     "A flat punch on a half-plane that wears at constant load: decay of the pressure",
@@ -116,7 +151,8 @@ def galin() -> Result:
     """Pressure tends to the mean as a sum of exponentials; the even modes' rates from a march and from eigenvalues.
 
     An implicit step divides each mode by exactly 1 + rate k 2 u0. The factors of the three slowest are the
-    roots of the recurrence that four late shapes of the pressure, ten half-cycles apart, satisfy.
+    roots of the recurrence that four late shapes of the pressure, ten half-cycles apart, satisfy. Sliding out of
+    the plane, where the strip's material stays below the same point of the punch, k is the sum of both bodies'.
     """
     rows: list[Row] = []
     plots: list[Plot] = []
@@ -144,6 +180,11 @@ def galin() -> Result:
         rates = (1 / factors - 1) / step
         rows.append(number(f"plane {plane}, march, even mode 1 (E* k V/a)", 1.7267, rates[0], 2e-3))
         rows.append(number(f"plane {plane}, march, even mode 2 (E* k V/a)", 3.3143, rates[1], 5e-3))
+        across = rigid_punch(1e4, *fine, f"model.plane='{plane}'", *shared_wear(step * HALF_WIDTH / effective / STROKE))
+        both = next(march(across, 100, block=100, implicit=True))
+        rows.append(
+            profile(f"plane {plane}, both bodies wear: pressure (MPa)", block.pressure, both.pressure, 1e-7, scale=MEAN)
+        )
         if plane == "stress":
             time = step * block.half_cycle
             size = np.sqrt((deviation**2) @ system.facing.weights) / (MEAN * np.sqrt(2 * HALF_WIDTH))

@@ -12,7 +12,7 @@ from fenwear import System, jump, march
 from fenwear.cycle import Block, follow
 from fenwear.cycle.follow import _in_place
 from fenwear.cycle.moment import Moment
-from fenwear.wear import Worn
+from fenwear.sliding.wear import Worn
 
 SMALL = ("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=0.4")
 

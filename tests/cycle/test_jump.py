@@ -10,7 +10,7 @@ import pytest
 from fenwear import System, jump, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
-from fenwear.wear import WornLayer
+from fenwear.sliding.wear import WornLayer
 
 MEAN = 1e4 / 600
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fenwear import CaseError, ConvergenceError, System, jump, march, steady
+from fenwear.cycle import growth_rate
 
 COARSE = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
 MOVING = (*COARSE, "geometry.parameters.overlap=3", "motion.positions=5")
@@ -71,6 +73,29 @@ def test_without_strip_wear_positions_change_little(assemble: Callable[..., Syst
     other = steady(assemble("example1", *MOVING))
     inner = slice(1, -1)
     np.testing.assert_allclose(other.pressure[:, inner], one.pressure[:, inner], atol=0.02 * MEAN)
+
+
+def test_growth_rate_of_several_positions(assemble: Callable[..., System]) -> None:
+    """Disturbances of a strip that moves by 20 um grow as fast as of one that stays; the stroke enters linearly."""
+    motion = ("motion.amplitude=0.01", "motion.angular_frequency=1500")
+    base = (*COARSE, *motion, "geometry.parameters.overlap=3")
+    for share in (0.1, 0.5):
+        rates = []
+        for positions in (1, 5):
+            system = assemble("example1-heat", *base, f"heat.partition={share}", f"motion.positions={positions}")
+            state = steady(system)
+            assert state.phase_pressure.shape == (2 * positions, len(system.facing.x))
+            np.testing.assert_array_equal(state.phase_pressure[positions // 2 :: positions], state.pressure)
+            rates.append(growth_rate(system, state.phase_pressure))
+        assert rates[1] == pytest.approx(rates[0], rel=1e-3)
+
+
+def test_steady_command_with_positions(fenwear: Callable[..., Any]) -> None:
+    """The command follows the same state: it says whether a run comes there."""
+    settings = [part for setting in MOVING for part in ("--set", setting)]
+    done = fenwear("steady", "example1", *settings)
+    assert done.returncode == 0, done.stderr
+    assert "within 1 % of the mean pressure after" in done.stdout
 
 
 def test_no_steady_state_where_the_track_deepens(assemble: Callable[..., System]) -> None:
@@ -167,6 +192,47 @@ def test_temperature_dependent_wear(assemble: Callable[..., System]) -> None:
     *_, block = march(system, 20)
     assert block.worn_area[0] == pytest.approx(AREAS[0], rel=1e-12)
     assert (np.diff(block.worn_area) > 0).all()
+
+
+def test_growth_rate_with_the_strip_worn(assemble: Callable[..., System]) -> None:
+    """Out of the plane both bodies wear at the same places: a disturbance dies as if the punch took both rates."""
+    both = ("wear.punch.coefficient=3e-8", "wear.strip.coefficient=2e-8")
+    alone = ("wear.punch.coefficient=5e-8",)
+    rates = []
+    for wear in (both, alone):
+        system = assemble("example2", *COARSE, "motion.axis=y", *wear)
+        rates.append(growth_rate(system, steady(system).phase_pressure))
+    assert rates[0] == pytest.approx(rates[1], rel=1e-9)
+    assert rates[0] < 0
+
+
+@pytest.mark.mpi
+def test_heat_under_a_strip_that_moves(assemble: Callable[..., System]) -> None:
+    """With heat and both bodies worn: areas and friction heat exact, the balance closed; nearly as in one position."""
+    hot = ("heat.partition=0.2", "heat.steps=5")
+    one = assemble("example1-heat", *COARSE, *hot)
+    several = assemble("example1-heat", *BOTH, *hot)
+    (single,), (block,) = (list(march(system, 40)) for system in (one, several))
+    np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
+    np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
+    assert block.heat is not None
+    assert single.heat is not None
+    assert block.heat.balance_error.max() < 1e-8
+    np.testing.assert_allclose(block.heat.terms[:, 0], 0.25 * 1e4 * 3, rtol=1e-11)  # mu F 2 u0, mJ
+    largest = single.heat.temperature_punch.max()
+    np.testing.assert_allclose(block.heat.temperature_punch, single.heat.temperature_punch, atol=0.1 * largest)
+
+
+def test_surfaces_that_never_meet(assemble: Callable[..., System]) -> None:
+    """A punch that is held, and drawn away from the strip by its load: not a run without wear but an error."""
+    held = "punch.supports=[{on='punch_load', fix=['x', 'z']}]"
+    for force in (-1000, 1000):
+        system = assemble("example1", *COARSE, held, f"punch.loads=[{{on='punch_free', force=[0, {force}]}}]")
+        if force < 0:
+            system.check_touching()
+            continue
+        with pytest.raises(CaseError, match=r"geometry: the surfaces never meet within the stroke: .* mm apart"):
+            system.check_touching()
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from functools import cache
+from random import Random
 from typing import Any
 
 from fenwear import load_case, make_case
@@ -109,6 +110,14 @@ STROKE_TABLES = (
     *(([0, 1, 2], [0, 1e9, 0]), ([0, 1, 2], [0, 1e-300, 0]), (list(range(41)), [k % 2 * 0.01 for k in range(41)])),
     *((["0 s", "1 mm", "2 s"], ["0 mm", "1 s", "0 mm"]), (["0 s", "1 s", "1e400 s"], [0, 0.01, 0])),
 )
+
+
+def motion_by_table(random: Random) -> dict[str, Any]:
+    """Return the table of a motion, good or bad."""
+    times, displacements = random.choice(STROKE_TABLES)
+    return {"kind": "table", "times": times, "displacements": displacements}
+
+
 CYCLES = (
     *(
         [[0, 1], [1, 1]],

@@ -33,10 +33,10 @@ from bases import base
 from pool import Verdict, verdicts
 
 from fenwear import Case, System, jump, load_case, make_case, march
+from fenwear.bodies.mesh import write_msh
 from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError, MeshQualityError
 from fenwear.heat.exchange import HeatExchange
-from fenwear.mesh import write_msh
 
 SECONDS = 60.0
 NAMES = tuple(bases.BASES)
@@ -199,10 +199,7 @@ KEYS: tuple[Any, ...] = (
     lambda r: (("motion", "axis"), r.choice(("x", "y", "z"))),
     lambda r: (("motion", "track"), r.choice((600, "600 mm", 0, 1e-300, 1e300, "1 s"))),
     lambda r: (("motion", "amplitude"), r.choice(("1 um", "1 mm", "10 mm", "1 km", "1e-300 mm", "1e300 mm"))),
-    lambda r: (
-        ("motion",),
-        dict(kind="table", **dict(zip(("times", "displacements"), r.choice(bases.STROKE_TABLES), strict=True))),
-    ),
+    lambda r: (("motion",), bases.motion_by_table(r)),
     lambda r: ((r.choice(("punch", "strip")), "loads", "over_cycle"), r.choice(bases.CYCLES)),
     lambda r: (("geometry", "order"), r.choice((1, 2, 3, 0, "2", True))),
     lambda r: (("geometry", "follow_wear"), r.choice(("never", 1e-9, 1e-6, 0.5, 0, -1, 1e300, "always", 1e-300))),

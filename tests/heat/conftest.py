@@ -11,9 +11,9 @@ from dolfinx.mesh import CellType, create_rectangle, locate_entities, locate_ent
 from mpi4py import MPI
 
 from fenwear import Case, System, make_case
+from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.heat.conduction import HeatBody
-from fenwear.mesh import BodyMesh
 
 SIDES, BOTTOM, CONTACT = 1, 2, 3
 

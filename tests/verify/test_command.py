@@ -10,10 +10,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mpi4py import MPI
 
+from fenwear import CaseError
+from fenwear.paper import FULL, Scope
 from fenwear.verify import registered
+from fenwear.verify.command import choose, verify
 
 Run = Callable[..., Any]
+COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+SCOPE = Scope(COARSE, shares=(0.2, 0.5), cycles=2_000, variants=110, meshes=((8, 1), (8, 2)), steps=(5, 10))
 QUICK = ("--only", "wear-volume", "--only", "time-steps")
 
 
@@ -73,13 +79,49 @@ def test_json(fenwear: Run, tmp_path: Path) -> None:
 def test_list(fenwear: Run, tmp_path: Path) -> None:
     """The names that --only takes, without computing anything."""
     done = fenwear("verify", "--list", cwd=tmp_path)
-    assert [line.split()[0] for line in done.stdout.splitlines()] == [case.name for case in registered()]
+    names = [line.split()[0] for line in done.stdout.splitlines()]
+    assert names == [*(case.name for case in registered()), "paper"]
+    some = fenwear("verify", "--list", "--only", "paper", "--only", "hertz", cwd=tmp_path)
+    assert [line.split()[0] for line in some.stdout.splitlines()] == ["hertz", "paper"]
     assert not (tmp_path / "results").exists()
+
+
+def test_choice() -> None:
+    """Everything by default; the paper alone, a case alone, or both."""
+    assert choose([]) == (registered(), FULL)
+    assert choose(["paper"]) == ([], FULL)
+    assert choose(["hertz"]) == (registered(["hertz"]), None)
+    assert choose(["paper", "hertz"]) == (registered(["hertz"]), FULL)
+    with pytest.raises(CaseError, match="did you mean 'paper'"):
+        choose(["papr"])
+
+
+@pytest.mark.mpi
+def test_paper(tmp_path: Path) -> None:
+    """The comparison stands on the page and in the numbers; rows that are not reproduced are no disagreement."""
+    folder = MPI.COMM_WORLD.bcast(tmp_path / "v")
+    said: list[str] = []
+    found, directory = verify(registered(["time-steps"]), SCOPE, folder, said.append)
+    assert found["agree"]
+    assert found["paper"]["seconds"] > 0
+    assert {row["verdict"] for row in found["paper"]["rows"]} >= {"reproduced", "not reproduced"}
+    text = "\n".join(said)
+    assert all(f"{row['quantity']}: {row['verdict']}\n" in text for row in found["paper"]["rows"])
+    if MPI.COMM_WORLD.rank == 0:
+        assert json.loads((directory / "verification.json").read_text()) == found
+        content = (directory / "verification.html").read_text("utf-8")
+        page = _Page()
+        page.feed(content)
+        assert page.loads == []
+        assert page.images == 1 + 8
+        assert '<section id="paper">' in content
+        assert '<section id="time-steps">' in content
+    MPI.COMM_WORLD.Barrier()
 
 
 def test_disagreement(fenwear: Run, tmp_path: Path) -> None:
     """Exit status 1 with the names of the cases; the others are computed all the same."""
-    stopped = ("--", "-fenwear_contact_snes_max_it", "0")
+    stopped = ("--", "-fenwear_contact_snes_max_it", "0", "-fenwear_contact_search_snes_max_it", "0")
     done = fenwear("verify", "-o", tmp_path / "v", "--only", "equilibrium", "--only", "optimum-table", *stopped)
     assert done.returncode == 1, done.stderr
     assert "does not agree: equilibrium\n" in done.stderr

@@ -1,0 +1,1 @@
+"""One body: its mesh, its elasticity, and its condensation onto the contact surface."""

@@ -1,0 +1,59 @@
+"""Displacement out of the plane: antiplane shear by tractions along y, a generalised plane state.
+
+Nothing changes along y, so that u_y(x, z) obeys div(G grad u_y) = 0 on its own: pressure, gap and
+wear stay as they are without it. What supports a body in the plane is taken to hold it along y, too.
+"""
+
+from __future__ import annotations
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from fenwear.arrays import Array
+from fenwear.bodies.assembly import assembled
+from fenwear.bodies.elasticity import PREFIX, ElasticBody
+from fenwear.bodies.factor import Factor
+
+
+def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: Array) -> fem.Function:
+    """Return u_y under nodal forces along y; collective.
+
+    Args:
+        elastic: The body.
+        blocks: Global numbers of the blocks of displacements at the loaded nodes (n,).
+        force: Per thickness (n,), N/mm.
+    """
+    mesh, shear_modulus = elastic.body.mesh, elastic.lame[1]
+    element = basix.ufl.element("Lagrange", mesh.basix_cell(), elastic.space.ufl_element().degree)
+    space = fem.functionspace(mesh, element)
+    # A space of one component may number its nodes in another way: go by the cells.
+    to_node = np.empty(space.dofmap.index_map.size_local + space.dofmap.index_map.num_ghosts, dtype=np.int64)
+    to_node[space.dofmap.list.ravel()] = elastic.space.dofmap.list.ravel()
+    index_map = elastic.space.dofmap.index_map
+    given, held = fem.Function(elastic.space), fem.Function(elastic.space)
+    start, stop = index_map.local_range
+    own = (blocks >= start) & (blocks < stop)
+    given.x.array[2 * (blocks[own] - start)] = force[own]
+    held.x.array[2 * (elastic.supported // 2)] = 1.0
+    held.x.scatter_forward()
+
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    a = shear_modulus * ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx
+    supports = np.flatnonzero(held.x.array[2 * to_node] > 0).astype(np.int32)
+    bc = fem.dirichletbc(PETSc.ScalarType(0), supports, space)
+    matrix = assembled(a, [bc])
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    load, solution = matrix.createVecLeft(), fem.Function(space, name="displacement_out_of_plane")
+    owned = space.dofmap.index_map.size_local
+    load.array[:] = given.x.array[2 * to_node[:owned]]
+    load.array[supports[supports < owned]] = 0.0
+
+    found = load.duplicate()
+    Factor(matrix, PREFIX, "cholesky").solve(load, found)
+    solution.x.array[:owned] = found.array_r
+    solution.x.scatter_forward()
+    return solution

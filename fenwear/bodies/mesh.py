@@ -1,0 +1,272 @@
+"""gmsh geometry to distributed meshes, one for each body, with their named groups.
+
+The contract of a geometry, a .geo or a .msh: physical groups whose names start with the body they
+belong to, punch_ or strip_; surfaces are the material regions; punch_contact and strip_contact are
+the curves that meet; further curves and points are for supports, loads and thermal conditions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import Mesh, MeshTags
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from fenwear import compat
+from fenwear.bodies.mesh_check import element_problems
+from fenwear.case import Geometry
+from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.parallel import on_root
+
+BODIES = ("punch", "strip")
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """The mesh of one body, distributed over the ranks, with its named groups.
+
+    Attributes:
+        regions: Tag in `cell_tags` of each material region.
+        curves: Tag in `facet_tags` of each group of facets.
+        points: Coordinates (count, gdim) of each group of points, mm.
+    """
+
+    name: str
+    mesh: Mesh
+    cell_tags: MeshTags
+    facet_tags: MeshTags
+    regions: dict[str, int]
+    curves: dict[str, int]
+    points: dict[str, NDArray[np.float64]]
+
+    def curve(self, group: str, key: str) -> int:
+        """Return the tag of a group of facets.
+
+        Raises:
+            CaseError: no such group; `key` is the case's key that asked for it.
+        """
+        if group not in self.curves:
+            raise CaseError(Problem(key, f"no physical curve {group!r} on the {self.name}{_known(self.curves)}"))
+        return self.curves[group]
+
+
+def _known(groups: object) -> str:
+    names = ", ".join(sorted(groups))  # type: ignore[call-overload]
+    return f"; the geometry has {names}" if names else ""
+
+
+def meshes_folder() -> Path:
+    """Return the folder of the ready geometries, in an installed package or in a checkout."""
+    package = Path(__file__).parents[1]
+    installed = package / "meshes"
+    return installed if installed.is_dir() else package.parent / "meshes"
+
+
+def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
+    """Return the geometry's file: beside the case file, or one of the ready ones.
+
+    Raises:
+        CaseError: no such file, or not one that gmsh meshes.
+    """
+    ready = meshes_folder()
+    places = [Path(geometry.file)] if folder is None else [folder / geometry.file]
+    path = next((p for p in (*places, ready / geometry.file) if p.is_file()), None)
+    if path is None:
+        names = ", ".join(sorted(p.name for p in ready.glob("*.geo")))
+        raise CaseError(Problem("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
+    if path.suffix not in (".geo", ".msh"):
+        raise CaseError(Problem("geometry.file", f"expected a .geo or a .msh file, got {geometry.file!r}"))
+    if path.suffix == ".msh" and geometry.order != 1:
+        raise CaseError(Problem("geometry.order", "a .msh file has its own; it belongs to a .geo file"))
+    if path.suffix == ".msh" and geometry.parameters:
+        raise CaseError(Problem("geometry.parameters", "a .msh file has none; they belong to a .geo file"))
+    return path
+
+
+def build_meshes(geometry: Geometry, folder: Path | None, comm: MPI.Comm) -> tuple[BodyMesh, BodyMesh]:
+    """Mesh the geometry and distribute it: the punch and the strip; collective.
+
+    Raises:
+        CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
+    """
+    on_root(comm, lambda: find_geometry(geometry, folder))
+    if comm.rank == 0:
+        with _gmsh() as gmsh:
+            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder)))
+            punch, strip = (_distribute(gmsh, name, comm) for name in BODIES)
+    else:
+        on_root(comm, lambda: None)
+        punch, strip = (_distribute(None, name, comm) for name in BODIES)
+    return punch, strip
+
+
+def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
+    """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
+
+    Raises:
+        CaseError: as `build_meshes`; or `path` cannot be written.
+        OutputError: there is no room for it.
+    """
+    with _gmsh() as gmsh:
+        _load(gmsh, geometry, find_geometry(geometry, folder))
+        try:
+            path.touch()
+        except OSError as error:
+            raise CaseError(Problem(str(path), f"cannot be written: {error.strerror}")) from None
+        gmsh.write(str(path))
+        if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
+            path.unlink()
+            raise OutputError(path, "gmsh wrote only a part of it; is there room?")
+
+
+@contextmanager
+def _gmsh() -> Iterator[Any]:
+    """Open gmsh quietly, and close it unless someone else had opened it."""
+    import gmsh
+
+    was_open = gmsh.isInitialized()
+    if not was_open:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.model.add("fenwear")
+    try:
+        yield gmsh
+    finally:
+        if was_open:
+            gmsh.model.remove()
+        else:
+            gmsh.finalize()
+
+
+def _load(gmsh: Any, geometry: Geometry, path: Path) -> None:
+    """Read and mesh the geometry in the current gmsh model, and check the contract."""
+    gmsh.parser.clear()
+    for name, value in geometry.parameters.items():
+        gmsh.parser.setNumber(name, [value])
+    _check_parameters(geometry, path)
+    try:
+        _merge(gmsh, path)
+        if path.suffix == ".geo":
+            gmsh.model.mesh.generate(2)
+            gmsh.model.mesh.setOrder(geometry.order)
+    except Exception as error:  # gmsh raises bare Exception only
+        raise CaseError(Problem("geometry.file", f"gmsh on {path.name}: {error}")) from None
+    _check_groups(gmsh, path)
+
+
+def _merge(gmsh: Any, path: Path) -> None:
+    """Read a file to its end: an error thrown inside gmsh's parser would spoil all that it reads later.
+
+    Raises:
+        Exception: the first error in the file.
+    """
+    gmsh.option.setNumber("General.AbortOnError", 0)
+    gmsh.logger.start()
+    gmsh.merge(str(path))
+    messages = gmsh.logger.get()
+    gmsh.logger.stop()
+    gmsh.option.setNumber("General.AbortOnError", 2)
+    errors = [m.removeprefix("Error: ") for m in messages if m.startswith("Error: ")]
+    if errors:
+        raise RuntimeError(errors[0])
+
+
+def _check_parameters(geometry: Geometry, path: Path) -> None:
+    """Refuse parameters that the .geo file does not define by DefineConstant."""
+    import re
+
+    if path.suffix != ".geo":
+        return
+    text = re.sub(r"//.*", "", path.read_text("utf-8"))
+    if re.search(r"^\s*(Macro|Function)\b", text, re.MULTILINE):
+        message = (
+            f"{path.name} defines a Macro, which gmsh reads safely only once in a process: write it out, or give a .msh"
+        )
+        raise CaseError(Problem("geometry.file", message))
+    blocks = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", text, re.DOTALL)
+    known = sorted({name for block in blocks for name in re.findall(r"(\w+)\s*=", block)})
+    unknown = [name for name in geometry.parameters if name not in known]
+    if unknown:
+        message = f"{path.name} has no such parameter; it has {', '.join(known)}"
+        raise CaseError([Problem(f"geometry.parameters.{name}", message) for name in unknown])
+
+
+def _groups(gmsh: Any, dim: int) -> dict[str, int]:
+    return {gmsh.model.getPhysicalName(dim, tag): tag for _, tag in gmsh.model.getPhysicalGroups(dim)}
+
+
+def _check_groups(gmsh: Any, path: Path) -> None:
+    problems = []
+    for body in BODIES:
+        regions = [name for name in _groups(gmsh, 2) if name.startswith(f"{body}_")]
+        if not regions:
+            problems.append(Problem("geometry.file", f"{path.name} has no physical surface named {body}_..."))
+        if f"{body}_contact" not in _groups(gmsh, 1):
+            problems.append(Problem("geometry.file", f"{path.name} has no physical curve named {body}_contact"))
+    for dim, names in ((2, _groups(gmsh, 2)), (1, _groups(gmsh, 1))):
+        for name, tag in names.items():
+            entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
+            types = {t for entity in entities for t in gmsh.model.mesh.getElementTypes(dim, entity)}
+            if not types:
+                problems.append(Problem("geometry.file", f"{path.name}: physical group {name} has no elements"))
+            if len(types) > 1:
+                problems.append(Problem("geometry.file", f"{path.name}: physical group {name} mixes element types"))
+    if not problems:
+        groups = [{n: t for n, t in _groups(gmsh, dim).items() if n.startswith(BODIES)} for dim in range(3)]
+        problems = [Problem("geometry.file", f"{path.name}: {text}") for text in element_problems(gmsh, groups)]
+    if problems:
+        raise CaseError(problems)
+
+
+def _distribute(gmsh: Any, body: str, comm: MPI.Comm) -> BodyMesh:
+    """Distribute one body's part of rank 0's gmsh model; collective."""
+    groups: list[dict[str, int]] = [{}, {}, {}]
+    points: dict[str, NDArray[np.float64]] = {}
+    model = None
+    if gmsh is not None:
+        model = gmsh.model
+        for dim in (0, 1, 2):
+            groups[dim] = {n: t for n, t in _groups(gmsh, dim).items() if n.startswith(f"{body}_")}
+        for name, tag in groups[0].items():
+            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :2]
+        whole = model.getCurrent()
+        _isolate(gmsh, body, groups)
+    _, curves, regions = comm.bcast(groups)
+    points = comm.bcast(points)
+    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, gdim=2)
+    if gmsh is not None:
+        gmsh.model.remove()
+        gmsh.model.setCurrent(whole)
+    return BodyMesh(body, mesh, cell_tags, facet_tags, regions, curves, points)
+
+
+def _isolate(gmsh: Any, body: str, groups: list[dict[str, int]]) -> None:
+    """Make a model of the body's groups alone current: dolfinx wants nodes numbered without gaps."""
+    model = gmsh.model
+    node_tags, coordinates, _ = model.mesh.getNodes()
+    parts = [
+        (dim, tag, model.mesh.getElements(dim, entity))
+        for dim in (2, 1)
+        for tag in groups[dim].values()
+        for entity in model.getEntitiesForPhysicalGroup(dim, tag)
+    ]
+    used = np.unique(np.concatenate([nodes for dim, _, (_, _, lists) in parts if dim == 2 for nodes in lists]))
+    position = np.argsort(node_tags)[np.searchsorted(np.sort(node_tags), used)]
+    model.add(body)
+    entities: dict[tuple[int, int], list[int]] = {}
+    for number, (dim, tag, (types, _, nodes)) in enumerate(parts, start=1):
+        model.addDiscreteEntity(dim, number)
+        if number == 1:
+            count = np.arange(1, len(used) + 1)
+            model.mesh.addNodes(dim, number, count, np.asarray(coordinates).reshape(-1, 3)[position].ravel())
+        for kind, connectivity in zip(types, nodes, strict=True):
+            model.mesh.addElementsByType(number, kind, [], np.searchsorted(used, connectivity) + 1)
+        entities.setdefault((dim, tag), []).append(number)
+    for (dim, tag), numbers in entities.items():
+        model.addPhysicalGroup(dim, numbers, tag)

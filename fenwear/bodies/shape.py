@@ -1,0 +1,180 @@
+"""The worn shape: meshes that follow the wear, and how far it is still from their elements' size.
+
+Small wear is an offset of the gap. Where it comes near the height of the elements at the contact, their
+nodes move instead: the depth worn at the contact is extended harmonically into the body,
+
+    integral of grad s . grad v dx = 0,   s = depth at the contact,   s = 0 at all other boundaries
+    that a motion along the contact's normal would bend, and at points that the case names,
+
+and every node moves by s into the body. The motion always starts from the mesh as it was made, so
+that it depends on the depth alone and not on the steps in which it was reached.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import entities_to_geometry, exterior_facet_indices
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from fenwear.arrays import Array
+from fenwear.bodies.mesh import BodyMesh
+from fenwear.compat import geometry_degree, geometry_dofmap, interpolation_points
+from fenwear.errors import MeshQualityError
+
+LEAST = 0.2  # of an element's volume that the motion may leave anywhere in it
+ACROSS = 1e-3  # cosine between a boundary's normal and the motion below which nodes slide along it
+PREFIX = "fenwear_shape_"
+
+
+def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]) -> Array:
+    """Move a mesh, as it was made, by the depth worn off its contact surface; collective.
+
+    Args:
+        body: Its geometry is changed.
+        depth: At the contact nodes of this degree in order along x (n,), mm.
+        degree: Of the nodes.
+        held: Points that keep their place, such as pins, mm.
+
+    Returns:
+        How far the contact nodes have moved into the body, along x (n,), mm: the depth as far as the
+        geometry's polynomials reach, which may be of a lower degree.
+
+    Raises:
+        MeshQualityError: an element is left with less than a fifth of its size somewhere.
+    """
+    mesh = body.mesh
+    space = fem.functionspace(mesh, ("Lagrange", degree))
+    x = space.tabulate_dof_coordinates()
+    contact = _contact_dofs(body, space)
+    shift = fem.Function(space)
+    shift.x.array[contact] = depth[_order_along_x(mesh.comm, x[contact, 0])]
+    shift.x.scatter_forward()
+    normal = _mean_normal(body)
+    fixed = np.setdiff1d(_bent_dofs(body, space, normal), contact)
+    pins = [np.flatnonzero(np.linalg.norm(x[:, :2] - point, axis=1) < 1e-6 * np.ptp(x[:, 0])) for point in held]
+    fixed = np.union1d(fixed, np.setdiff1d(np.concatenate([*pins, []]).astype(np.int32), contact)).astype(np.int32)
+    zero = fem.Function(space)
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    a = fem.form(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
+    bcs = [fem.dirichletbc(shift, contact), fem.dirichletbc(zero, fixed)]
+    solution = _solve(a, bcs, space)
+    before = _sizes(body)
+    _move(body, solution, -normal)
+    own = contact[contact < space.dofmap.index_map.size_local]
+    displaced = (x - space.tabulate_dof_coordinates())[own, :2] @ normal
+    ratio = mesh.comm.allreduce(float((_sizes(body) / before).min(initial=np.inf)), MPI.MIN)
+    if ratio < LEAST:
+        raise MeshQualityError(
+            f"the wear of the {body.name} has used up the elements at its contact: one is left with "
+            f"{max(ratio, 0.0):.0%} of its size; the depth is {depth.max():.3g} mm. Expected a geometry that is higher "
+            "where it wears, or less wear"
+        )
+    along, displaced = (
+        np.concatenate(parts) for parts in zip(*mesh.comm.allgather((x[own, 0], displaced)), strict=True)
+    )
+    return displaced[np.argsort(along, kind="stable")]
+
+
+def element_height(body: BodyMesh, degree: int) -> Array:
+    """Return the height of the elements at each contact node, volume over length, along x (n,), mm; collective."""
+    mesh = body.mesh
+    tag = body.curves[f"{body.name}_contact"]
+    cells = fem.functionspace(mesh, ("DG", 0))
+    ds = ufl.Measure("ds", domain=mesh, subdomain_data=body.facet_tags)
+    v = ufl.TestFunction(cells)
+    volume, length = (fem.assemble_vector(fem.form(v * measure)).array for measure in (ufl.dx(domain=mesh), ds(tag)))
+    height = fem.Function(cells)
+    height.x.array[:] = volume / np.maximum(length, 1e-300)
+    space = fem.functionspace(mesh, ("Lagrange", degree))
+    w = ufl.TestFunction(space)
+    vectors = [fem.petsc.assemble_vector(fem.form(f * w * ds(tag))) for f in (height, ufl.as_ufl(1.0))]
+    for vector in vectors:
+        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+    own = _contact_dofs(body, space)
+    own = own[own < space.dofmap.index_map.size_local]
+    mean = vectors[0].array_r[own] / vectors[1].array_r[own]
+    x = space.tabulate_dof_coordinates()[own, 0]
+    x, mean = (np.concatenate(parts) for parts in zip(*mesh.comm.allgather((x, mean)), strict=True))
+    return mean[np.argsort(x, kind="stable")]
+
+
+def _contact_dofs(body: BodyMesh, space: fem.FunctionSpace) -> NDArray[np.int32]:
+    facets = body.facet_tags.find(body.curves[f"{body.name}_contact"])
+    return fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, facets)
+
+
+def _order_along_x(comm: MPI.Comm, x: Array) -> NDArray[np.int64]:
+    """Return the place of each of this rank's contact nodes, ghosts too, among those of all ranks."""
+    everywhere = np.unique(np.concatenate(comm.allgather(x)).round(12))
+    return np.searchsorted(everywhere, x.round(12))
+
+
+def _mean_normal(body: BodyMesh) -> Array:
+    """Return the mean outward unit normal of the contact surface (2,); collective."""
+    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
+    tag = body.curves[f"{body.name}_contact"]
+    n = ufl.FacetNormal(body.mesh)
+    parts = [body.mesh.comm.allreduce(fem.assemble_scalar(fem.form(n[i] * ds(tag)))) for i in (0, 1)]
+    normal = np.array(parts) / np.linalg.norm(parts)
+    normal[np.abs(normal) < 1e-9] = 0.0
+    return normal / np.linalg.norm(normal)
+
+
+def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArray[np.int32]:
+    """Return the nodes on boundary facets whose shape a motion along `normal` would change; collective."""
+    mesh, dim = body.mesh, body.mesh.topology.dim
+    mesh.topology.create_connectivity(dim - 1, dim)
+    facets = exterior_facet_indices(mesh.topology)
+    facets = np.setdiff1d(facets, body.facet_tags.find(body.curves[f"{body.name}_contact"])).astype(np.int32)
+    corners = mesh.geometry.x[entities_to_geometry(mesh, dim - 1, facets)][:, :, :2]
+    extent, along = np.ptp(corners, axis=1), np.ptp(corners @ normal, axis=1)
+    bent = along < np.sqrt(1 - ACROSS**2) * np.linalg.norm(extent, axis=1)
+    return fem.locate_dofs_topological(space, dim - 1, facets[bent])
+
+
+def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) -> fem.Function:
+    matrix = fem.petsc.assemble_matrix(a, bcs=bcs)
+    matrix.assemble()
+    load = fem.Function(space)  # its vector has ghosts, unlike the matrix's own
+    fem.petsc.apply_lifting(load.x.petsc_vec, [a], [bcs])
+    load.x.petsc_vec.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+    fem.petsc.set_bc(load.x.petsc_vec, bcs)
+    ksp = PETSc.KSP().create(space.mesh.comm)
+    ksp.setOptionsPrefix(PREFIX)
+    ksp.setOperators(matrix)
+    ksp.setType("preonly")
+    ksp.pc.setType("lu")
+    ksp.pc.setFactorSolverType("mumps")
+    ksp.setFromOptions()
+    solution = fem.Function(space)
+    ksp.solve(load.x.petsc_vec, solution.x.petsc_vec)
+    solution.x.scatter_forward()
+    return solution
+
+
+def _move(body: BodyMesh, shift: fem.Function, direction: Array) -> None:
+    """Move the nodes of the geometry by `shift` along `direction`."""
+    mesh = body.mesh
+    space = fem.functionspace(mesh, ("Lagrange", geometry_degree(mesh)))
+    of_geometry = fem.Function(space)
+    of_geometry.interpolate(shift)
+    x = mesh.geometry.x
+    nodes, dofs = geometry_dofmap(mesh).ravel(), space.dofmap.list.ravel()
+    moved = x.copy()
+    moved[nodes, :2] = x[nodes, :2] + of_geometry.x.array[dofs, None] * direction
+    x[:] = moved
+
+
+def _sizes(body: BodyMesh) -> Array:
+    """Return the determinant of the Jacobian at points of each element: its local size."""
+    space = fem.functionspace(body.mesh, ("DG", 2))
+    sizes = fem.Function(space)
+    sizes.interpolate(fem.Expression(ufl.JacobianDeterminant(body.mesh), interpolation_points(space)))
+    return sizes.x.array.copy()

@@ -1,0 +1,98 @@
+"""Half-cycles that do not converge, tried again from where they began in smaller steps.
+
+Each phase is cut into parts of equal time at the same position of the strip. Each part has a contact
+of its own, wears its share, and heats for its share of the time.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+
+import numpy as np
+
+from fenwear.contact import ContactState
+from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
+from fenwear.cycle.moment import Moment
+from fenwear.cycle.phase import PhaseEnd, PhaseStep
+from fenwear.errors import ConvergenceError
+from fenwear.heat.exchange import State
+from fenwear.remedies import SMALLER_STEPS
+from fenwear.sliding.wear import Worn
+from fenwear.system import System
+
+PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
+
+
+class SmallerSteps:
+    """Half-cycles in parts of their phases; what they need is made at the first one and kept.
+
+    Args:
+        system: The assembled problem.
+        implicit: Whether the wear of a part is implicit.
+    """
+
+    def __init__(self, system: System, *, implicit: bool) -> None:
+        self.system, self.implicit = system, implicit
+        self._steps: dict[int, tuple[System, list[PhaseStep]]] = {}
+
+    def half_cycle(self, moment: Moment, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
+        """Return the ends of the phases of a half-cycle.
+
+        Args:
+            moment: At its start.
+            phases: Their numbers in the cycle.
+            error: Why it is not solved as a whole.
+
+        Raises:
+            ConvergenceError: it does not converge in the smallest parts either; `error` as it was.
+        """
+        for parts in PARTS:
+            try:
+                ends = self._in_parts(moment, phases, parts)
+            except ConvergenceError:
+                continue
+            self.system.remedies.note(SMALLER_STEPS.format(parts * len(phases)))
+            return ends
+        raise error
+
+    def _in_parts(self, moment: Moment, phases: range, parts: int) -> list[PhaseEnd]:
+        system, steps = self._prepared(parts)
+        temperature = _carried(moment.temperature, self.system, system)
+        worn, ends = moment.worn, []
+        for phase in phases:
+            before = moment.contacts[phase]
+            contact, own = before, []
+            for step in steps[phase * parts : (phase + 1) * parts]:
+                end = step.solve(temperature, worn, contact)
+                contact, temperature, worn = end.record.contact, end.temperature, worn + end.worn
+                own.append(end)
+            ends.append(_joined(own, phase, before, _carried(temperature, system, self.system)))
+        return ends
+
+    def _prepared(self, parts: int) -> tuple[System, list[PhaseStep]]:
+        if parts not in self._steps:
+            system = self.system.in_parts(parts)
+            phases = range(len(system.motion.phases))
+            self._steps[parts] = (system, [PhaseStep(system, phase, implicit=self.implicit) for phase in phases])
+        return self._steps[parts]
+
+
+def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: State | None) -> PhaseEnd:
+    """Return the parts of a phase as one: the contact in its middle, and all that it wears and heats."""
+    middle = ends[len(ends) // 2].record
+    punch, strip = np.sum([end.record.areas for end in ends], axis=0).tolist()
+    previous = None if before is None else before.pressure[0]
+    heats = [end.heat for end in ends if end.heat is not None]
+    return PhaseEnd(
+        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.slip),
+        temperature,
+        reduce(HalfCycleHeat.then, heats) if heats else None,
+        reduce(Worn.__add__, [end.worn for end in ends]),
+    )
+
+
+def _carried(state: State | None, before: System, after: System) -> State | None:
+    """Return the state of the same temperatures on the other system's basis."""
+    if state is None or before.exchange is None or after.exchange is None:
+        return None
+    return after.exchange.state(before.exchange.temperatures(state))

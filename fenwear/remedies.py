@@ -1,0 +1,27 @@
+"""What was done where the usual way to solve did not converge: noted where it happens, told with the results."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+LINE_SEARCH = "contact solved with a line search"
+FULL_START = "contact solved from full contact on"
+FULL_START_SEARCH = "contact solved from full contact on, with a line search"
+SMALLER_STEPS = "solved in {} smaller steps"
+SHORTER_JUMPS = "jump shortened"
+
+
+class Remedies:
+    """Counts remedies by their names until they are taken; the same on every rank."""
+
+    def __init__(self) -> None:
+        self._noted: Counter[str] = Counter()
+
+    def note(self, name: str) -> None:
+        """Count a remedy."""
+        self._noted[name] += 1
+
+    def take(self) -> Counter[str]:
+        """Return what was noted since the last time."""
+        noted, self._noted = self._noted, Counter()
+        return noted

@@ -1,0 +1,1 @@
+"""Pictures and pages, drawn from the folder of a run alone."""

@@ -1,0 +1,179 @@
+"""Several runs in one figure and one table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray
+
+from fenwear.errors import CaseError, Problem
+from fenwear.report.figures import directions_present, mark_few, read_history
+from fenwear.report.key_numbers import flat, number_text, read_case, read_summary
+from fenwear.report.style import DIRECTIONS, contact_axis, legend_beside, panels, run_style
+from fenwear.results.disk import writing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS = (".png", ".pdf", ".svg")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs side by side: each row of the tables has a value for every run, None where it has none.
+
+    Attributes:
+        names: Of the runs, each different.
+        histories: Of the runs.
+        numbers: The numbers and the words of the summaries.
+        cases: Those keys of the cases that differ.
+        versions: Those versions of the stack that differ.
+    """
+
+    names: list[str]
+    histories: list[xarray.Dataset]
+    numbers: dict[str, list[Any]]
+    cases: dict[str, list[Any]]
+    versions: dict[str, list[Any]]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the tables; what is no finite number is null."""
+        numbers = {k: [None if _not_finite(v) else v for v in row] for k, row in self.numbers.items()}
+        return {"runs": self.names, "numbers": numbers, "cases": self.cases, "versions": self.versions}
+
+    def text(self) -> str:
+        """Return the tables for people, a column per run."""
+        parts = []
+        tables = {"differences of the cases": self.cases, "differences of the versions": self.versions}
+        for title, table in {"results": self.numbers, **tables}.items():
+            if table:
+                parts.append(_columns(title, self.names, table))
+        if not self.cases:
+            parts.append("the cases are equal")
+        return "\n\n".join(parts)
+
+
+def compare(directories: Sequence[Path]) -> Comparison:
+    """Read the runs.
+
+    Raises:
+        CaseError: fewer than two, or one is no run; lists all that are wrong.
+    """
+    if len(directories) < 2:
+        raise CaseError(Problem("DIR", "expected the folders of at least two runs"))
+    problems: list[Problem] = []
+    read = []
+    for directory in directories:
+        try:
+            read.append((read_history(directory), read_summary(directory), read_case(directory)))
+        except CaseError as error:
+            problems += error.problems
+    if problems:
+        raise CaseError(problems)
+    summaries = [summary for _, summary, _ in read]
+    shown = [{k: v for k, v in s.items() if k not in ("versions", "warnings", "title")} for s in summaries]
+    return Comparison(
+        names=_names(directories),
+        histories=[history for history, _, _ in read],
+        numbers=_rows([flat(s) for s in shown]),
+        cases=_differing(_rows([flat(case) for _, _, case in read])),
+        versions=_differing(_rows([s.get("versions", {}) for s in summaries])),
+    )
+
+
+def comparison_figure(comparison: Comparison) -> Figure:
+    """Draw shape and pressures at the end of each run, its largest pressure and temperature over the half-cycles."""
+    runs = list(zip(comparison.names, comparison.histories, strict=True))
+    present = [d for d in DIRECTIONS if any(d in directions_present(h) for h in comparison.histories)]
+    hot = [h for h in comparison.histories if "max_temperature" in h]
+    count = 2 + len(present) + (1 if hot else 0)
+    figure, axes = panels(count, 2.5, share_x=False)
+    shape, *pressures = axes[: 1 + len(present)]
+    for number, (name, history) in enumerate(runs):
+        # Thinner from run to run: where two agree, both are seen.
+        style = {**run_style(number), "linewidth": max(1.2, 3.0 - 0.7 * number)}
+        few = mark_few(history.half_cycle)
+        shape.plot(history.x, 1e3 * history.wear.isel(half_cycle=-1), label=name, **style)
+        for ax, d in zip(pressures, present, strict=True):
+            rows = history.direction.values == d
+            if rows.any():
+                ax.plot(history.x, history.pressure.values[rows][-1], label=name, **style)
+        for ax, variable in zip(axes[1 + len(present) :], ("max_pressure", "max_temperature"), strict=False):
+            if variable in history:
+                ax.plot(history.half_cycle, _larger_of_cycle(history, variable), label=name, **style, **few)
+    shape.set_title("Worn shape at the end", loc="left")
+    shape.set_ylabel("worn depth w (µm)")
+    for ax, d in zip(pressures, present, strict=True):
+        ax.set_title(f"Pressure at the end, strip moves {DIRECTIONS[d][0]}", loc="left")
+        ax.set_ylabel("pressure p (MPa)")
+    for ax in (shape, *pressures):
+        ax.set_ylim(bottom=0)
+        contact_axis(ax)
+    titles = (("Largest contact pressure", "pressure (MPa)"), ("Largest temperature", "temperature (K)"))
+    for ax, (title, label) in zip(axes[1 + len(present) :], titles, strict=False):
+        ax.set_title(title, loc="left")
+        ax.set_ylabel(label)
+        ax.set_xscale("log")
+        ax.set_xlabel("half-cycle n")
+    for ax in axes:
+        legend_beside(ax, "run")
+    return figure
+
+
+def draw_comparison(comparison: Comparison, path: Path) -> Path:
+    """Write the figure.
+
+    Raises:
+        CaseError: the file's ending is unknown, or its folder takes no file.
+        OutputError: there is no room for it.
+    """
+    if path.suffix not in FORMATS:
+        raise CaseError(Problem("-o", f"expected a file ending in {', '.join(FORMATS)}, got {str(path)!r}"))
+    try:
+        path.touch()
+    except OSError as error:
+        raise CaseError(Problem("-o", f"{path} cannot be written: {error.strerror}")) from None
+    with writing(path):
+        comparison_figure(comparison).savefig(path, dpi=150)
+    return path
+
+
+def _names(directories: Sequence[Path]) -> list[str]:
+    """Return the folders' names, or their paths where names repeat."""
+    names = [directory.resolve().name for directory in directories]
+    return names if len(set(names)) == len(names) else [str(directory) for directory in directories]
+
+
+def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
+    keys = {key: None for table in tables for key in table}  # in order, each once
+    return {key: [table.get(key) for table in tables] for key in keys}
+
+
+def _differing(rows: dict[str, list[Any]]) -> dict[str, list[Any]]:
+    return {key: row for key, row in rows.items() if any(value != row[0] for value in row)}
+
+
+def _larger_of_cycle(history: xarray.Dataset, name: str) -> xarray.DataArray:
+    """Return the larger value of the last two directions: the line shall not jump between them."""
+    return history[name].rolling(half_cycle=len(directions_present(history)), min_periods=1).max()
+
+
+def _not_finite(value: Any) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)
+
+
+def _columns(title: str, names: Sequence[str], table: dict[str, list[Any]]) -> str:
+    lines = [[title, *names], *([key, *(_short(number_text(value)) for value in row)] for key, row in table.items())]
+    widths = [max(len(line[k]) for line in lines) for k in range(len(names) + 1)]
+    return "\n".join(
+        "  ".join([line[0].ljust(widths[0]), *(text.rjust(w) for text, w in zip(line[1:], widths[1:], strict=True))])
+        for line in lines
+    )
+
+
+def _short(text: str, length: int = 32) -> str:
+    return text if len(text) <= length else f"{text[: length - 1]}…"

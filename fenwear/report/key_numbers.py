@@ -1,0 +1,114 @@
+"""The key numbers of a run and its case as flat tables: what the report and the comparison show."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fenwear.errors import CaseError, Problem
+from fenwear.results.history import CASE, SUMMARY
+
+UNITS = {"_per_s": "1/s", "_MPa": "MPa", "_mm2": "mm²", "_mm": "mm", "_K": "K", "_mJ": "mJ", "_seconds": "s"}
+LABELS = {
+    "half_cycles": "half-cycles done",
+    "half_cycle": "half-cycle",
+    "stop": "how the run stopped",
+    "setup_seconds": "time for meshes and operators",
+    "half_cycles_seconds": "time for the half-cycles",
+    "max_pressure_MPa": "largest pressure",
+    "contact_width_mm": "width in contact",
+    "max_temperature_K": "largest temperature of the contact surfaces",
+    "wear_mm": "worn depth of the punch",
+    "wear_strip_max_mm": "largest worn depth of the strip",
+    "worn_area_strip_mm2": "cross-section worn off the strip",
+    "worn_area_punch_mm2": "cross-section worn off the punch",
+    "pressure_MPa": "contact pressure",
+    "temperature_punch_K": "temperature of the punch",
+    "temperature_strip_K": "temperature of the strip",
+    "heat_mJ": "heat of the last half-cycle",
+    "periodicity": "periodicity: change of pressure against one cycle ago, over the mean pressure",
+    "growth_rate_per_s": "growth rate of disturbances of the final state",
+    "largest_equilibrium_error": "largest error of the force and moment balance, over the load",
+    "largest_heat_balance_error": "largest error of the heat balance, over its largest term",
+    "ranks": "MPI ranks",
+}
+
+
+def read_summary(directory: Path) -> dict[str, Any]:
+    """Return summary.json of a run, empty where it has not ended.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    path = directory / SUMMARY
+    try:
+        summary = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise CaseError(Problem(str(path), f"no readable summary of a run: {error}")) from None
+    if not isinstance(summary, dict):
+        raise CaseError(Problem(str(path), "no summary of a run"))
+    return summary
+
+
+def read_case(directory: Path) -> dict[str, Any]:
+    """Return the tables of the resolved case of a run.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    path = directory / CASE
+    try:
+        return tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        message = f"{error.strerror}; expected the folder of a run"
+        raise CaseError(Problem(str(path), message)) from None
+    except ValueError as error:
+        raise CaseError(Problem(str(path), f"no readable case of a run: {error}")) from None
+
+
+def flat(tables: Any, prefix: str = "") -> dict[str, Any]:
+    """Return every single value by its path, such as heat_mJ.friction or wear_mm[1]."""
+    if isinstance(tables, Mapping):
+        pairs = [(f"{prefix}.{key}" if prefix else str(key), value) for key, value in tables.items()]
+    elif isinstance(tables, list):
+        pairs = [(f"{prefix}[{number}]", value) for number, value in enumerate(tables)]
+    else:
+        return {prefix: tables}
+    return {path: value for key, inner in pairs for path, value in flat(inner, key).items()}
+
+
+def unit_of(path: str) -> str:
+    """Return the unit that a name along the path ends with, "" where there is none."""
+    names = [name.partition("[")[0] for name in path.split(".")]
+    return next((unit for name in names for suffix, unit in UNITS.items() if name.endswith(suffix)), "")
+
+
+def label_of(path: str) -> str:
+    """Return a path in words, without its unit."""
+    return ", ".join(_words(name) for name in path.split("."))
+
+
+def number_text(value: Any) -> str:
+    """Return a value as people read it: five digits, a dash where there is no number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return "–" if value is None else str(value)
+    if isinstance(value, int):
+        return f"{value:,}"
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else f"{value}"
+    return f"{value:.5g}".replace("-", "−")
+
+
+def _words(name: str) -> str:
+    bare, bracket, index = name.partition("[")
+    words = LABELS.get(bare)
+    if words is None:
+        suffix = next((suffix for suffix in UNITS if bare.endswith(suffix)), "")
+        words = bare.removesuffix(suffix).replace("_", " ")
+    return words + bracket + index

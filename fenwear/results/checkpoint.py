@@ -1,0 +1,215 @@
+"""Checkpoints: a moment of a run on disk, whole or not at all, for any number of ranks.
+
+Arrays of the interface go to one NumPy file; temperatures are functions on the meshes, written by
+adios4dolfinx in the numbering of the geometry, so that another number of ranks can read them.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tomllib
+import zipfile
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import adios4dolfinx
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.contact import ContactState
+from fenwear.cycle.moment import Moment
+from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.heat.conduction import HeatBody
+from fenwear.heat.exchange import HeatExchange
+from fenwear.parallel import on_root
+from fenwear.results.disk import check_room, writing, writing_together
+from fenwear.sliding.wear import Worn
+from fenwear.system import System
+
+FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
+CASE, ARRAYS = "case.toml", "moment.npz"
+NUMBERS, WEAR, STATES = (
+    ("half_cycle", "jump_length", "periodic_phases"),
+    ("wear", "wear_strip"),
+    ("pressure", "gap", "rigid"),
+)
+FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
+BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
+# A run may go on farther than it was meant to, and keep other things.
+FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "title")
+
+
+def save(directory: Path, system: System, exchange: HeatExchange | None, moment: Moment) -> None:
+    """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
+
+    Raises:
+        OutputError: it cannot be written; the old one stays.
+    """
+    try:
+        _save(directory, system, exchange, moment)
+    except OutputError:  # on all ranks
+        on_root(system.comm, lambda: shutil.rmtree(directory / NEW, ignore_errors=True))
+        raise
+
+
+def _save(directory: Path, system: System, exchange: HeatExchange | None, moment: Moment) -> None:
+    comm, new = system.comm, directory / NEW
+    on_root(comm, lambda: _begin(new, system, moment))
+    if exchange is not None and moment.temperature is not None and system.heat_bodies is not None:
+        temperatures = exchange.temperatures(moment.temperature)
+        for body, values in zip(system.heat_bodies, temperatures, strict=True):
+            path, function = new / f"temperature_{body.body.name}.bp", body.function(values)
+            size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
+            on_root(comm, partial(check_room, new, size))
+            with writing_together(comm, path):
+                adios4dolfinx.write_function_on_input_mesh(path, function)
+    comm.Barrier()
+    on_root(comm, lambda: _swap(directory))
+
+
+def _begin(new: Path, system: System, moment: Moment) -> None:
+    with writing(new):
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir()
+        _write(new, system, moment)
+
+
+def _write(new: Path, system: System, moment: Moment) -> None:
+    (new / CASE).write_text(system.case.to_toml(), "utf-8")
+    n, r = len(system.facing.weights), len(system.statics.resultant)
+    empty = ContactState(np.full((1, n), np.nan), np.full((1, n), np.nan), np.full((1, r), np.nan), 0)
+    contacts = [contact or empty for contact in moment.contacts]
+    with (new / ARRAYS).open("wb") as file:
+        np.savez(
+            file,
+            **{name: getattr(moment, name) for name in NUMBERS},
+            **_depths(WEAR, moment.worn),
+            **({} if system.followed is None else _depths(FOLLOWED, system.followed)),
+            **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
+        )
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
+    return dict(zip(names, (worn.punch, worn.strip), strict=True))
+
+
+def followed(directory: Path, system: System) -> Worn | None:
+    """Return the worn depths that the meshes of a checkpoint follow, None where they are as made; collective.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is of another case.
+    """
+    arrays = on_root(system.comm, lambda: _read(_find(directory), system))
+    return Worn(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
+
+
+def _swap(directory: Path) -> None:
+    new, current, old = (directory / name for name in (NEW, FOLDER, OLD))
+    with writing(current):
+        shutil.rmtree(old, ignore_errors=True)
+        if current.exists():
+            current.rename(old)
+        new.rename(current)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def load(directory: Path, system: System, exchange: HeatExchange | None) -> Moment:
+    """Return the moment of a run's checkpoint; collective.
+
+    Raises:
+        CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
+    """
+    comm = system.comm
+    folder = on_root(comm, lambda: _find(directory))
+    arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
+    temperature = None
+    if exchange is not None and system.heat_bodies is not None:
+        punch, strip = (_read_temperature(folder, body) for body in system.heat_bodies)
+        temperature = exchange.state((punch, strip))
+    contacts = tuple(
+        None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
+        for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
+    )
+    numbers = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
+    worn = Worn(*(arrays[name] for name in WEAR))
+    return Moment(int(arrays["half_cycle"]), worn, contacts, temperature, *numbers)
+
+
+def _read_temperature(folder: Path, body: HeatBody) -> Array:
+    """Return the temperatures of this rank's own nodes of a body; collective."""
+    comm, function = body.body.mesh.comm, body.function(body.initial())
+    readable = True
+    try:
+        adios4dolfinx.read_function(folder / f"temperature_{body.body.name}.bp", function)
+    except (KeyError, OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
+        readable = False
+    values = function.x.array[: body.owned].copy()
+    if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):
+        raise _damaged(folder)
+    return values
+
+
+def _damaged(folder: Path) -> CaseError:
+    return CaseError(Problem("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
+
+
+def _find(directory: Path) -> Path:
+    for name in (FOLDER, OLD):  # killed between two renames only the old one is left
+        if (directory / name / ARRAYS).is_file():
+            return directory / name
+    raise CaseError(Problem("--resume", f"no checkpoint in {directory}"))
+
+
+def reached(directory: Path) -> int | None:
+    """Return the half-cycle of the checkpoint in a run's folder; None where there is none to go on from."""
+    try:
+        return int(_arrays(_find(directory))["half_cycle"])
+    except CaseError:
+        return None
+
+
+def _arrays(folder: Path) -> dict[str, Any]:
+    try:
+        with np.load(folder / ARRAYS) as arrays:
+            followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
+            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *STATES, *followed)}
+    except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
+        raise _damaged(folder) from None
+
+
+def _read(folder: Path, system: System) -> dict[str, Any]:
+    try:
+        saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
+    except (OSError, ValueError):
+        raise _damaged(folder) from None
+    present = _flat(tomllib.loads(system.case.to_toml()))
+    keys = sorted({*saved, *present})
+    problems = [
+        Problem(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")
+        for key in keys
+        if saved.get(key) != present.get(key) and not key.startswith(FREE_KEYS)
+    ]
+    if problems:
+        raise CaseError([Problem("--resume", "the checkpoint is of another case"), *problems])
+    arrays = _arrays(folder)
+    for names in (WEAR, FOLLOWED):
+        for name, unworn in _depths(names, system.unworn()).items():
+            if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
+                raise _damaged(folder)
+    return arrays
+
+
+def _flat(tables: Any, path: str = "") -> dict[str, Any]:
+    """Return nested tables as one, keyed by the path."""
+    if isinstance(tables, dict):
+        items: Any = tables.items()
+    elif isinstance(tables, list) and any(isinstance(item, dict) for item in tables):
+        items = enumerate(tables)
+    else:
+        return {path: tables}
+    return {k: v for key, value in items for k, v in _flat(value, f"{path}.{key}" if path else str(key)).items()}

@@ -1,0 +1,317 @@
+"""Fields in both bodies at chosen half-cycles: displacement, stress, temperature, heat flux.
+
+The condensed interface knows the contact alone; here the whole bodies are solved once more,
+K u = f + C p + G (theta - theta_0), and written for ParaView (VTX, in parallel) and, as plain
+NetCDF on the nodes, for fenwear's own pictures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import basix.ufl
+import dolfinx
+import numpy as np
+import scipy.spatial
+import ufl
+import xarray
+from dolfinx import fem
+
+from fenwear.arrays import Array
+from fenwear.bodies.antiplane import shear_out_of_plane
+from fenwear.bodies.elasticity import ElasticBody, strain, stress
+from fenwear.bodies.surface import SurfaceNodes
+from fenwear.compat import interpolation_points
+from fenwear.heat.conduction import HeatBody
+from fenwear.parallel import on_root
+from fenwear.results.disk import check_room, writing, writing_together
+from fenwear.sliding.wear import Worn
+from fenwear.system import System
+
+FOLDER = "fields"
+BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
+AXES = ("x", "z")
+
+
+@dataclass(frozen=True)
+class BodyFields:
+    """The fields of one body: functions on its nodes.
+
+    Attributes:
+        displacement: mm.
+        out_of_plane: Displacement along y, mm; None where no traction acts along it.
+        von_mises: Equivalent stress, MPa.
+        temperature: K; None without heat.
+        heat_flux: -k grad theta, mW/mm²; None without heat.
+    """
+
+    displacement: fem.Function
+    out_of_plane: fem.Function | None
+    von_mises: fem.Function
+    temperature: fem.Function | None
+    heat_flux: fem.Function | None
+
+
+def body_fields(
+    system: System, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
+) -> tuple[BodyFields, BodyFields]:
+    """Return the fields of the punch and the strip; collective.
+
+    Args:
+        system: The assembled problem.
+        pressure: Contact pressure (n,), MPa.
+        rigid: Amplitudes of the rigid modes (modes,).
+        phase: Number of the phase in the cycle.
+        temperatures: Of each body's owned nodes, K.
+    """
+    facing, (slip, cross) = system.facings[phase], _tractions(system, phase, pressure, temperatures)
+    normal = facing.weights * pressure
+    nodal = np.array([normal, normal * slip, normal * cross])
+    loads = (nodal, -nodal @ facing.transfer)
+    count = len(system.punch.rigid_modes)
+    amplitudes = (rigid[:count], rigid[count:])
+    heat_bodies = system.heat_bodies or (None, None)
+    punch, strip = (
+        _solve(system, elastic, nodes, load, modes, heat, None if temperatures is None else temperatures[k])
+        for k, (elastic, nodes, load, modes, heat) in enumerate(
+            zip(
+                system.phase_bodies[phase],
+                (facing.punch, facing.strip),
+                loads,
+                amplitudes,
+                heat_bodies,
+                strict=True,
+            )
+        )
+    )
+    return punch, strip
+
+
+def _tractions(
+    system: System, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None
+) -> tuple[Array, Array]:
+    """Return the tractions on the punch along e_t and y over this pressure (n,) each; collective."""
+    friction, surfaces = system.friction, None
+    if not friction.constant and temperatures is not None and system.heat_bodies is not None:
+        punch, strip = (
+            system.comm.allreduce(body.contact_rows @ values)
+            for body, values in zip(system.heat_bodies, temperatures, strict=True)
+        )
+        surfaces = (punch, system.facing.transfer @ strip)
+    mu = friction.values(system.conditions(phase, pressure, surfaces))
+    direction = system.motion.phases[phase].direction
+    return friction.slip(direction, mu), friction.cross(direction, mu)
+
+
+def _solve(
+    system: System,
+    elastic: ElasticBody,
+    nodes: SurfaceNodes,
+    load: Array,
+    rigid: Array,
+    heat: HeatBody | None,
+    temperature: Array | None,
+) -> BodyFields:
+    """Return one body's fields under nodal contact loads along e_n, e_t and y (3, n), N/mm; collective."""
+    force = elastic.load.copy()
+    vectors = load[0][:, None] * nodes.normal + load[1][:, None] * nodes.tangent
+    start, stop = elastic.space.dofmap.index_map.local_range
+    own = (nodes.block >= start) & (nodes.block < stop)
+    rows = 2 * (nodes.block[own, None] - start) + np.arange(2)
+    force.array[rows.ravel()] += vectors[own].ravel()
+    force.array[elastic.supported] = 0.0
+    theta = None
+    if heat is not None and temperature is not None:
+        theta = heat.function(temperature)
+        change = heat.function(temperature - heat.heat.initial)
+        elastic.thermal_coupling(heat.space, system.case.materials).multAdd(change.x.petsc_vec, force, force)
+    solution = force.duplicate()
+    elastic.factor.solve(force, solution)
+    displacement = fem.Function(elastic.space, name="displacement")
+    owned = 2 * elastic.space.dofmap.index_map.size_local
+    displacement.x.array[:owned] = solution.array_r
+    for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
+        displacement.x.array[:owned] += amplitude * mode
+    displacement.x.scatter_forward()
+    out_of_plane = shear_out_of_plane(elastic, nodes.block, load[2]) if load[2].any() else None
+    equivalent = _von_mises(system, elastic, displacement, out_of_plane, theta)
+    von_mises = _interpolated(equivalent, elastic, "von_mises", ())
+    flux = None
+    if heat is not None and theta is not None:
+        flux = _interpolated(-heat.conductivity * ufl.grad(theta), elastic, "heat_flux", (2,))
+    return BodyFields(displacement, out_of_plane, von_mises, theta, flux)
+
+
+def _von_mises(system: System, elastic: ElasticBody, displacement: Any, out_of_plane: Any, theta: Any) -> Any:
+    """Return sqrt(3/2 s : s) with the stress out of plane: zero in plane stress, in plane strain from eps_yy = 0."""
+    sigma = stress(displacement, *elastic.lame)
+    plane_stress = system.case.model.plane == "stress"
+    thermal: Any = 0.0
+    if theta is not None and system.case.heat is not None:
+        thermal = elastic.thermal_modulus(system.case.materials) * (theta - system.case.heat.initial)
+        sigma = sigma - thermal * ufl.Identity(2)
+    out = 0.0 if plane_stress else elastic.lame[0] * ufl.tr(strain(displacement)) - thermal
+    xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
+    shear = xz**2
+    if out_of_plane is not None:
+        slope = elastic.lame[1] * ufl.grad(out_of_plane)
+        shear = shear + ufl.inner(slope, slope)
+    return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * shear)
+
+
+def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple[int, ...]) -> fem.Function:
+    """Return the expression on the body's nodes, averaged between the elements that share one."""
+    mesh, degree = elastic.body.mesh, elastic.space.ufl_element().degree
+    broken = fem.functionspace(mesh, basix.ufl.element("DG", mesh.basix_cell(), degree, shape=shape))
+    values = fem.Function(broken)
+    values.interpolate(fem.Expression(expression, interpolation_points(broken)))
+    smooth = fem.functionspace(mesh, basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=shape))
+    sums, counts = fem.Function(smooth, name=name), fem.Function(smooth)
+    size = smooth.dofmap.bs
+    cells = mesh.topology.index_map(2).size_local
+    to = smooth.dofmap.list[:cells].ravel()
+    from_ = broken.dofmap.list[:cells].ravel()
+    for component in range(size):
+        np.add.at(sums.x.array, to * size + component, values.x.array[from_ * size + component])
+        np.add.at(counts.x.array, to * size + component, 1.0)
+    for function in (sums, counts):
+        function.x.scatter_reverse(dolfinx.la.InsertMode.add)
+    sums.x.array[:] /= np.maximum(counts.x.array, 1.0)
+    sums.x.scatter_forward()
+    return sums
+
+
+def write_fields(
+    directory: Path,
+    system: System,
+    half_cycle: int,
+    fields: tuple[BodyFields, BodyFields],
+    direction: int,
+    worn: Worn,
+) -> None:
+    """Write the fields of a half-cycle into `directory`/fields; collective.
+
+    Args:
+        directory: Of the run.
+        system: The assembled problem.
+        half_cycle: Its number.
+        fields: Of punch and strip.
+        direction: Sliding direction d.
+        worn: Depths at its end.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    comm = system.comm
+    folder = directory / FOLDER
+    nodes = sum(body.space.dofmap.index_map.size_global for body in (system.punch, system.strip))
+    on_root(comm, lambda: _make_folder(folder, BYTES_PER_NODE * nodes + BYTES_PER_RANK * comm.size))
+    stem = f"half_cycle_{half_cycle:06d}"
+    data: dict[str, Any] = {}
+    for elastic, body in zip((system.punch, system.strip), fields, strict=True):
+        name = elastic.body.name
+        given = (body.displacement, body.out_of_plane, body.von_mises, body.temperature, body.heat_flux)
+        functions = [f for f in given if f is not None]
+        _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
+        data.update(_gathered(name, elastic, functions))
+    time = float(system.motion.time(np.array(half_cycle)))
+    attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
+    data.update(_contact_surfaces(system, worn))
+    on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
+
+
+def _contact_surfaces(system: System, worn: Worn) -> dict[str, Any]:
+    """Return where the contact nodes of both bodies are, and what is worn there that the meshes do not follow."""
+    rest = worn if system.moved is None else worn - system.moved
+    facing = system.facing
+    data: dict[str, Any] = {}
+    for name, nodes, depth in (("punch", facing.punch, rest.punch), ("strip", facing.strip, rest.strip)):
+        at = f"{name}_contact"
+        data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES)}
+        data[f"{at}_wear"] = (at, depth, {"units": "mm"})
+    return data
+
+
+def _make_folder(folder: Path, size: int) -> None:
+    with writing(folder):
+        folder.mkdir(exist_ok=True)
+    check_room(folder, size)
+
+
+def _write_nodal(dataset: xarray.Dataset, path: Path) -> None:
+    part = path.with_suffix(".part")
+    with writing(path):
+        dataset.to_netcdf(part, engine="h5netcdf")
+        part.replace(path)
+
+
+def _write_for_paraview(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
+    with writing_together(elastic.body.mesh.comm, stem):
+        _write_vtx_or_xdmf(stem, elastic, functions)
+
+
+def _write_vtx_or_xdmf(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
+    comm = elastic.body.mesh.comm
+    if dolfinx.has_adios2:
+        with dolfinx.io.VTXWriter(comm, str(stem.with_suffix(".bp")), functions, engine="BP4") as writer:
+            writer.write(0.0)
+        return
+    with dolfinx.io.XDMFFile(comm, str(stem.with_suffix(".xdmf")), "w") as file:
+        file.write_mesh(elastic.body.mesh)
+        for function in functions:  # XDMF knows vertices only
+            element = basix.ufl.element("Lagrange", elastic.body.mesh.basix_cell(), 1, shape=function.ufl_shape)
+            linear = fem.Function(fem.functionspace(elastic.body.mesh, element), name=function.name)
+            linear.interpolate(function)
+            file.write_function(linear)
+
+
+def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) -> dict[str, Any]:
+    """Return a body's nodes, cells and nodal values as variables of a dataset, on rank 0; collective."""
+    units = {"von_mises": "MPa", "temperature": "K", "heat_flux": "mW/mm2"}
+    comm, space = elastic.body.mesh.comm, elastic.space
+    index_map, degree = space.dofmap.index_map, space.ufl_element().degree
+    cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(2).size_local]
+    corners = _subcells(space)
+    linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, 4)
+    x = space.tabulate_dof_coordinates()[: index_map.size_local, :2]
+    parts = comm.gather((x, linear))
+    gathered = [(f.name, comm.gather(_on_nodes(f, elastic).reshape(index_map.size_local, -1))) for f in functions]
+    if comm.rank != 0:
+        return {}
+    point, cell = f"{name}_point", f"{name}_cell"
+    points = np.concatenate([p[0] for p in parts])
+    data: dict[str, Any] = {f"{name}_{a}": (point, points[:, k], {"units": "mm"}) for k, a in enumerate(AXES)}
+    data[f"{name}_cells"] = ((cell, "corner"), np.concatenate([p[1] for p in parts]), {"degree": degree})
+    for field, values in gathered:
+        joined = np.concatenate(values)
+        names = [field] if joined.shape[1] == 1 else [f"{field}_{a}" for a in AXES]
+        for k, component in enumerate(names):
+            data[f"{name}_{component}"] = (point, joined[:, k], {"units": units.get(field, "mm")})
+    return data
+
+
+def _on_nodes(function: fem.Function, elastic: ElasticBody) -> Array:
+    """Return the owned nodal values in the order of the displacement's nodes.
+
+    Spaces of the same mesh and degree may number their nodes differently: go by the cells.
+    """
+    space, size = elastic.space, function.function_space.dofmap.bs
+    index_map = space.dofmap.index_map
+    count = index_map.size_local + index_map.num_ghosts
+    values = np.zeros((count, size))
+    to, from_ = space.dofmap.list.ravel(), function.function_space.dofmap.list.ravel()
+    values[to] = function.x.array.reshape(-1, size)[from_]
+    return values[: index_map.size_local]
+
+
+def _subcells(space: fem.FunctionSpace) -> Array:
+    """Return the corners (count, 4) of the linear cells between the nodes of one element, around each."""
+    points = space.element.basix_element.points
+    degree = space.ufl_element().degree
+    if len(points) != (degree + 1) ** 2:  # triangles: the last corner twice
+        triangles = scipy.spatial.Delaunay(points).simplices
+        return np.hstack([triangles, triangles[:, 2:]])
+    grid = np.lexsort((points[:, 0], points[:, 1])).reshape(degree + 1, degree + 1)
+    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)

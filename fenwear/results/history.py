@@ -1,0 +1,373 @@
+"""What a run leaves: case.toml, history.nc, summary.json. Nothing here computes or draws."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+import h5netcdf
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.case import Case
+from fenwear.cycle import Block
+from fenwear.errors import CaseError, Problem
+from fenwear.heat.exchange import TERMS
+from fenwear.results.disk import check_room, claim, write_text, writing
+from fenwear.system import System
+from fenwear.versions import versions
+
+HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
+SECONDS_BETWEEN_WRITES = 2.0
+CHUNK = 256  # rows that a variable's storage grows by
+INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
+
+# name: (dimensions, units, long_name); a Block has an attribute of each name
+VARIABLES = {
+    "half_cycle": (("half_cycle",), "1", "number of the half-cycle"),
+    "time": (("half_cycle",), "s", "time at the end of the half-cycle"),
+    "direction": (("half_cycle",), "1", "sliding direction of the strip: 1 rightward, -1 leftward"),
+    "pressure": (("half_cycle", "x"), "MPa", "contact pressure during the half-cycle"),
+    "gap": (("half_cycle", "x"), "mm", "gap between punch and strip during the half-cycle"),
+    "wear": (("half_cycle", "x"), "mm", "worn depth of the punch at the end of the half-cycle"),
+    "max_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
+    "contact_width": (("half_cycle",), "mm", "width in contact"),
+    "worn_area": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
+    "optimum_distance": (("half_cycle",), "1", "largest distance to the optimal pressure over the mean pressure"),
+    "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the mean pressure"),
+    "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
+    "retries": (("half_cycle",), "1", "solves that took a second attempt, in another way or in smaller steps"),
+}
+
+INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
+
+# the same with heat; the names of a BlockHeat, terms of the balance by their position
+HEAT_VARIABLES = {
+    "temperature_punch": (("half_cycle", "x"), "K", "temperature of the punch's contact surface at the end"),
+    "temperature_strip": (("half_cycle", "x"), "K", "temperature of the strip's contact surface at the end"),
+    "max_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces"),
+    "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
+    "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
+}
+HEAT_TERMS = {
+    "friction": "heat made by friction in the half-cycle",
+    "debris": "heat carried off by debris",
+    "stored": "heat gained by both bodies",
+    "convected": "heat lost to the surroundings",
+    "held": "heat lost through boundaries of held temperature",
+    "carried": "heat that the strip's material carries out of the model",
+}
+
+
+# the same where the strip wears
+STRIP_VARIABLES = {
+    "wear_strip": (("half_cycle", "x_strip"), "mm", "worn depth of the strip at the end of the half-cycle"),
+    "worn_area_strip": (("half_cycle",), "mm2", "cross-section worn off the strip in the half-cycle"),
+}
+
+
+def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
+    if case.heat is None:
+        return variables
+    terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
+    return {**variables, **HEAT_VARIABLES, **terms}
+
+
+def _coordinates(system: System) -> dict[str, tuple[str, Array, str]]:
+    """Return, by name, what does not change in a run: its dimension, values (mm) and long name."""
+    facing = system.facing
+    coordinates = {
+        "x": ("x", facing.x, "position along the contact, from the centre of the geometry"),
+        "weight": ("x", facing.weights, "length that each contact node stands for"),
+    }
+    if system.case.wear.strip is not None:
+        along = "position along the strip, on its material, as x in the middle position"
+        coordinates["x_strip"] = ("x_strip", facing.strip.x[:, 0], along)
+        coordinates["weight_strip"] = ("x_strip", facing.strip.weights, "length that each node stands for")
+    return coordinates
+
+
+def _values(block: Block, name: str) -> NDArray[Any]:
+    """Return the values of a variable over a block's half-cycles."""
+    if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
+        return getattr(block, name)
+    if name == "heat_balance_error":
+        return block.heat.balance_error
+    if name in HEAT_VARIABLES:
+        return getattr(block.heat, name)
+    return block.heat.terms[:, TERMS.index(name.removeprefix("heat_"))]
+
+
+def make_directory(path: Path) -> None:
+    """Make the new folder of a run.
+
+    Raises:
+        CaseError: it exists and is not empty, or cannot be made.
+    """
+    try:
+        if path.exists() and (not path.is_dir() or any(path.iterdir())):
+            raise CaseError(Problem("-o", f"{path} exists already; expected a new or an empty folder"))
+        path.mkdir(parents=True, exist_ok=True)
+        probe = path / CASE
+        probe.touch()
+    except OSError as error:
+        raise CaseError(Problem("-o", f"{path} cannot be written: {error.strerror}")) from None
+
+
+def free_directory(stem: Path) -> Path:
+    """Return `stem`, or the first of stem-2, stem-3, ... that does not exist."""
+    if not stem.exists():
+        return stem
+    number = 2
+    while (path := stem.with_name(f"{stem.name}-{number}")).exists():
+        number += 1
+    return path
+
+
+class HistoryWriter:
+    """Writes blocks of half-cycles to history.nc, every few seconds; for one rank.
+
+    history.nc has a twin that lags one write behind. A write brings the twin up to date, and the two
+    change places: history.nc is whole and readable at any moment, and no write costs more in a long run.
+    """
+
+    def __init__(self, directory: Path, system: System, resumed_after: int | None = None) -> None:
+        """Begin a history, or go on with the one of a run that is resumed after a half-cycle.
+
+        Raises:
+            CaseError: the history to go on with cannot be read.
+            OutputError: it cannot be written.
+        """
+        self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
+        self._variables = _variables(system.case)
+        self._coordinates = _coordinates(system)
+        self._phases = system.motion.half_cycles
+        # Cycle jumps have few records: all are kept.
+        self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
+        self._pending: list[dict[str, NDArray[Any]]] = []
+        self._last: dict[str, NDArray[Any]] | None = None
+        self._due = time.monotonic() + SECONDS_BETWEEN_WRITES
+        self._seconds_of_copying = 0.0
+        self.rows = self._twin_rows = 0
+        with writing(self.path):
+            for left_by_a_killed_run in (self._twin, self._spare):
+                left_by_a_killed_run.unlink(missing_ok=True)
+            if resumed_after is None or not self.path.exists():
+                self._create(system)
+            else:
+                self._cut(resumed_after)
+
+    def _create(self, system: System) -> None:
+        coordinates = sum(values.nbytes for _, values, _ in self._coordinates.values())
+        check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + coordinates)
+        with h5netcdf.File(self._twin, "w") as file:
+            file.attrs["title"] = system.case.title or "fenwear run"
+            file.attrs["Conventions"] = "CF-1.11"
+            file.attrs["case"] = system.case.to_toml()
+            file.attrs["versions"] = json.dumps(versions())
+            sizes = self._sizes()
+            file.dimensions = {"half_cycle": None, **sizes}
+            for name, (dimension, values, long_name) in self._coordinates.items():
+                variable = file.create_variable(name, (dimension,), float)
+                variable[:] = values
+                variable.attrs.update(units="mm", long_name=long_name)
+            for name, (dimensions, units, long_name) in self._variables.items():
+                kind = int if name in INTEGERS else float
+                chunks = (CHUNK, *(sizes[d] for d in dimensions[1:]))
+                variable = file.create_variable(name, dimensions, kind, chunks=chunks)
+                variable.attrs.update(units=units, long_name=long_name)
+        self._twin.replace(self.path)
+
+    def _cut(self, half_cycle: int) -> None:
+        """Drop what a killed run wrote after its last checkpoint."""
+        try:
+            with h5netcdf.File(self.path, "r") as file:
+                stored = file["half_cycle"][:]
+        except (OSError, KeyError, RuntimeError):
+            message = "cannot be read; remove it to go on with a new one, which begins at the checkpoint"
+            raise CaseError(Problem(str(self.path), message)) from None
+        self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
+        if self.rows < len(stored):
+            self._copy()
+            with h5netcdf.File(self._twin, "a") as file:
+                file.resize_dimension("half_cycle", self.rows)
+            self._twin.replace(self.path)
+
+    def add(self, block: Block) -> None:
+        """Take a block; write what has gathered if the last write is some seconds ago.
+
+        Raises:
+            OutputError: history.nc cannot be written; it stays as it was at the last write.
+        """
+        rows = {name: _values(block, name) for name in self._variables}
+        keep = (block.half_cycle - 1) // self._phases % self._every == 0
+        self._pending.append({name: values[keep] for name, values in rows.items()})
+        before = self._last or {name: values[:0] for name, values in rows.items()}
+        self._last = {n: np.concatenate([before[n], values])[-self._phases :] for n, values in rows.items()}
+        if time.monotonic() > self._due:
+            self.flush()
+
+    def close(self) -> None:
+        """Write the rest, with the last cycle whatever `output.every` is.
+
+        Raises:
+            OutputError: as `add`.
+        """
+        if self._last is not None:
+            seen = {int(n) for rows in self._pending for n in rows["half_cycle"]} | self._stored_tail()
+            new = np.array([int(n) not in seen for n in self._last["half_cycle"]])
+            self._pending.append({name: values[new] for name, values in self._last.items()})
+        self.flush()
+        with writing(self._twin):
+            self._twin.unlink(missing_ok=True)
+
+    def _stored_tail(self) -> set[int]:
+        with writing(self.path), h5netcdf.File(self.path, "r") as file:
+            return {int(n) for n in file["half_cycle"][max(0, self.rows - self._phases) :]}
+
+    def flush(self) -> None:
+        """Write what has gathered.
+
+        Raises:
+            OutputError: as `add`.
+        """
+        self._seconds_of_copying = 0.0
+        joined = {n: np.concatenate([rows[n] for rows in self._pending]) for n in self._variables if self._pending}
+        if len(joined.get("half_cycle", ())):
+            with writing(self.path):
+                try:
+                    self._write(joined)
+                except (OSError, RuntimeError):
+                    self._twin.unlink(missing_ok=True)
+                    raise
+        self._pending = []
+        # A copy grows with the file: let it cost a small share of the time only.
+        self._due = time.monotonic() + max(SECONDS_BETWEEN_WRITES, 20 * self._seconds_of_copying)
+
+    def _write(self, values: dict[str, NDArray[Any]]) -> None:
+        count = self.rows + len(values["half_cycle"])
+        with h5netcdf.File(self.path, "r") as stored, self._open_twin(count) as twin:
+            twin.resize_dimension("half_cycle", count)
+            for name in self._variables:
+                twin[name][self._twin_rows : self.rows] = stored[name][self._twin_rows : self.rows]
+                twin[name][self.rows : count] = values[name]
+        self._twin_rows, self.rows = self.rows, count
+        self._change_places()
+
+    def _open_twin(self, rows: int) -> h5netcdf.File:
+        """Open the twin, with room for so many rows in all."""
+        if not self._twin.exists():
+            self._copy()
+        claim(self._twin, self._bytes(rows - self._twin_rows))
+        try:
+            return h5netcdf.File(self._twin, "a")
+        except OSError:  # locked: someone still reads what was history.nc before the last write
+            self._twin.unlink()
+            self._copy()
+            claim(self._twin, self._bytes(rows - self._twin_rows))
+            return h5netcdf.File(self._twin, "a")
+
+    def _copy(self) -> None:
+        begin = time.monotonic()
+        shutil.copyfile(self.path, self._twin)
+        self._twin_rows = self.rows
+        self._seconds_of_copying = time.monotonic() - begin
+
+    def _sizes(self) -> dict[str, int]:
+        return {dimension: len(values) for dimension, values, _ in self._coordinates.values()}
+
+    def _bytes(self, rows: int) -> int:
+        """Return what so many more rows take at most: whole chunks, and for each variable some nodes of an index."""
+        chunks = (rows > 0) + -(-rows // CHUNK)
+        sizes = self._sizes()
+        values = sum(sizes[d[1]] if len(d) > 1 else 1 for d, _, _ in self._variables.values())
+        return chunks * CHUNK * 8 * values + (chunks // 16 + 1) * INDEX * len(self._variables)
+
+    def _change_places(self) -> None:
+        try:
+            os.link(self.path, self._spare)
+        except OSError:  # no hard links here: the next write makes a copy
+            self._twin.replace(self.path)
+            return
+        self._twin.replace(self.path)
+        self._spare.replace(self._twin)
+
+
+def summarise(system: System, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
+    """Return the key numbers of a run, each with its unit in its name.
+
+    Args:
+        last: The last block.
+        extremes: Largest errors over all half-cycles.
+        run: How the run went: stop, times, warnings.
+    """
+    facing = system.facing
+    width = facing.x[-1] - facing.x[0]
+    centre = (facing.x[-1] + facing.x[0]) / 2
+    places = centre + width * np.array([-0.25, 0.0, 0.25])
+    phases = system.motion.half_cycles
+    names = {1: "rightward", -1: "leftward"}
+    return {
+        "title": system.case.title,
+        "half_cycles": int(last.half_cycle[-1]),
+        **run,
+        "mean_pressure_MPa": system.statics.mean_pressure,
+        "x_mm": places.tolist(),
+        "wear_mm": facing.interpolate(last.wear[-1], places).tolist(),
+        **_strip_summary(system, last),
+        **{
+            names[int(d)]: {
+                "half_cycle": int(last.half_cycle[-phases:][i]),
+                "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
+                "pressure_MPa": facing.interpolate(last.pressure[-phases:][i], places).tolist(),
+                "contact_width_mm": float(last.contact_width[-phases:][i]),
+            }
+            for i, d in enumerate(last.direction[-phases:])
+        },
+        **({} if last.heat is None else _heat_summary(system, last, places)),
+        "periodicity": float(last.periodicity[-1]),
+        **extremes,
+        "contact_nodes": len(facing.x),
+        "degrees_of_freedom": system.punch.stiffness.size[0] + system.strip.stiffness.size[0],
+        "ranks": system.comm.size,
+        "versions": versions(),
+    }
+
+
+def _strip_summary(system: System, last: Block) -> dict[str, Any]:
+    """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
+    if system.case.wear.strip is None:
+        return {}
+    depth, nodes = last.wear_strip[-1], system.facing.strip
+    return {
+        "wear_strip_max_mm": float(depth.max()),
+        "worn_area_strip_mm2": float(nodes.weights @ depth),
+        "worn_area_punch_mm2": float(system.facing.weights @ last.wear[-1]),
+    }
+
+
+def _heat_summary(system: System, last: Block, places: NDArray[Any]) -> dict[str, Any]:
+    assert last.heat is not None
+    interpolate = system.facing.interpolate
+    return {
+        "max_temperature_K": float(last.heat.max_temperature[-1]),
+        "temperature_punch_K": interpolate(last.heat.temperature_punch[-1], places).tolist(),
+        "temperature_strip_K": interpolate(last.heat.temperature_strip[-1], places).tolist(),
+        "heat_mJ": dict(zip(TERMS, last.heat.terms[-1].tolist(), strict=True)),
+    }
+
+
+def write_summary(directory: Path, summary: dict[str, Any]) -> None:
+    """Write summary.json."""
+    write_text(directory / SUMMARY, json.dumps(summary, indent=2) + "\n")
+
+
+def write_case(directory: Path, case: Case) -> None:
+    """Write the resolved case.toml, which runs again as it is."""
+    write_text(directory / CASE, case.to_toml())

@@ -1,0 +1,1 @@
+"""The laws of sliding: motion, friction and wear."""

@@ -1,0 +1,242 @@
+"""The wear rule: depths worn in a phase on both bodies, and the wear of a step as a layer of the contact.
+
+The punch's worn depth belongs to its contact nodes, the strip's to the strip's nodes, whose material
+moves under the punch: what is worn in a phase is put on the strip at its offset, so that its
+cross-section is what the pressure wore, and what is felt is read there. On a closed track the
+strip's wear spreads over the whole of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.case import Dependence, WearLaw
+from fenwear.interface import Facing
+from fenwear.sliding.friction import ContactConditions, Friction
+
+
+@dataclass(frozen=True)
+class Worn:
+    """Worn depths.
+
+    Attributes:
+        punch: At the punch's contact nodes (n,), mm.
+        strip: At the strip's contact nodes (n_strip,), on its material, mm.
+    """
+
+    punch: Array
+    strip: Array
+
+    def __add__(self, other: Worn) -> Worn:
+        return Worn(self.punch + other.punch, self.strip + other.strip)
+
+    def __sub__(self, other: Worn) -> Worn:
+        return Worn(self.punch - other.punch, self.strip - other.strip)
+
+    def times(self, factor: float) -> Worn:
+        """Return the depths times a factor."""
+        return Worn(factor * self.punch, factor * self.strip)
+
+
+@dataclass(frozen=True)
+class _BodyWear:
+    """What a body loses in each phase: rate p^b, the rate = beta~ S of the nodes (m, n), mm/MPa^b."""
+
+    rate: Array
+    exponent: float
+
+    def depth(self, pressure: Array) -> Array:
+        """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes."""
+        if self.exponent == 1:
+            return self.rate * pressure
+        return self.rate * np.maximum(pressure, 0.0) ** self.exponent
+
+    def slope(self, pressure: Array) -> Array:
+        """Return their derivatives to the pressures (m, n), mm/MPa."""
+        if self.exponent == 1:
+            return np.broadcast_to(self.rate, pressure.shape)
+        floor = 1e-9 * max(float(pressure.max()), 1e-300)  # b < 1: the slope at p = 0 is infinite
+        return self.rate * self.exponent * np.maximum(pressure, floor) ** (self.exponent - 1)
+
+
+@dataclass(frozen=True)
+class PhasesWear:
+    """The wear of the phases of a motion, or of some of them; equations (1), (26), (27).
+
+    Attributes:
+        punch, strip: beta~ S p^b at the interface nodes; None where the body does not wear.
+        facings: The surfaces opposite each other in each phase.
+        track: Length of the closed track that the strip runs on, mm; None for its own nodes.
+    """
+
+    punch: _BodyWear | None
+    strip: _BodyWear | None
+    facings: Sequence[Facing]
+    track: float | None
+
+    def some(self, phases: Sequence[int]) -> PhasesWear:
+        """Return the wear of some of the phases."""
+        chosen = list(phases)
+        punch, strip = (
+            None if body is None else replace(body, rate=body.rate[chosen]) for body in (self.punch, self.strip)
+        )
+        return PhasesWear(punch, strip, [self.facings[k] for k in chosen], self.track)
+
+    def depth(self, pressure: Array) -> Array:
+        """Return the depth worn off the punch in each phase (m, n), mm."""
+        return np.zeros_like(pressure) if self.punch is None else self.punch.depth(pressure)
+
+    def worn(self, pressure: Array) -> Worn:
+        """Return what all phases wear off both bodies at pressures (m, n)."""
+        first = self.facings[0]
+        strip = np.zeros(len(first.strip.weights))
+        if self.strip is not None:
+            for facing, depth in zip(self.facings, self.strip.depth(pressure), strict=True):
+                strip += self._on_strip(facing) @ depth
+        return Worn(self.depth(pressure).sum(axis=0), strip)
+
+    def opening(self, pressure: Array) -> Array:
+        """Return the gap that the wear of all phases opens in each of them (m, n), mm."""
+        worn = self.worn(pressure)
+        if self.strip is None:
+            return np.broadcast_to(worn.punch, pressure.shape)
+        return np.array([facing.opening(worn.punch, worn.strip) for facing in self.facings])
+
+    def border(self, pressure: Array) -> tuple[Array, Array]:
+        """Return L (m, n, q) and R (m, q, n): gap opened in phase k by unit pressures of phase j is L_k R_j.
+
+        Worn depths are the q quantities between: R of what pressure wears, L of what worn depth opens.
+        """
+        m, n = pressure.shape
+        right = np.zeros((m, self._left.shape[2], n))
+        strip = 0
+        if self.punch is not None:
+            nodes, strip = np.arange(n), n
+            right[:, nodes, nodes] = self.punch.slope(pressure)
+        if self.strip is not None:
+            for k, slope in enumerate(self.strip.slope(pressure)):
+                right[k, strip:] = self._on_strip(self.facings[k]) * slope
+        return self._left, right
+
+    @cached_property
+    def _left(self) -> Array:
+        parts = []
+        if self.punch is not None:
+            n = len(self.facings[0].weights)
+            parts.append(np.broadcast_to(np.eye(n), (len(self.facings), n, n)))
+        if self.strip is not None:
+            parts.append(np.array([facing.material for facing in self.facings]))
+        return np.concatenate(parts, axis=2)
+
+    def _on_strip(self, facing: Facing) -> Array:
+        """Return what puts depths of the interface nodes on the strip's nodes (n_strip, n), areas kept."""
+        if self.track is not None:
+            return np.broadcast_to(facing.weights / self.track, (len(facing.strip.weights), len(facing.weights)))
+        return facing.to_strip
+
+    def worn_area(self, pressure: Array) -> tuple[float, float]:
+        """Return the cross-sections worn off punch and strip, mm²."""
+        areas = [
+            0.0 if body is None else float((body.depth(pressure) @ self.facings[0].weights).sum())
+            for body in (self.punch, self.strip)
+        ]
+        return areas[0], areas[1]
+
+
+@dataclass(frozen=True)
+class WornLayer:
+    """The wear of `repeats` cycles at the pressures of their phases, as a layer of the contact.
+
+    Put into the inequality it makes the step implicit: pressure and wear belong to its end, so that
+    it is stable for any number of repeats.
+    """
+
+    wear: PhasesWear
+    repeats: float = 1.0
+
+    def opening(self, pressure: Array) -> Array:
+        """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
+        return self.repeats * self.wear.opening(pressure)
+
+    def border(self, pressure: Array) -> tuple[Array, Array]:
+        """Return L (m, n, q) and R (m, q, n) of its derivative L_k R_j."""
+        left, right = self.wear.border(pressure)
+        return left, self.repeats * right
+
+
+@dataclass(frozen=True)
+class Wear:
+    """The wear rule of a motion: both bodies' laws and the sliding of each phase.
+
+    Attributes:
+        punch, strip: The laws; None where the body does not wear.
+        sliding: Of each body S, the integral of v^a over each phase, (m,) each, mm^a s^(1-a).
+        facings: The surfaces opposite each other in each phase.
+        friction: Enters where the case gives beta or the energy of friction.
+        track: Length of the closed track, mm.
+    """
+
+    punch: WearLaw | None
+    strip: WearLaw | None
+    sliding: tuple[Array, Array]
+    facings: Sequence[Facing]
+    friction: Friction
+    track: float | None
+
+    @property
+    def constant(self) -> bool:
+        """Whether no coefficient depends on temperature, pressure or speed."""
+        laws = [law for law in (self.punch, self.strip) if law is not None]
+        of_friction = any(law.beta is not None or law.energy is not None for law in laws)
+        dependent = any(isinstance(law.coefficient, Dependence) for law in laws)
+        return not dependent and (self.friction.constant or not of_friction)
+
+    def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
+        """Return the wear of all phases or of some of them.
+
+        Args:
+            conditions: T, p and v of each of these phases, for the coefficients that depend on them.
+            which: Numbers of the phases; by default all.
+
+        Raises:
+            CaseError: a coefficient is negative or not finite there.
+        """
+        chosen = range(len(self.facings)) if which is None else which
+        bodies: list[_BodyWear | None] = []
+        for law, sliding, key in zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), strict=True):
+            if law is None:
+                bodies.append(None)
+                continue
+            rates = [
+                sliding[k] * coefficient(law, self.friction, state, key)
+                for k, state in zip(chosen, conditions, strict=True)
+            ]
+            bodies.append(_BodyWear(np.array(rates), law.pressure_exponent))
+        return PhasesWear(bodies[0], bodies[1], [self.facings[k] for k in chosen], self.track)
+
+
+def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:
+    """Return beta~ at the nodes (n,), in the internal unit of its exponents.
+
+    beta~ = beta mu^b, K / H (Archard), or the energy wear coefficient times mu.
+
+    Raises:
+        CaseError: it is negative or not finite; `key` is the law's key.
+    """
+    n = conditions.shape
+    if isinstance(law.coefficient, Dependence):
+        body = conditions.of("punch" if key.endswith("punch") else "strip")
+        return law.coefficient.values(body, n, law.scale, f"{key}.coefficient")
+    if law.coefficient is not None:
+        return np.full(n, law.coefficient)
+    if law.archard is not None and law.hardness is not None:
+        return np.full(n, law.archard / law.hardness)
+    mu = friction.values(conditions)
+    if law.energy is not None:
+        return law.energy * mu
+    return (law.beta or 0.0) * mu**law.pressure_exponent

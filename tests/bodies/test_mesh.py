@@ -1,0 +1,222 @@
+"""Geometries: the contract of named groups, parameters, matching and mirrored meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenwear import CaseError, System, load_case, steady
+from fenwear.bodies.mesh import BodyMesh, build_meshes, meshes_folder, write_msh
+from fenwear.case import Geometry
+from fenwear.parallel import on_root
+
+READY = "punch_on_strip.geo"
+SMALL = {"elements_along_contact": 4, "growth": 2.0}
+
+
+def build(**parameters: float) -> tuple[BodyMesh, BodyMesh]:
+    return build_meshes(Geometry(file=READY, parameters=SMALL | parameters), None, MPI.COMM_WORLD)
+
+
+@pytest.mark.mpi
+def test_contract() -> None:
+    """The physical groups that issue 2 asks for, each with its own place (3 and 4 of Example 1's geometry)."""
+    punch, strip = build()
+    assert set(punch.regions) == {"punch_lower", "punch_upper"}
+    assert set(strip.regions) == {"strip_body"}
+    assert set(punch.curves) == {"punch_contact", "punch_load", "punch_free"}
+    assert set(strip.curves) == {"strip_contact", "strip_free", "strip_bottom", "strip_ends"}
+    assert punch.points["punch_pin"].tolist() == [[30, 120]]
+    for body, area in ((punch, 60 * 100), (strip, 1140 * 100)):
+        assert integral(body) == pytest.approx(area, rel=1e-12)
+    assert integral(punch, region="punch_lower") == pytest.approx(60 * 20, rel=1e-12)
+    lengths = {"punch_contact": 60, "punch_load": 60, "punch_free": 200, "strip_contact": 60,
+               "strip_free": 1080, "strip_bottom": 1140, "strip_ends": 200}  # fmt: skip
+    for name, length in lengths.items():
+        assert integral(punch if name in punch.curves else strip, curve=name) == pytest.approx(length, rel=1e-12)
+
+
+def integral(body: BodyMesh, region: str | None = None, curve: str | None = None) -> float:
+    """Return the area of a region or of all, or the length of a curve."""
+    import ufl
+    from dolfinx import fem
+
+    if curve is not None:
+        measure = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)(body.curves[curve])
+    else:
+        measure = ufl.Measure("dx", domain=body.mesh, subdomain_data=body.cell_tags)
+        measure = measure(tuple(body.regions.values()) if region is None else body.regions[region])
+    one = fem.Constant(body.mesh, 1.0)
+    return body.mesh.comm.allreduce(fem.assemble_scalar(fem.form(one * measure)))
+
+
+@pytest.mark.parametrize("degree", [1, 3, 8])
+@pytest.mark.mpi
+def test_facing_nodes_coincide(degree: int) -> None:
+    """The two contact surfaces have the same nodes, to the last digits, whatever the partition."""
+    system = System(
+        load_case("example1", [f"geometry.degree={degree}", "geometry.parameters.elements_along_contact=6"])
+    )
+    facing = system.facing
+    assert len(facing.x) == 6 * degree + 1
+    np.testing.assert_allclose(facing.punch.x, facing.strip.x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(facing.x, -facing.x[::-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(facing.initial_gap, 0, atol=1e-12)
+
+
+def test_meshes_are_mirror_images() -> None:
+    """Both bodies' nodes are symmetric about x = 0, so that a symmetric problem stays symmetric."""
+    for body in build(pins_on_left_side=1, pin_height_2=55):
+        x = body.mesh.geometry.x.round(8) + 0.0
+        assert {tuple(p) for p in x} == {tuple(p) for p in x * [-1, 1, 1] + 0.0}
+
+
+def test_finest_at_the_edges() -> None:
+    """edge_grading is the ratio of the element sizes in the middle of the contact and at its edges."""
+    system = System(load_case("example1", ["geometry.degree=1", "geometry.parameters.edge_grading=7"]))
+    sizes = np.diff(system.facing.x)
+    assert sizes.max() / sizes.min() == pytest.approx(7, rel=1e-6)
+    assert sizes.argmin() in (0, len(sizes) - 1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "points"),
+    [
+        ({"pin_height_1": 20}, {(30, 120)}),  # on the line between the materials
+        ({"pin_height_1": 100}, {(30, 200)}),  # at the top
+        ({"pin_height_1": 80, "pin_height_2": 40, "pins_on_left_side": 1},
+         {(30, 140), (30, 180), (-30, 140), (-30, 180)}),
+    ],
+)  # fmt: skip
+def test_pins(parameters: dict[str, float], points: set[tuple[float, float]]) -> None:
+    """Examples 1 and 2: pins on one side or both, at any height, in any order."""
+    punch, _ = build(**parameters)
+    assert {tuple(p) for p in punch.points["punch_pin"]} == points
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ({"punch_with": 60}, "geometry.parameters.punch_with: .* has no such parameter; it has .*punch_width"),
+        ({"pin_height_1": 101}, "a pin is off the punch"),
+        ({"pin_height_1": 0}, "a pin is off the punch"),
+        ({"punch_width": -1}, "must be positive"),
+        ({"layer_height": 100}, "layer_height"),
+        ({"strip_length": 60}, "strip_length"),
+        ({"elements_along_contact": 5}, "even"),
+        ({"growth": 0}, "growth"),
+    ],
+)
+@pytest.mark.mpi
+def test_parameters_refused(parameters: dict[str, float], expected: str) -> None:
+    """An unknown or impossible parameter is refused by its name, on all ranks alike."""
+    with pytest.raises(CaseError, match=expected):
+        build(**parameters)
+
+
+def test_two_unknown_parameters_at_once() -> None:
+    """Every unknown parameter is named."""
+    with pytest.raises(CaseError) as refused:
+        build(height=1, width=2)
+    assert [p.key for p in refused.value.problems] == ["geometry.parameters.height", "geometry.parameters.width"]
+
+
+def refuse(file: Path, expected: str, **parameters: float) -> None:
+    with pytest.raises(CaseError, match=expected):
+        build_meshes(Geometry(file=file.name, parameters=parameters), file.parent, MPI.COMM_WORLD)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('Physical Curve("punch_contact")', 'Physical Curve("punch_touch")', "no physical curve named punch_contact"),
+        ('Physical Surface("strip_body")', 'Physical Surface("body")', "no physical surface named strip_"),
+        ("Recombine Surface{:};", "Recombine Surface{strip[]};\nRecombine Surface{lower[0]};", "mixes element types"),
+        ("half_width = punch_width / 2;", "half_width = ;", "gmsh on changed.geo"),
+    ],
+)
+def test_bad_geo(old: str, new: str, expected: str, tmp_path: Path) -> None:
+    """A geometry that breaks the contract, or is none, is refused in words."""
+    text = (meshes_folder() / READY).read_text("utf-8")
+    assert old in text
+    (tmp_path / "changed.geo").write_text(text.replace(old, new), "utf-8")
+    refuse(tmp_path / "changed.geo", expected)
+
+
+def test_bad_files(tmp_path: Path) -> None:
+    """No file, no mesh, no parameters of a mesh."""
+    refuse(tmp_path / "nowhere.geo", f"no file 'nowhere.geo'; ready ones are .*{READY}")
+    (tmp_path / "mesh.vtu").touch()
+    refuse(tmp_path / "mesh.vtu", "expected a .geo or a .msh file")
+    (tmp_path / "nonsense.msh").write_text("$Nonsense\n")
+    refuse(tmp_path / "nonsense.msh", "nonsense.msh")
+    (tmp_path / "binary.msh").write_bytes(bytes(range(256)))
+    refuse(tmp_path / "binary.msh", "binary.msh")
+    refuse(tmp_path / "nonsense.msh", "geometry.parameters: a .msh file has none", punch_width=60)
+    (tmp_path / "nonsense.geo").write_text("a b c d;\n e f;\n")
+    refuse(tmp_path / "nonsense.geo", "gmsh on nonsense.geo: .*syntax error")
+    build()  # a bad file leaves nothing behind in gmsh's parser
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        (["punch.supports.0.on='punch_pine'"], r"punch\.supports\.0\.on: no physical curve or point 'punch_pine'"),
+        (["strip.supports.1.on='punch_pin'"], r"strip\.supports\.1\.on: "),
+        (["punch.loads.0.on='lid'"], r"punch\.loads\.0\.on: no physical curve 'lid' .*punch_load"),
+        (["punch.regions.punch_middle='steel'"], r"punch\.regions\.punch_middle: no physical surface"),
+        (["strip.regions={strip_soil='steel'}"], r"strip\.regions: no material for .*'strip_body'"),
+        (["punch.supports.0={at=[31, 120], fix=['x']}"], r"punch\.supports\.0\.at: a pin off the punch.*31, 120"),
+        (["punch.supports=[]"], r"punch\.supports: the punch is free to slide along x"),
+        (["punch.supports.0.fix=['z']"], r"punch\.supports: the punch is free to slide along x"),
+    ],
+)
+@pytest.mark.mpi
+def test_case_that_does_not_fit_the_geometry(settings: list[str], expected: str) -> None:
+    """Missing groups, pins off the body, bodies that slide away: the key is named, on all ranks alike."""
+    with pytest.raises(CaseError, match=expected):
+        System(load_case("example1", ["geometry.parameters.elements_along_contact=4", *settings]))
+
+
+def test_surfaces_that_do_not_face(tmp_path: Path) -> None:
+    """A punch beside the strip, above it, or upside down does not touch it."""
+    text = (meshes_folder() / READY).read_text("utf-8")
+    tail = 'Physical Curve("strip_contact") = strip_contact[];'
+    for number, (new, expected) in enumerate(
+        [
+            ('Physical Curve("strip_contact") = {strip_contact[0]};', "punch_contact spans"),
+            (
+                'Physical Curve("strip_contact") = {bottom_lines[0], bottom_lines[#distances[] - 1]};',
+                "do not point at each other",
+            ),
+            (tail + " Translate{0, 5, 0}{Surface{lower[], upper[]};}", "5 mm above"),
+        ]
+    ):
+        file = tmp_path / f"{number}.geo"
+        file.write_text(text.replace(tail, new).replace("{strip[]};", "{strip[]};"), "utf-8")
+        case = load_case("example1").model_copy(update={"geometry": Geometry(file=file.name)}).at(tmp_path)
+        with pytest.raises(CaseError, match=expected):
+            System(case)
+
+
+@pytest.mark.mpi
+def test_own_msh_gives_the_same_answer(assemble: Callable[..., System], tmp_path: Path) -> None:
+    """A mesh written by fenwear and read back as the case's own geometry changes nothing."""
+    comm = MPI.COMM_WORLD
+    folder = comm.bcast(tmp_path)
+    geo = assemble("example1", "geometry.degree=2")
+    on_root(comm, lambda: write_msh(geo.case.geometry, None, folder / "own.msh"))
+    case = geo.case.model_copy(update={"geometry": Geometry(file="own.msh", degree=2)}).at(folder)
+    msh = System(case)
+    np.testing.assert_allclose(msh.facing.x, geo.facing.x, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(steady(msh).pressure, steady(geo).pressure, rtol=0, atol=1e-7)
+
+
+def test_msh_that_cannot_be_written(tmp_path: Path) -> None:
+    """The path is named."""
+    with pytest.raises(CaseError, match=r"nowhere.*cannot be written"):
+        write_msh(Geometry(parameters=SMALL), None, tmp_path / "nowhere" / "mesh.msh")

@@ -1,0 +1,124 @@
+"""Static condensation of the bodies onto their contact nodes."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import ufl
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from fenwear import System, load_case
+from fenwear.bodies import elasticity
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.surface import condense, surface_nodes
+from fenwear.interface import interpolation
+
+SMALL = ("geometry.parameters.elements_along_contact=8",)
+
+
+def solve_directly(body: ElasticBody, traction: Callable[[ufl.SpatialCoordinate], ufl.core.expr.Expr]) -> PETSc.Vec:
+    """Return the displacement under a traction on the contact, integrated consistently, by CG."""
+    x = ufl.SpatialCoordinate(body.body.mesh)
+    force = body.surface_integral(traction(x), body.body.curves[f"{body.body.name}_contact"])
+    force.array[body.supported] = 0.0
+    ksp = PETSc.KSP().create(body.body.mesh.comm)
+    ksp.setOperators(body.stiffness)
+    ksp.setType("cg")
+    ksp.pc.setType("jacobi" if body.body.mesh.comm.size > 1 else "icc")
+    ksp.setTolerances(rtol=1e-13, max_it=20_000)
+    solution = force.duplicate()
+    ksp.solve(force, solution)
+    assert ksp.getConvergedReason() > 0
+    return solution
+
+
+@pytest.mark.parametrize("name", ["punch", "strip"])
+@pytest.mark.mpi
+def test_compliance_is_symmetric_and_positive(assemble: Callable[..., System], name: str) -> None:
+    """Maxwell and Betti, and the work of any pressure is positive."""
+    body = getattr(assemble("example1", *SMALL), name)
+    matrix = condense(body, surface_nodes(body)).normal_by_normal
+    np.testing.assert_array_equal(matrix, matrix.T)
+    assert np.linalg.eigvalsh(matrix).min() > 1e-6 * np.abs(matrix).max()
+
+
+@pytest.mark.parametrize("kind", ["normal", "tangential"])
+@pytest.mark.parametrize("name", ["punch", "strip"])
+@pytest.mark.mpi
+def test_compliance_equals_a_direct_solve(assemble: Callable[..., System], name: str, kind: str) -> None:
+    """D_nn W p and D_nt W p are the normal displacement under that traction, integrated consistently and solved by CG.
+
+    Lumping at Gauss-Lobatto nodes is exact for p of degree k - 1 (here 3).
+    """
+    body = getattr(assemble("example1", *SMALL), name)
+    surface = condense(body, nodes := surface_nodes(body))
+
+    def p(x):  # type: ignore[no-untyped-def]
+        return 5 + x / 10 - (x / 20) ** 2 + (x / 30) ** 3
+
+    into_punch = nodes.normal[0, 1]
+    assert into_punch == pytest.approx(1)
+    axis = (0, 1) if kind == "normal" else (1, 0)
+    direct = solve_directly(body, lambda x: ufl.as_vector([c * p(x[0]) for c in axis]))
+    start, stop = body.space.dofmap.index_map.local_range
+    displacement = np.zeros(len(nodes.block))
+    own = (nodes.block >= start) & (nodes.block < stop)
+    displacement[own] = direct.array_r[2 * (nodes.block[own] - start) + 1]
+    displacement = body.body.mesh.comm.allreduce(displacement)
+    matrix = surface.normal_by_normal if kind == "normal" else surface.normal_by_tangential
+    condensed = matrix @ (nodes.weights * p(nodes.x[:, 0]))
+    np.testing.assert_allclose(condensed, displacement, rtol=0, atol=1e-8 * np.abs(displacement).max())
+
+
+@pytest.mark.parametrize("degree", range(1, 9))
+@pytest.mark.mpi
+def test_weights_integrate_polynomials(assemble: Callable[..., System], degree: int) -> None:
+    """Gauss-Lobatto with degree + 1 nodes: exact up to degree 2 k - 1, positive; the interval is [-30, 30]."""
+    nodes = surface_nodes(assemble("example1", *SMALL, f"geometry.degree={degree}").punch)
+    assert (nodes.weights > 0).all()
+    xi = nodes.x[:, 0] / 30
+    for power in range(2 * degree):
+        exact = 60 / (power + 1) * (power % 2 == 0)
+        assert nodes.weights @ xi**power == pytest.approx(exact, rel=1e-12, abs=1e-11)
+
+
+@pytest.mark.parametrize("degree", range(1, 9))
+def test_interpolation_reproduces_polynomials(degree: int) -> None:
+    """Piecewise Lagrange of degree k is exact for x^k on any graded nodes, and is the identity at the nodes."""
+    ends = np.array([-2.0, -1.9, -1.0, 0.5, 3.0])
+    reference = (1 - np.cos(np.pi * np.arange(degree + 1) / degree)) / 2
+    nodes = np.unique(np.concatenate([a + (b - a) * reference for a, b in itertools.pairwise(ends)]).round(14))
+    x = np.linspace(-2, 3, 101)
+    matrix = interpolation(nodes, degree, x)
+    for power in range(degree + 1):
+        np.testing.assert_allclose(matrix @ nodes**power, x**power, atol=1e-9 * 3**power)
+    np.testing.assert_allclose(interpolation(nodes, degree, nodes), np.eye(len(nodes)), atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["example1", "example2"])
+def test_further_supports_carry_nothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The supports that make K regular are arbitrary: others give the same pressure and the same gap."""
+
+    def solve() -> tuple[set[int], NDArray[np.float64], NDArray[np.float64]]:
+        system = System(load_case(name, [*SMALL, "contact.friction=0.4", "geometry.parameters.pin_height_1=40"]))
+        state = system.contact((1,)).solve(system.facing.initial_gap + 1e-4 * np.cos(system.facing.x))
+        return set(system.punch.supported.tolist()), state.pressure, state.gap
+
+    best_rows = elasticity._best_rows
+    supported, pressure, gap = solve()
+    assert (pressure == 0).any()
+    assert gap.max() > 1e-6
+
+    def other_rows(matrix: NDArray[np.float64], count: int) -> list[int]:
+        random = np.random.default_rng(3).uniform(0.01, 1, len(matrix)) ** 2
+        return best_rows(matrix * random[:, None], count)
+
+    monkeypatch.setattr(elasticity, "_best_rows", other_rows)
+    others, other_pressure, other_gap = solve()
+    assert others != supported
+    np.testing.assert_allclose(other_pressure, pressure, rtol=0, atol=1e-8 * pressure.max())
+    np.testing.assert_allclose(other_gap, gap, rtol=0, atol=1e-8 * gap.max())

@@ -1,0 +1,158 @@
+"""What does not converge is tried again in another way, from the same state, and told."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import ConvergenceError, System, jump, march
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact.inequality import DenseInequality
+from fenwear.cycle import Block
+from fenwear.cycle.phase import PhaseEnd, PhaseStep
+from fenwear.remedies import FULL_START, LINE_SEARCH, SHORTER_JUMPS, SMALLER_STEPS
+
+Assemble = Callable[..., System]
+COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
+# So much heat in a half-cycle that contact and heat taken together have no solution.
+HOT = (*COARSE, "motion.amplitude=20", "heat.partition=0.5")
+MEAN = 1e4 / 600
+
+
+def run(system: System, half_cycles: int, **options: Any) -> Block:
+    (block,) = march(system, half_cycles, block=half_cycles, **options)
+    return block
+
+
+@pytest.fixture
+def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[System], list[int]]:
+    """Return fails(system): phases of a system do not converge at their second cycle; lists the failures."""
+
+    def fails(system: System) -> list[int]:
+        original, failed = PhaseStep.solve, []
+
+        def solve(self: PhaseStep, temperature: Any, worn: Any, before: ContactState | None) -> PhaseEnd:
+            if self.system is system and before is not None and self.phase not in failed:
+                failed.append(self.phase)
+                raise ConvergenceError("on purpose")
+            return original(self, temperature, worn, before)
+
+        monkeypatch.setattr(PhaseStep, "solve", solve)
+        return failed
+
+    return fails
+
+
+@pytest.mark.parametrize("implicit", [False, True])
+@pytest.mark.parametrize(
+    ("case", "settings"),
+    [
+        ("example1", COARSE),
+        ("example1", (*COARSE, "wear.strip.coefficient=1e-8", "motion.positions=3", "geometry.parameters.overlap=3")),
+        ("example1-heat", (*COARSE, "heat.partition=0.2")),
+        ("example1-heat", (*COARSE, "heat.partition=0.2", "heat.operator=full")),
+    ],
+)
+@pytest.mark.mpi
+def test_half_cycles_in_parts(
+    assemble: Assemble, failing: Callable[[System], list[int]], case: str, settings: tuple[str, ...], implicit: bool
+) -> None:
+    """A half-cycle in five parts wears and heats what it does as a whole, but for the size of the steps."""
+    system = assemble(case, *settings)
+    usual = run(system, 8, implicit=implicit)
+    assert usual.retries.max() == 0
+    strokes = failing(system)
+    retried = run(system, 8, implicit=implicit)
+    half_cycles = len(strokes)  # a stroke fails at each of its phases, in turn
+    assert half_cycles == len(system.motion.phases)
+    assert retried.retries.sum() == half_cycles
+    parts = 5 * system.motion.positions
+    assert retried.remedies == {SMALLER_STEPS.format(parts): half_cycles}
+    np.testing.assert_allclose(retried.worn_area, usual.worn_area, rtol=1e-12)
+    np.testing.assert_allclose(retried.worn_area_strip, usual.worn_area_strip, rtol=1e-12)
+    assert retried.equilibrium_error.max() < 1e-12
+    np.testing.assert_allclose(retried.pressure, usual.pressure, rtol=0, atol=0.02 * usual.pressure.max())
+    if retried.heat is None or usual.heat is None:
+        return
+    assert retried.heat.balance_error.max() < 1e-8
+    np.testing.assert_allclose(retried.heat.terms[:, 0], usual.heat.terms[:, 0], rtol=1e-12)
+    largest = usual.heat.max_temperature.max()
+    np.testing.assert_allclose(
+        retried.heat.temperature_punch, usual.heat.temperature_punch, rtol=0, atol=0.05 * largest
+    )
+
+
+def test_heat_too_strong_for_a_half_cycle(assemble: Assemble) -> None:
+    """A run that ended here goes on in smaller steps: nothing of wear, force and heat is lost."""
+    system = assemble("example1-heat", *HOT)
+    block = run(system, 20)
+    assert 0 < np.count_nonzero(block.retries) < 20
+    assert any(name.startswith("solved in") for name in block.remedies)
+    np.testing.assert_allclose(block.worn_area, 1.25e-8 * np.pi * 1e4 * 40 / 10, rtol=1e-12)
+    assert block.heat is not None
+    assert block.heat.balance_error.max() < 1e-10
+    assert block.equilibrium_error.max() < 1e-10
+
+
+def test_no_parts_converge(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error is that of the whole half-cycle, and names it."""
+    system = assemble("example1", *COARSE)
+
+    def solve(self: PhaseStep, *_: Any) -> PhaseEnd:
+        raise ConvergenceError("the whole" if self.system is system else "a part")
+
+    monkeypatch.setattr(PhaseStep, "solve", solve)
+    with pytest.raises(ConvergenceError, match="half-cycle 1: the whole"):
+        run(system, 4)
+
+
+@pytest.mark.parametrize("ways", [1, 2])
+def test_contact_by_another_way(assemble: Assemble, monkeypatch: pytest.MonkeyPatch, ways: int) -> None:
+    """With the first ways closed the next ones find the same contact; which one is noted."""
+    system = assemble("example1", *COARSE)
+    usual = run(system, 6)
+    original, closed = DenseInequality.solve, [0]
+
+    def solve(self: DenseInequality, start: Any, *, line_search: bool = False) -> Any:
+        if closed[0] < ways:
+            closed[0] += 1
+            raise ConvergenceError("closed")
+        return original(self, start, line_search=line_search)
+
+    monkeypatch.setattr(DenseInequality, "solve", solve)
+    contact = system.contact((1,))
+    assert isinstance(contact, CondensedContact)
+    start = ContactState(usual.pressure[-2:-1], usual.gap[-2:-1], usual.rigid[-2:-1], 0)
+    found = contact.solve(usual.wear[-3], start)
+    assert system.remedies.take() == {(LINE_SEARCH, FULL_START)[ways - 1]: 1}
+    np.testing.assert_allclose(found.pressure[0], usual.pressure[-2], rtol=0, atol=1e-9 * MEAN)
+
+
+@pytest.mark.parametrize("shortest", [16, 1])
+def test_jumps_that_fail(assemble: Assemble, monkeypatch: pytest.MonkeyPatch, shortest: int) -> None:
+    """A jump that does not converge is shortened; a single cycle is cut into smaller steps. All is told."""
+    system = assemble("example1", *COARSE)
+    *_, usual = jump(system, 400, tolerance=1e-3)
+    stepper = sys.modules["fenwear.cycle.jump"]._Stepper
+    original = stepper.step
+
+    def step(self: Any, moment: Any, cycles: float) -> Any:
+        if cycles >= shortest:
+            raise ConvergenceError("on purpose")
+        return original(self, moment, cycles)
+
+    monkeypatch.setattr(stepper, "step", step)
+    blocks = list(jump(system, 400, tolerance=1e-3))
+    told = sum((block.remedies for block in blocks), start=type(usual.remedies)())
+    if shortest == 16:
+        assert set(told) == {SHORTER_JUMPS}
+    else:
+        assert told == {SMALLER_STEPS.format(8): 200}
+    last = blocks[-1]
+    assert last.half_cycle[-1] == 400
+    np.testing.assert_allclose(last.pressure[-2:], usual.pressure[-2:], rtol=0, atol=0.01 * usual.pressure.max())
+    np.testing.assert_allclose(last.worn_area, usual.worn_area[-1], rtol=1e-12)

@@ -1,0 +1,141 @@
+"""What a run leaves in its folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from fenwear import CaseError, ConvergenceError, System, load_case, march, run
+from fenwear.report.figures import open_history
+from fenwear.results.history import free_directory, make_directory
+from fenwear.run import run_case
+
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")
+
+
+def save(folder: Path, *settings: str, name: str = "example1") -> tuple[xarray.Dataset, dict[str, object]]:
+    case = load_case(name, [*SMALL, *settings])
+    summary, directory = run_case(case, "test", folder, lambda message: None)
+    assert directory == folder
+    with open_history(folder) as history:
+        return history.load(), summary
+
+
+@pytest.mark.parametrize("integration", ["explicit", "implicit", "jump"])
+def test_history_is_what_was_computed(assemble: Callable[..., System], tmp_path: Path, integration: str) -> None:
+    """Every variable has units and a long name, no value is missing, and the dimensions are those of the design."""
+    history, summary = save(tmp_path / "run", f"run.integration='{integration}'", "run.half_cycles=30")
+    for name, variable in history.variables.items():
+        assert variable.attrs["units"], name
+        assert variable.attrs["long_name"], name
+        if name != "periodicity":
+            assert np.isfinite(variable.values).all(), name
+    assert set(history.dims) == {"half_cycle", "x"}
+    assert history.pressure.dims == ("half_cycle", "x")
+    assert history.half_cycle[-1] == summary["half_cycles"] == 30
+    np.testing.assert_allclose(history.pressure @ history.weight, 1000, rtol=1e-8)
+    np.testing.assert_allclose(history.worn_area, 4e-7 * 1e4 * 3 / 10, rtol=1e-10)
+    if integration != "jump":
+        system = assemble("example1", *SMALL)
+        (block,) = march(system, 30, implicit=integration == "implicit")
+        np.testing.assert_array_equal(history.pressure, block.pressure)
+        np.testing.assert_array_equal(history.wear, block.wear)
+        np.testing.assert_array_equal(history.half_cycle, np.arange(1, 31))
+
+
+@pytest.mark.parametrize(
+    ("name", "every", "count", "kept"),
+    [
+        ("example1", 4, 21, [1, 2, 9, 10, 17, 18, 20, 21]),  # whole cycles, and the last half-cycles
+        ("example1", 1, 5, [1, 2, 3, 4, 5]),
+        ("example1", 100, 8, [1, 2, 7, 8]),
+        ("monotonic-lz20", 3, 8, [1, 4, 7, 8]),
+    ],
+)
+def test_every(tmp_path: Path, name: str, every: int, count: int, kept: list[int]) -> None:
+    """Every k-th cycle is kept, and always the last one."""
+    history, _ = save(tmp_path / "run", f"output.every={every}", f"run.half_cycles={count}", name=name)
+    assert history.half_cycle.values.tolist() == kept
+
+
+def test_blocks_are_written_without_gaps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written block by block instead of at the end, the history is the same."""
+    settings = ("run.half_cycles=450", "output.every=3")
+    at_once, _ = save(tmp_path / "one", *settings)
+    monkeypatch.setattr("fenwear.results.history.SECONDS_BETWEEN_WRITES", 0.0)
+    in_blocks, _ = save(tmp_path / "two", *settings)
+    xarray.testing.assert_identical(at_once, in_blocks.assign_attrs(at_once.attrs))
+
+
+def test_summary_and_case(tmp_path: Path) -> None:
+    """summary.json holds the summary, with the history's last values; case.toml runs again to the same history."""
+    history, summary = save(tmp_path / "run", "run.half_cycles=6")
+    assert json.loads((tmp_path / "run" / "summary.json").read_text()) == summary
+    rightward = summary["rightward"]
+    assert isinstance(rightward, dict)
+    assert rightward["half_cycle"] == 5
+    assert rightward["max_pressure_MPa"] == history.max_pressure.values[-2] == history.pressure.values[-2].max()
+    middle = int(np.abs(history.x.values).argmin())
+    assert summary["wear_mm"][1] == pytest.approx(float(history.wear[-1, middle]), rel=1e-12)  # type: ignore[index]
+    assert summary["x_mm"] == pytest.approx([-15, 0, 15])
+    assert summary["largest_equilibrium_error"] < 1e-8  # type: ignore[operator]
+    again = load_case(tmp_path / "run" / "case.toml")
+    _, folder = run_case(again, "again", tmp_path / "again", lambda message: None)
+    with open_history(folder) as repeated:
+        np.testing.assert_array_equal(repeated.pressure, history.pressure)
+
+
+def test_periodic_stop_is_said(tmp_path: Path) -> None:
+    """summary.json tells why the run ended."""
+    history, summary = save(tmp_path / "run", "run.periodic_within=0.05", "run.half_cycles=5000")
+    assert summary["stop"] == "periodic"
+    assert len(history.half_cycle) == summary["half_cycles"] < 5000
+
+
+def test_unstable_run_is_warned_about(tmp_path: Path) -> None:
+    """Beyond the explicit limit a warning names the way out; implicit there is none."""
+    _, explicit = save(tmp_path / "one", "run.half_cycles=4", "wear.punch.coefficient=1e-3")
+    assert "run.integration" in str(explicit["warnings"])
+    _, implicit = save(tmp_path / "two", "run.half_cycles=4", "wear.punch.coefficient=1e-3", "run.integration=implicit")
+    assert implicit["warnings"] == []
+
+
+def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A solver that fails after two blocks: history, summary and figures of what was computed, and the error."""
+    case = load_case("example1", [*SMALL, "run.half_cycles=1000"])
+
+    def failing(system: System, half_cycles: int, **options: object):  # type: ignore[no-untyped-def]
+        for number, block in enumerate(march(system, half_cycles)):
+            if number == 2:
+                raise ConvergenceError("DIVERGED_ON_PURPOSE")
+            yield block
+
+    monkeypatch.setattr(run, "march", failing)
+    with pytest.raises(ConvergenceError, match="DIVERGED_ON_PURPOSE") as failed:
+        run_case(case, "test", tmp_path / "run", lambda message: None)
+    assert f"half-cycle 400 are in {tmp_path / 'run'}" in str(failed.value)
+    with open_history(tmp_path / "run") as history:
+        assert history.half_cycle[-1] == 400
+    assert "DIVERGED_ON_PURPOSE" in json.loads((tmp_path / "run" / "summary.json").read_text())["stop"]
+    assert (tmp_path / "run" / "figures" / "shape.png").is_file()
+
+
+def test_directories(tmp_path: Path) -> None:
+    """A folder of results is new or empty; a file or a full folder is never touched."""
+    make_directory(tmp_path / "a" / "b")
+    with pytest.raises(CaseError, match="exists already"):
+        make_directory(tmp_path / "a")
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(CaseError, match="exists already"):
+        make_directory(tmp_path / "file")
+    with pytest.raises(CaseError, match="cannot be written"):
+        make_directory(tmp_path / "file" / "below")
+    assert (tmp_path / "file").read_text() == "mine"
+    assert free_directory(tmp_path / "c") == tmp_path / "c"
+    (tmp_path / "a-2").mkdir()
+    assert free_directory(tmp_path / "a") == tmp_path / "a-3"

@@ -53,3 +53,9 @@ def geometry_dofmap(mesh: Mesh) -> NDArray[np.int32]:
     """Return the geometry's nodes of every cell (cells, nodes); from 0.11 on one such array per cell type."""
     maps = getattr(mesh.geometry, "dofmaps", None)
     return mesh.geometry.dofmap if maps is None else maps[0]
+
+
+def geometry_degree(mesh: Mesh) -> int:
+    """Return the degree of the elements' shape; from 0.11 on there is one for each cell type."""
+    maps = getattr(mesh.geometry, "cmaps", None)
+    return int((mesh.geometry.cmap if maps is None else maps[0]).degree)

@@ -25,7 +25,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.compat import geometry_dofmap, interpolation_points
+from fenwear.compat import geometry_degree, geometry_dofmap, interpolation_points
 from fenwear.errors import MeshQualityError
 
 LEAST = 0.2  # of an element's volume that the motion may leave anywhere in it
@@ -162,7 +162,7 @@ def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) ->
 def _move(body: BodyMesh, shift: fem.Function, direction: Array) -> None:
     """Move the nodes of the geometry by `shift` along `direction`."""
     mesh = body.mesh
-    space = fem.functionspace(mesh, ("Lagrange", mesh.geometry.cmap.degree))
+    space = fem.functionspace(mesh, ("Lagrange", geometry_degree(mesh)))
     of_geometry = fem.Function(space)
     of_geometry.interpolate(shift)
     x = mesh.geometry.x

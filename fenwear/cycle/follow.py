@@ -43,15 +43,16 @@ def follow(system: System, integrate: Integrate, exchange: Exchange, start: Mome
     """
     moment = start
     while True:
+        if moment is not None and system.outworn(moment.worn):  # a run may also go on from just there
+            moved = System(system.case, system.comm, moment.worn)
+            moved.prepare()
+            moment = replace(moment, temperature=_carried(moment.temperature, (system, moved), exchange))
+            system = moved
         for block in integrate(system, moment, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
             yield block
             moment = block.end
         if moment is None or not system.outworn(moment.worn):
             return
-        moved = System(system.case, system.comm, moment.worn)
-        moved.prepare()
-        moment = replace(moment, temperature=_carried(moment.temperature, (system, moved), exchange))
-        system = moved
 
 
 def _carried(state: State | None, systems: tuple[System, System], exchange: Exchange) -> State | None:

@@ -18,7 +18,7 @@ from tqdm import tqdm
 from fenwear.case import Case
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
-from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, MeshQualityError, OutputError, Problem
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.report.page import try_report
@@ -94,7 +94,10 @@ def _run(
     except (ConvergenceError, InterruptedRunError) as error:
         failure = error
     times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
-    summary = run.finish({"stop": run.stop(failure), **times, "warnings": run.warnings, "retries": run.remedies})
+    # Who interrupts a run is in a hurry: its figures can be drawn later.
+    report = system.case.output.report and not isinstance(failure, InterruptedRunError)
+    how = {"stop": run.stop(failure), **times, "warnings": run.warnings, "retries": run.remedies}
+    summary = run.finish(how, report=report)
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -240,10 +243,13 @@ class _Run:
         """Say what there is after a run that ended early, and how to go on."""
         if self.moment.half_cycle == 0:
             return f"no half-cycle was done; {self.directory} can be removed"
+        reached = f"the results up to half-cycle {self.moment.half_cycle} are in {self.directory}"
+        if isinstance(failure, MeshQualityError):
+            return f"{reached}; to get further: start anew with coarser elements at the contact, or a thicker body"
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
-        return f"the results up to half-cycle {self.moment.half_cycle} are in {self.directory}, to go on: --resume{how}"
+        return f"{reached}, to go on: --resume{how}"
 
-    def finish(self, how: dict[str, Any]) -> dict[str, Any]:
+    def finish(self, how: dict[str, Any], *, report: bool) -> dict[str, Any]:
         """Write what a run ends with, and return the summary; collective."""
         self._on_history(HistoryWriter.close)
         if self.last is None:
@@ -257,7 +263,8 @@ class _Run:
             self.extremes["growth_rate_per_s"] = growth_rate(self.system, contacts.pressure)
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
-        on_root(self.comm, lambda: try_report(self.directory, self.log))
+        if report:
+            on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 
 

@@ -19,7 +19,7 @@ import pytest
 import xarray
 
 Run = Callable[..., Any]
-SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 ENDLESS = ("run.half_cycles=10_000_000", "output.checkpoint=0.5", "output.every=10")
 
 
@@ -122,12 +122,16 @@ def check_goes_on(fenwear: Run, folder: Path) -> None:
 # ------------------------------------------------------------------------- full disks
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("kilobytes", [8, 40, 160, 500, 900, 1200, 2000])
+@pytest.mark.parametrize(
+    ("kilobytes", "ranks"),
+    [*((kilobytes, 1) for kilobytes in (8, 40, 160, 500, 900, 1200, 2000)), (40, 2), (500, 2), (2000, 2)],
+)
 def test_full_disk(fenwear: Run, small_disk: Callable[[int], Path], kilobytes: int, ranks: int) -> None:
     """However much room there is, the run ends with a message, no crash, and what is written is whole."""
     folder = small_disk(kilobytes) / "run"
-    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=40"), ranks=ranks)
+    done = fenwear(
+        "run", "example1-heat", "-o", folder, *options("run.half_cycles=40", "output.report=true"), ranks=ranks
+    )
     assert "Traceback" not in done.stderr, done.stderr
     assert "Exception ignored" not in done.stderr, done.stderr
     assert done.stderr.count("No space left on device") == 1, done.stderr

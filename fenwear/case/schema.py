@@ -487,6 +487,7 @@ class Output(_Part):
         default=None, description="half-cycles whose fields are written; by default the last one, () for none"
     )
     checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
+    report: bool = Field(default=True, description="draw figures and report.html when the run has ended")
     figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = Field(
         default=(), description="half-cycles that the figures show; by default six spread over the run"
     )

@@ -16,7 +16,7 @@ import pytest
 import xarray
 
 Run = Callable[..., Any]
-SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.steps=2")
+SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.steps=2")
 
 
 def options(*settings: str) -> list[str]:

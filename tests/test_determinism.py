@@ -58,7 +58,7 @@ def test_the_same_bits_again(run: MakeRun, name: str, ranks: int) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_other_ranks_give_the_same_numbers(run: MakeRun, name: str) -> None:
-    """1, 2 and 3 ranks to 1e-9 of each variable's largest value; gaps of what the bodies give way by, heats of friction."""
+    """1, 2 and 3 ranks to 1e-9 of each largest value; gaps of what the bodies give way by, heats of friction."""
     one, *others = (run(name, ranks, 1) for ranks in (1, 2, 3))
     measures = ("equilibrium_error", "heat_balance_error", "coupling_iterations")  # of rounding itself
     for other in others:

@@ -134,7 +134,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     elif cycles is None:
         print("  pressure within 1 % of the mean pressure: not within ten million cycles from the initial shape")
     else:
-        print(f"  pressure within 1 % of the mean pressure after {cycles:,} cycles from the initial shape")
+        print(f"  pressure within 1 % of the mean pressure after about {cycles:,} cycles from the initial shape")
 
 
 def _velocities(velocity: dict[str, float], per: str) -> str:
@@ -170,12 +170,15 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
     from fenwear.cycle import stability_number
+    from fenwear.run import position_warnings
     from fenwear.system import System
 
     loaded = _load(case, settings)
     system = System(loaded)
     number = stability_number(system)
     system.check_touching()
+    for warning in position_warnings(system):
+        log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.facing.x)} contact nodes, "
         f"{system.punch.stiffness.size[0] + system.strip.stiffness.size[0]:,} displacement degrees of freedom, "

@@ -35,6 +35,7 @@ from fenwear.results.history import (
 )
 from fenwear.system import System
 
+FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 Log = Callable[[str], None]
 Progress = Literal["bar", "lines", "none"]
 
@@ -142,6 +143,7 @@ class _Run:
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
+        self.warnings += position_warnings(system)
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
@@ -284,6 +286,18 @@ class _Signals:
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
+
+
+def position_warnings(system: System) -> list[str]:
+    """Return what is to be said of the positions of a strip that wears."""
+    spacing, motion = system.position_spacing, system.motion
+    if not system.track_deepens or spacing <= FAR_APART:
+        return []
+    wanted = int(np.ceil(motion.positions * spacing))
+    return [
+        f"the positions of the strip in a half-cycle lie {spacing:.1f} contact nodes apart: its scar will have steps; "
+        f"set motion.positions = {wanted}, or use fewer elements along the contact"
+    ]
 
 
 def _warnings(number: float) -> list[str]:

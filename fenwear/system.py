@@ -341,6 +341,12 @@ class System:
         )
 
     @property
+    def position_spacing(self) -> float:
+        """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
+        offsets = np.unique([phase.offset for phase in self.motion.phases])
+        return float(np.diff(offsets).max(initial=0.0) / np.median(np.diff(self.facing.x)))
+
+    @property
     def track_deepens(self) -> bool:
         """Whether the strip wears to and fro under the punch, so that no shape of its track stays."""
         motion = self.case.motion

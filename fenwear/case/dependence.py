@@ -63,6 +63,12 @@ def parse_expression(text: str) -> Function:
     return _build(tree.body, text, DEEPEST)
 
 
+def variables_of(text: str) -> frozenset[str]:
+    """Return which of T, p and v a valid expression depends on."""
+    tree = ast.parse(text.strip(), mode="eval")
+    return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in VARIABLES)
+
+
 def _build(node: ast.AST, text: str, depth: int) -> Function:
     if depth == 0:
         raise ValueError(f"expected at most {DEEPEST} nested operations in {text!r}")

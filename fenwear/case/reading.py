@@ -147,7 +147,8 @@ def _problems(error: Any) -> list[Problem]:  # noqa: PLR0911
             return [Problem(*line.split(": ", 1)) for line in message.splitlines()]
         case "value_error":
             return [Problem(key, message)]
-    return [Problem(key, f"expected {message[:1].lower()}{message[1:]}")]
+    got = f", got {error['input']!r}" if isinstance(error["input"], str | int | float) else ""
+    return [Problem(key, f"expected {message[:1].lower()}{message[1:]}{got}")]
 
 
 def _suggestion(location: tuple[str | int, ...]) -> str:

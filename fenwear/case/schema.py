@@ -26,7 +26,7 @@ from pydantic import (
 )
 
 from fenwear.arrays import Array
-from fenwear.case.dependence import evaluate, parse_expression
+from fenwear.case.dependence import evaluate, parse_expression, variables_of
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, Problem
 
@@ -201,6 +201,10 @@ class Dependence(_Part):
             if len(arguments) < 2 or np.any(np.diff(arguments) <= 0):
                 raise ValueError("table: expected at least two pairs [argument, value] with rising arguments")
         return self
+
+    def depends_on(self, name: str) -> bool:
+        """Return whether T, p or v is in it."""
+        return name == self.of if self.table is not None else name in variables_of(self.expression or "")
 
     def values(self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str) -> Array:
         """Return the coefficient times `factor` at T, p, v of the `state` (shape).
@@ -554,6 +558,15 @@ class Case(_Part):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
         if motion.axis == "y" and not isinstance(motion, OneWay) and (motion.positions or 1) > 1:
             problems.append("motion.positions: expected 1 for sliding out of the plane")
+        if self.heat is None:
+            given = {"contact.friction": self.contact.friction}
+            for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
+                given[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
+            problems += [
+                f"{key}: depends on the temperature T, which a case without the table heat does not know"
+                for key, value in given.items()
+                if isinstance(value, Dependence) and value.depends_on("T")
+            ]
         friction = self.contact.friction
         for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
             if law is not None and law.coefficient is None and law.archard is None and friction == 0:

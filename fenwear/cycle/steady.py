@@ -34,6 +34,7 @@ from fenwear.system import System
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 MAX_ITERATIONS, CLOSE = 60, 1e-9  # of coefficients that depend on the state; change of pressure over the mean
+ZERO = 1e-12  # of the largest: a velocity that is rounding
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
 
@@ -294,7 +295,9 @@ def _result(
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
     shape = np.where(touched, omega - _rigid_part(system, omega - system.facing.initial_gap, touched), np.nan)
-    velocity: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale / problem.lengths
+    depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale
+    depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
+    velocity = depths / problem.lengths
     middle = slice(motion.positions // 2, None, motion.positions)
     return Steady(
         motion.stroke_directions,
@@ -354,16 +357,21 @@ def _rigid_part(system: System, values: Array, where: Mask) -> Array:
 def cycles_to_reach(system: System, state: Steady, fraction: float, limit: int = 10_000_000) -> int | None:
     """Return after how many cycles from the initial shape the pressures come this near to the end.
 
-    Found by a run of cycle jumps, and so exact to the length of the jump that crosses.
+    Found by a run of cycle jumps; within the jump that crosses the distance is taken to decay exponentially.
 
     Args:
         state: The steady state.
         fraction: Of the mean pressure.
         limit: Cycles tried; None is returned beyond.
     """
-    phases = len(state.directions)
-    for block in jump(system, limit * phases, tolerance=fraction / 2, block=phases):
-        near = np.abs(block.pressure - state.pressure).max() < fraction * system.statics.mean_pressure
-        if near:
-            return int(block.half_cycle[-1]) // phases
+    phases, goal = len(state.directions), fraction * system.statics.mean_pressure
+    before: tuple[int, float] | None = None
+    for block in jump(system, limit * phases, tolerance=fraction / 10, block=phases):
+        cycles, distance = int(block.half_cycle[-1]) // phases, float(np.abs(block.pressure - state.pressure).max())
+        if distance < goal:
+            if before is None or distance == 0:
+                return cycles
+            share = np.log(before[1] / goal) / np.log(before[1] / distance)
+            return round(before[0] + share * (cycles - before[0]))
+        before = (cycles, distance)
     return None

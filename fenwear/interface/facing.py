@@ -82,7 +82,8 @@ class Facing:
                 Problem(
                     "motion",
                     f"the stroke runs off the meshed strip: moved by {offset:g} mm, strip_contact spans x = "
-                    f"{strip[0]:g} to {strip[-1]:g} mm, but punch_contact {x[0]:g} to {x[-1]:g} mm",
+                    f"{strip[0]:g} to {strip[-1]:g} mm, but punch_contact {x[0]:g} to {x[-1]:g} mm "
+                    "(lengths of a mesh are taken as mm)",
                 )
             )
         material = transfer_matrix(x, self.punch.degree, strip, self.strip.degree)
@@ -108,7 +109,10 @@ def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
         if np.diff(nodes.x[:, 0]).min() <= 0:
             _not_facing(f"{name}_contact folds back on itself along x")
     if x[0] < low - slack or x[-1] > high + slack:
-        _not_facing(f"punch_contact spans x = {x[0]:g} to {x[-1]:g} mm, strip_contact only {low:g} to {high:g} mm")
+        _not_facing(
+            f"punch_contact spans x = {x[0]:g} to {x[-1]:g} mm, strip_contact only {low:g} to {high:g} mm "
+            "(are the names of punch and strip exchanged?)"
+        )
     transfer = transfer_matrix(x, punch.degree, strip.x[:, 0], strip.degree)
     normal = transfer @ strip.normal
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -119,6 +123,8 @@ def face(punch: SurfaceNodes, strip: SurfaceNodes) -> Facing:
             f"their outward normals do not point at each other at x = {x[worst]:g} mm: they are "
             f"{np.degrees(np.arccos(np.clip(facing[worst], -1, 1))):.0f} degrees off"
         )
+    if normal[:, 1].mean() < 0:
+        _not_facing("the punch lies below the strip; expected it above, with z upwards")
     # Forces act along the common normal: a node's weight is its length seen along it.
     common = replace(
         punch,

@@ -145,17 +145,17 @@ def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
     surfaces = [("Worn shape: the punch's surface above its start, w = 0", history.x, history.wear)]
     if strip_wears:
         title = "Worn shape: the strip's surface below its start, on its material"
-        surfaces.append((title, history.x_strip, -history.wear_strip))
-    for ax, (title, x, height) in zip(axes, surfaces, strict=True):
+        surfaces.append((title, history.x_strip, history.wear_strip))
+    for ax, (title, x, depth) in zip(axes, surfaces, strict=True):
         for colour, n in shades(half_cycles):
-            ax.plot(x, 1e3 * height.sel(half_cycle=n), color=colour, label=f"{n:,}")
+            ax.plot(x, 1e3 * depth.sel(half_cycle=n), color=colour, label=f"{n:,}")
         ax.set_title(title, loc="left")
         legend_beside(ax, "after half-cycle")
     axes[0].set_ylabel("worn depth w (µm)")
     axes[0].set_ylim(bottom=0)
     if strip_wears:
-        axes[1].set_ylabel("- worn depth (µm)")
-        axes[1].set_ylim(top=0)
+        axes[1].set_ylabel("worn depth, downwards (µm)")
+        axes[1].set_ylim(top=0, bottom=1.05e3 * max(float(history.wear_strip.max()), 1e-12))
         left, right = _worn_range(history)
         axes[1].set_xlim(left, right)
     contact_axis(axes[-1])

@@ -140,7 +140,7 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
             values = np.concatenate([data[f"{b}_{field}"].values[inside[b]] for data in datasets for b in BODIES])
             # A corner's stress has no bound: the colours leave out the largest half per cent.
             low, high = float(values.min()), float(np.quantile(values, 0.995 if field == "von_mises" else 1.0))
-            ranges[field] = (0.0 if 0 < low < high else low, high if high > low else low + 1.0)
+            ranges[field] = (0.0 if 0 < low < high / 2 else low, high if high > low else low + 1.0)
     surfaces = [data[f"{body}_contact_z"].values for data in datasets for body in BODIES]
     # Displacement that is magnified fits surfaces which lie on each other, not the gap between curved ones.
     curved = any(np.abs(surface - contact).max() > FLAT * width for surface in surfaces)

@@ -194,6 +194,7 @@ def test_surfaces_that_do_not_face(tmp_path: Path) -> None:
                 "do not point at each other",
             ),
             (tail + " Translate{0, 5, 0}{Surface{lower[], upper[]};}", "5 mm above"),
+            (tail + " Symmetry{0, 1, 0, -100}{Surface{lower[], upper[], strip[]};}", "the punch lies below the strip"),
         ]
     ):
         file = tmp_path / f"{number}.geo"

@@ -10,6 +10,7 @@ import pytest
 
 from fenwear import CaseError, ConvergenceError, System, jump, march, steady
 from fenwear.cycle import growth_rate
+from fenwear.run import position_warnings
 
 COARSE = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
 MOVING = (*COARSE, "geometry.parameters.overlap=3", "motion.positions=5")
@@ -240,10 +241,24 @@ def test_surfaces_that_never_meet(assemble: Callable[..., System]) -> None:
     [
         ("motion.amplitude=8", r"motion: the stroke runs off the meshed strip: moved by .* strip_contact spans"),
         ("contact.friction={expression='0.3 - p'}", r"contact.friction: expected zero or more, got .* at T = 0, p = 1"),
-        ("wear.strip={coefficient={expression='log(T)'}}", "wear.strip.coefficient: expected zero or more, got -inf"),
+        ("wear.strip={coefficient={expression='log(p - p)'}}", "wear.strip.coefficient: expected zero or more, got -i"),
+        ("wear.strip={coefficient={expression='T'}}", "wear.strip.coefficient: depends on the temperature T, which"),
+        ("contact.friction={table=[[0, 0.1], [1, 0.2]]}", "contact.friction: depends on the temperature T, which"),
     ],
 )
 def test_bad_input(assemble: Callable[..., System], setting: str, message: str) -> None:
     """A stroke off the mesh and coefficients without a meaning are named by their keys."""
     with pytest.raises(CaseError, match=message):
         list(march(assemble("example1", *MOVING, setting), 1))
+
+
+def test_positions_far_apart_are_warned_about(assemble: Callable[..., System]) -> None:
+    """Neighbouring positions more than two contact nodes apart leave steps in the strip's scar; the number is named."""
+    settings = (*COARSE, "geometry.parameters.overlap=12", "wear.strip.coefficient=2e-8", "motion.amplitude=10")
+    few, many = (assemble("example1", *settings, f"motion.positions={n}") for n in (3, 25))
+    (warning,) = position_warnings(few)
+    assert "motion.positions = " in warning
+    named = int(warning.partition("motion.positions = ")[2].split(",")[0])
+    assert not position_warnings(assemble("example1", *settings, f"motion.positions={named}"))
+    assert not position_warnings(many)
+    assert not position_warnings(assemble("example1", *COARSE))

@@ -53,7 +53,7 @@ BASES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "monotonic-lz20": ("monotonic-lz20", TINY, ""),
     "fretting": ("fretting", (*TINY, "motion.positions=3"), ""),
     "laws": ("example1-heat", (*WITH_HEAT, *OVERLAP), LAWS),
-    "implicit laws": ("example1", (*TINY, *OVERLAP, "run.integration=implicit"), LAWS),
+    "implicit laws": ("example2-heat", (*WITH_HEAT, *OVERLAP, "run.integration=implicit"), LAWS),
     "exponents": ("fretting", (*TINY, "motion.positions=3"), EXPONENTS),
     "hardness": ("rounded-punch", (*ROUNDED, "geometry.parameters.overlap=2"), HARDNESS),
     "strokes": ("fretting", (*TINY, "punch.loads.0.over_cycle=[[0, 0.5], [0.4, 1.5], [1, 0.5]]"), STROKES),

@@ -82,7 +82,7 @@ def test_coefficients_of_archard_energy_and_beta() -> None:
         'coefficient = {table = [[200, 0], [400, 2e-8]], of = "T"}': 1e-8,
     }
     for text, expected in settings.items():
-        law = load_case("example1", (f"wear.punch={{{text}}}",)).wear.punch
+        law = load_case("example1-heat", (f"wear.punch={{{text}}}",)).wear.punch
         assert isinstance(law, WearLaw)
         found = coefficient(law, friction, state, "wear.punch")
         np.testing.assert_allclose(found, np.broadcast_to(expected, 2), rtol=1e-12)

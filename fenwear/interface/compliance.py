@@ -51,11 +51,17 @@ class Interface:
         return self.rigid.pair
 
 
-def join(rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody) -> Interface:
-    """Join two condensed bodies at the place of a pair."""
+def join(rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, *, strip_moves: bool) -> Interface:
+    """Join two condensed bodies at the place of a pair.
+
+    Args:
+        rigid: The equilibrium there.
+        punch: Condensed onto its pressure nodes.
+        strip: Condensed onto its trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        strip_moves: Which of the two.
+    """
     pair = rigid.pair
-    # Where the strip was condensed onto the punch's own nodes there is nothing to take over.
-    reading = None if strip.patterns.shape[1] == len(pair.weights) else pair.transfer
+    reading = pair.transfer if strip_moves else None
     on_strip = strip.normal_response(pair.normal_on_strip, reading)
     turned = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
     by_load = strip.by_load if reading is None else reading @ strip.by_load

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.errors import CaseError, Problem
-from fenwear.interface.overlap import ChartedSurface, uncovered
+from fenwear.interface.overlap import ChartedSurface, Overlap, overlap
 from fenwear.interface.placement import HERE, Placement
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
@@ -86,8 +86,9 @@ def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HE
         for surface in (punch, strip):
             if _folds(surface, axis):
                 _not_facing(f"{surface.body}_contact folds back on itself seen along {'xyz'[axis]}")
-    _check_covered(first, second, placement)
-    transfer = dual_transfer(first, second)
+    common = overlap(first, second)
+    _check_covered(common, first, second, placement)
+    transfer = dual_transfer(first, second, common)
     normal = wear_transfer(first, second) @ strip_outward if strip.cell == "triangle" else transfer @ strip_outward
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
@@ -111,7 +112,7 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     axis = _chart_axis(middle.strip)
     first = _charted(middle.punch, middle.punch.trace, axis)
     second = _charted(middle.strip, placement.points(middle.strip.trace), axis)
-    _check_covered(first, second, placement)
+    _check_covered(overlap(first, second), first, second, placement)
     return replace(middle, placement=placement, material=wear_transfer(first, second))
 
 
@@ -142,9 +143,9 @@ def _folds(surface: ContactSurface, axis: int) -> bool:
     return bool((along * np.sign(surface.weights @ along) <= 0).any())
 
 
-def _check_covered(first: ChartedSurface, second: ChartedSurface, placement: Placement) -> None:
+def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurface, placement: Placement) -> None:
     """Raise where a part of the punch's surface has nothing of the strip's below it."""
-    if not uncovered(first, second).any():
+    if common.covered.all():
         return
     spans = [
         " and ".join(f"{low:g} to {high:g}" for low, high in zip(c.s.min(axis=0), c.s.max(axis=0), strict=True))

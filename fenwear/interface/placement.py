@@ -42,6 +42,11 @@ class Placement:
     turn: Vector = ZERO
     centre: Vector = ZERO
 
+    def __str__(self) -> str:
+        """Say where the body is."""
+        shift, turn = (next((c for c in v if c), 0.0) for v in (self.shift, self.turn))
+        return f"turned by {turn:g} rad" if turn else f"moved by {shift:g} mm"
+
     def points(self, x: Array) -> Array:
         """Return where points (n, d) of the body are, mm."""
         if self.turn == ZERO:

@@ -123,7 +123,8 @@ class NodeAreas:
 def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     """Return quadrature points on all pairs of facets that lie over each other.
 
-    Uncovered is a facet of the first surface where more than a strip of SLACK times the surface's size is left.
+    Uncovered is a facet of the first surface where a strip wider than SLACK times the surface's size is left, or
+    more than half of it.
     """
     corners1, corners2 = first.corners, second.corners
     ring1, ring2 = corners1[:, RING[first.cell]], corners2[:, RING[second.cell]]
@@ -136,9 +137,10 @@ def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     s = (simplices[:, :1] + points @ edges).reshape(-1, flat)
     weights = (np.abs(np.linalg.det(edges))[:, None] * gauss).ravel()
     facet1, facet2 = np.repeat(facet1, len(gauss)), np.repeat(facet2, len(gauss))
-    left = np.abs(_sizes(ring1)) - np.bincount(facet1, weights, minlength=len(corners1))
+    size1 = np.abs(_sizes(ring1))
+    left = size1 - np.bincount(facet1, weights, minlength=len(corners1))
     diameter = np.linalg.norm(np.ptp(corners1, axis=1), axis=1)
-    covered_facets = left <= SLACK * first.extent * diameter ** (flat - 1)
+    covered_facets = left <= np.minimum(SLACK * first.extent * diameter ** (flat - 1), size1 / 2)
     covered = np.ones(len(first.nodes), dtype=bool)
     covered[first.pressure_facets[~covered_facets]] = False
     return Overlap(
@@ -161,7 +163,7 @@ def node_areas(surface: ChartedSurface) -> NodeAreas:
     integrals of the nodes' shape functions, on quadrilaterals if they are parallelograms.
     """
     reference = _reference_parts(surface.cell, surface.pressure_degree)
-    shares, count, flat = reference.shape
+    _, count, flat = reference.shape
     corners = surface.corners
     polygons = tabulate(surface.cell, 1, reference.reshape(-1, flat)) @ corners
     polygons = polygons.reshape(-1, count, flat)
@@ -324,8 +326,8 @@ def _clip(subject: Array, clip: Array) -> tuple[Indices, Array]:
         crosses = inside != (after >= 0)
         share = height / np.where(crosses, height - after, 1.0)
         crossing = polygons + np.where(crosses, share, 0.0)[:, :, None] * (following - polygons)
-        vertices = np.stack([polygons, crossing], axis=2).reshape(len(pair), -1, 2)
-        present = np.stack([inside, crosses], axis=2).reshape(len(pair), -1)
+        vertices = np.stack([polygons, crossing], axis=2).reshape(len(pair), 2 * polygons.shape[1], 2)
+        present = np.stack([inside, crosses], axis=2).reshape(vertices.shape[:2])
         count = present.sum(axis=1)
         kept = count > 2
         pair, count = pair[kept], count[kept]

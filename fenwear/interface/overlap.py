@@ -243,8 +243,7 @@ def _pull_back(cell: str, corners: Array, facet: Indices, s: Array) -> Array:
     a, b, c = a[facet], b[facet], c[facet]
     square, linear, constant = -side * _cross(a, c), side * (_cross(r, c) - _cross(a, b)), side * _cross(r, b)
     root = np.sqrt(np.maximum(linear**2 - 4 * square * constant, 0.0))
-    below = linear <= 0  # no cancellation in either form
-    x = np.where(below, 2 * constant, -linear - root) / np.where(below, root - linear, 2 * square)
+    x = 2 * constant / (root - linear)  # root is the determinant at (x, y), root - linear twice that at (0, y)
     along = b + c * x[:, None]
     y = np.einsum("qc,qc->q", r - a * x[:, None], along) / np.einsum("qc,qc->q", along, along)
     return np.stack([x, y], axis=1)

@@ -92,21 +92,21 @@ def test_distorted_facets(cell1: str, cell2: str) -> None:
     np.testing.assert_allclose(np.bincount(common.facet1, common.weights), area, rtol=1e-12)
 
 
-def test_quadrilaterals_almost_triangles() -> None:
-    """The inverse of the bilinear map holds in quadrilaterals of any convex form."""
+def test_quadrilaterals_of_any_form() -> None:
+    """The inverse of the bilinear map holds in convex quadrilaterals, also where they are almost triangles."""
     random = np.random.default_rng(4)
     angles = np.sort(random.uniform(0, 2 * np.pi, (500, 4)), axis=1)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=2)
-    middle = ring.mean(axis=1)
+    around = surface(np.array([[[-3.0, -2.0], [3.0, -2.0], [0.0, 4.0]]]), "triangle", 1)
     for corners in ring[:, [0, 1, 3, 2]]:
         first = surface(corners[None], "quadrilateral", 1)
-        small = surface(middle[0] + 0.0 + 3 * random.uniform(-1, 1, (1, 3, 2)), "triangle", 1)
-        common = overlap(first, small)
-        if len(common.weights):
-            at = tabulate("quadrilateral", 1, common.points1) @ first.corners[0]
-            np.testing.assert_allclose(at, tabulate("triangle", 1, common.points2) @ small.corners[0], atol=1e-9)
-            assert common.points1.min() > -1e-9
-            assert common.points1.max() < 1 + 1e-9
+        common = overlap(first, around)
+        assert common.covered.all()
+        at = tabulate("quadrilateral", 1, common.points1) @ first.corners[0]
+        exact = tabulate("triangle", 1, common.points2) @ around.corners[0]
+        np.testing.assert_allclose(at, exact, atol=1e-13)
+        assert common.points1.min() > 0
+        assert common.points1.max() < 1
 
 
 @pytest.mark.parametrize("beyond", [0.3, 1e-3, 1e-7])

@@ -33,7 +33,7 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 Log = Callable[[str], None]
@@ -72,7 +72,7 @@ def run_case(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     begin = time.perf_counter()
-    system = System(case, comm)
+    system = assemble(case, comm)
     system.prepare()
     if not resume:
         system.check_touching()
@@ -85,7 +85,7 @@ def run_case(
 
 
 def _run(
-    system: System, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
+    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
@@ -115,14 +115,14 @@ def _way_on(directory: Path) -> str:
 class _Run:
     """A run in its folder: takes the blocks, keeps history and checkpoints."""
 
-    def __init__(self, system: System, directory: Path, log: Log, *, resume: bool) -> None:
+    def __init__(self, system: Tribosystem, directory: Path, log: Log, *, resume: bool) -> None:
         self.directory, self.log = directory, log
         self.comm, self.case = system.comm, system.case
         start: Moment | None = None
         if resume:
             followed = checkpoint.followed(directory, system)
             if followed is not None:
-                system = System(self.case, self.comm, followed)
+                system = assemble(self.case, self.comm, followed)
                 system.prepare()
             start = checkpoint.load(directory, system, self._exchange(system))
             if start.half_cycle >= self.case.run.half_cycles:
@@ -178,14 +178,14 @@ class _Run:
                 if interrupted:
                     raise InterruptedRunError(f"interrupted after half-cycle {self.moment.half_cycle}")
 
-    def _exchange(self, system: System) -> HeatExchange | None:
+    def _exchange(self, system: Tribosystem) -> HeatExchange | None:
         """Return the heat exchange that the run integrates."""
         return system.reduced_exchange if self.case.run.integration == "jump" else system.exchange
 
     def _blocks(self) -> Iterator[Block]:
         return follow(self.system, self._integrate, self._exchange, self.start)
 
-    def _integrate(self, system: System, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+    def _integrate(self, system: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         run = self.case.run
         shared: dict[str, Any] = {"periodic_within": run.periodic_within, "start": start, "stops": self._fields_at}
         if run.integration == "jump":
@@ -288,7 +288,7 @@ class _Signals:
             signal.signal(number, handler)
 
 
-def position_warnings(system: System) -> list[str]:
+def position_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of the positions of a strip that wears."""
     spacing, motion = system.position_spacing, system.motion
     if not system.track_deepens or spacing <= FAR_APART:

@@ -13,7 +13,7 @@ from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Block:
         end: From where the run goes on.
     """
 
-    system: System
+    system: Tribosystem
     half_cycle: NDArray[np.int64]
     direction: NDArray[np.int64]
     pressure: Array
@@ -119,7 +119,7 @@ class Block:
     @property
     def contact_width(self) -> Array:
         """Width of the nodes in contact, by their weights (k,), mm."""
-        return (self.pressure > 0) @ self.system.statics.facing.weights
+        return (self.pressure > 0) @ self.system.rigid.pair.weights
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class PhaseRecord:
 class Recorder:
     """Collects half-cycles into blocks; one append a half-cycle, one copy a block."""
 
-    system: System
+    system: Tribosystem
     size: int
     _rows: list[tuple[object, ...]] = field(default_factory=list)
     _heat: list[HalfCycleHeat] = field(default_factory=list)
@@ -164,7 +164,7 @@ class Recorder:
         """
         middle = phases[len(phases) // 2]
         state, pressure = middle.contact, middle.contact.pressure[0]
-        scale = self.system.statics.mean_pressure
+        scale = self.system.rigid.mean_pressure
         direction = self.system.motion.phases[middle.phase].direction
         change = max(
             float("nan") if p.before is None else float(np.abs(p.contact.pressure[0] - p.before).max()) / scale
@@ -183,9 +183,9 @@ class Recorder:
 
     def _balance(self, record: PhaseRecord) -> float:
         """Return the largest error of the force and moment balance relative to the load."""
-        statics = self.system.interfaces[record.phase].statics
+        statics = self.system.interfaces[record.phase].rigid
         lengths = self.system.mode_lengths
-        scale = lengths * self.system.statics.mean_pressure * statics.facing.weights.sum()
+        scale = lengths * self.system.rigid.mean_pressure * statics.pair.weights.sum()
         known = self._equilibria.get(record.phase)
         if known is None or known[0] is not record.slip:
             self._equilibria[record.phase] = known = (record.slip, statics.equilibrium(record.slip))

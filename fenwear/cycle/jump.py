@@ -26,7 +26,7 @@ from fenwear.heat.periodic import CycleHeat
 from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn, WornLayer
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 PARTS = 8  # of a cycle that does not converge as a whole
 MAX_ITERATIONS = 60  # of contact with the nodes that conduct
@@ -37,7 +37,7 @@ SolveContact = Callable[[Array, Array, ContactState], ContactState]
 
 
 def jump(
-    system: System,
+    system: Tribosystem,
     half_cycles: int,
     *,
     tolerance: float,
@@ -102,11 +102,11 @@ def jump(
 class _Stepper:
     """Implicit steps of any number of cycles."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Tribosystem) -> None:
         self.system = system
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.heat = cycle_heat(system)
-        self.slips = system.slips()
+        self.slips = system.friction_ratios()
         self.wear = system.phases_wear
 
     def beginning(self) -> Moment:
@@ -156,7 +156,7 @@ class _Stepper:
                 cycles,
                 contact,
                 lambda thermal, coupling, start: self.contact.solve(gap + thermal, start, layer, coupling),
-                self.system.statics.mean_pressure,
+                self.system.rigid.mean_pressure,
             )
             temperature = self.heat.parts(end)
         worn = moment.worn + self.wear.worn(contact.pressure).times(cycles)
@@ -176,7 +176,7 @@ class _Stepper:
         self.wear = system.wear.phases(conditions)
         if system.friction.constant:
             return
-        self.slips = system.slips(conditions)
+        self.slips = system.friction_ratios(conditions)
         if isinstance(self.contact, CondensedContact):
             self.contact.slide(self.slips)
         if self.heat is not None:
@@ -227,7 +227,7 @@ class _Stepper:
         return heats
 
 
-def cycle_heat(system: System) -> CycleHeat | None:
+def cycle_heat(system: Tribosystem) -> CycleHeat | None:
     """Return the heat of whole cycles; None without heat."""
     exchange = system.reduced_exchange
     return None if exchange is None else CycleHeat(exchange)
@@ -264,17 +264,17 @@ def solve_with_heat(
     )
 
 
-def _difference(system: System, one: Moment, other: Moment) -> float:
+def _difference(system: Tribosystem, one: Moment, other: Moment) -> float:
     """Return the root mean square of the pressures' difference over what is in contact, over the mean pressure there.
 
     Not the largest: that is the whole pressure of the one node which is in contact here and not there.
     """
-    weights, largest = system.facing.weights, 0.0
+    weights, largest = system.pair.weights, 0.0
     for a, b in zip(one.contacts, other.contacts, strict=True):
         first, second = _present(a).pressure[0], _present(b).pressure[0]
         width = float(weights @ (np.maximum(first, second) > 0))
         largest = max(largest, float(weights @ (first - second) ** 2) * width)
-    return float(np.sqrt(largest) / (system.statics.mean_pressure * weights.sum()))
+    return float(np.sqrt(largest) / (system.rigid.mean_pressure * weights.sum()))
 
 
 def _present(contact: ContactState | None) -> ContactState:

@@ -10,13 +10,13 @@ from fenwear.cycle.moment import Moment, beginning
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
 from fenwear.errors import ConvergenceError
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 BLOCK = 200
 
 
 def march(
-    system: System,
+    system: Tribosystem,
     half_cycles: int,
     *,
     implicit: bool = False,

@@ -13,7 +13,7 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 MAX_ITERATIONS = 60  # of coefficients and the pressure they depend on
 CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
@@ -38,7 +38,7 @@ class PhaseStep:
         implicit: Whether the pressure is that on the shape at the end of the phase.
     """
 
-    def __init__(self, system: System, phase: int, *, implicit: bool) -> None:
+    def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
         self.system, self.phase, self.implicit = system, phase, implicit
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
@@ -74,7 +74,7 @@ class PhaseStep:
             start, found = contact, contact.pressure[0]
             change = np.inf if pressure is None else np.abs(found - pressure).max()
             pressure = found if pressure is None else (pressure + found) / 2  # a coefficient of p would go to and fro
-            if change < CLOSE * self.system.statics.mean_pressure:
+            if change < CLOSE * self.system.rigid.mean_pressure:
                 return self._end(contact, after, heat, before, wear)
         raise ConvergenceError(
             f"the coefficients of friction and wear and the pressure they depend on did not come together in "

@@ -8,12 +8,12 @@ from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.jump import cycle_heat
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 
 
-def stability_number(system: System) -> float:
+def stability_number(system: Tribosystem) -> float:
     """Return the wear step over its explicit limit: above 1 an explicit run oscillates and diverges; collective.
 
     On closed contact a worn depth lowers the pressure by P = (I - H-part) S^-1, the leading block of
@@ -21,7 +21,7 @@ def stability_number(system: System) -> float:
     I - K P with K = beta~ S b p^(b-1) of both bodies at the mean pressure, in the phase that wears most:
     stable while K times the largest eigenvalue of P is below 2.
     """
-    statics = system.statics
+    statics = system.rigid
     n, r = statics.rigid_normal.shape
     uniform = np.full((len(system.motion.phases), n), statics.mean_pressure)
     wear = system.phases_wear
@@ -29,7 +29,7 @@ def stability_number(system: System) -> float:
     scale = system.interface.elastic_length
     largest = 0.0
     for d in sorted(set(system.motion.directions)):
-        slip = system.slip(d)
+        slip = system.friction_ratio(d)
         matrix = np.zeros((n + r, n + r))
         matrix[:n, :n] = system.interface.compliance(slip) / scale
         matrix[:n, n:] = statics.rigid_normal
@@ -46,7 +46,7 @@ def stability_number(system: System) -> float:
     return float(slopes.max()) * largest / 2
 
 
-def growth_rate(system: System, pressure: Array) -> float:
+def growth_rate(system: Tribosystem, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
@@ -64,7 +64,7 @@ def growth_rate(system: System, pressure: Array) -> float:
     dim = 0 if heat is None else heat.gap_rows.shape[1]
     maps = None if heat is None else heat.maps(heat.conductances(pressure))
     left, right = system.phases_wear.border(pressure)
-    slips = system.slips()
+    slips = system.friction_ratios()
     cycle = np.eye(dim + n)
     for phase, interface in enumerate(system.interfaces):
         change = np.zeros((dim + n, dim + n))  # of temperature and depth over the phase
@@ -89,9 +89,9 @@ def growth_rate(system: System, pressure: Array) -> float:
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
 
 
-def _restricted_stiffness(system: System, slip: Array, compliance: Array, closed: Mask) -> Array:
+def _restricted_stiffness(system: Tribosystem, slip: Array, compliance: Array, closed: Mask) -> Array:
     """Return minus the pressure (n, n) that each unit of gap makes where `closed` nodes stay closed."""
-    statics = system.statics
+    statics = system.rigid
     nodes = np.flatnonzero(closed)
     k, r = len(nodes), statics.rigid_normal.shape[1]
     scale = system.interface.elastic_length
@@ -104,7 +104,7 @@ def _restricted_stiffness(system: System, slip: Array, compliance: Array, closed
     return stiffness
 
 
-def critical_speed(system: System, direction: int) -> float:
+def critical_speed(system: Tribosystem, direction: int) -> float:
     """Return the sliding speed above which full contact is thermo-elastically unstable, mm/s; collective.
 
     Of disturbances that grow without moving along the contact, and without wear: there the steady
@@ -119,15 +119,15 @@ def critical_speed(system: System, direction: int) -> float:
     Raises:
         CaseError: the case has no heat, or a body no heat sink.
     """
-    n = len(system.facing.weights)
+    n = len(system.pair.weights)
     everywhere = np.ones(n, dtype=bool)
-    slip = system.slip(direction)
+    slip = system.friction_ratio(direction)
     compliance = system.interface.compliance(slip)
     stiffness = _restricted_stiffness(system, slip, compliance, everywhere)
     speed = system.motion.mean_speed
     for _ in range(50):  # the strip's temperature depends on its speed
-        exchange = system.steady_exchange([direction * speed])
-        uniform = np.full(n, system.statics.mean_pressure)
+        exchange = steady_exchange(system, [direction * speed])
+        uniform = np.full(n, system.rigid.mean_pressure)
         states, _terms = exchange.response(0, exchange.conductance(uniform))
         thermal = exchange.gap_change(states) / speed
         values = np.linalg.eigvals(-stiffness @ thermal)

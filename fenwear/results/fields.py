@@ -28,7 +28,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
+from fenwear.assembly import Tribosystem, assemble
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
@@ -55,7 +55,7 @@ class BodyFields:
 
 
 def body_fields(
-    system: System, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
+    system: Tribosystem, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
 ) -> tuple[BodyFields, BodyFields]:
     """Return the fields of the punch and the strip; collective.
 
@@ -66,13 +66,13 @@ def body_fields(
         phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
     """
-    facing, (slip, cross) = system.facings[phase], _tractions(system, phase, pressure, temperatures)
+    facing, (slip, cross) = system.pairs[phase], _tractions(system, phase, pressure, temperatures)
     normal = facing.weights * pressure
     nodal = np.array([normal, normal * slip, normal * cross])
     loads = (nodal, -nodal @ facing.transfer)
-    count = len(system.punch.rigid_modes)
+    count = len(system.bodies.punch.rigid_modes)
     amplitudes = (rigid[:count], rigid[count:])
-    heat_bodies = system.heat_bodies or (None, None)
+    heat_bodies = system.bodies.heat or (None, None)
     punch, strip = (
         _solve(system, elastic, nodes, load, modes, heat, None if temperatures is None else temperatures[k])
         for k, (elastic, nodes, load, modes, heat) in enumerate(
@@ -90,23 +90,23 @@ def body_fields(
 
 
 def _tractions(
-    system: System, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None
+    system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None
 ) -> tuple[Array, Array]:
     """Return the tractions on the punch along e_t and y over this pressure (n,) each; collective."""
     friction, surfaces = system.friction, None
-    if not friction.constant and temperatures is not None and system.heat_bodies is not None:
+    if not friction.constant and temperatures is not None and system.bodies.heat is not None:
         punch, strip = (
             system.comm.allreduce(body.contact_rows @ values)
-            for body, values in zip(system.heat_bodies, temperatures, strict=True)
+            for body, values in zip(system.bodies.heat, temperatures, strict=True)
         )
-        surfaces = (punch, system.facing.transfer @ strip)
+        surfaces = (punch, system.pair.transfer @ strip)
     mu = friction.values(system.conditions(phase, pressure, surfaces))
     direction = system.motion.phases[phase].direction
     return friction.slip(direction, mu), friction.cross(direction, mu)
 
 
 def _solve(
-    system: System,
+    system: Tribosystem,
     elastic: ElasticBody,
     nodes: SurfaceNodes,
     load: Array,
@@ -144,13 +144,13 @@ def _solve(
     return BodyFields(displacement, out_of_plane, von_mises, theta, flux)
 
 
-def _von_mises(system: System, elastic: ElasticBody, displacement: Any, out_of_plane: Any, theta: Any) -> Any:
+def _von_mises(system: Tribosystem, elastic: ElasticBody, displacement: Any, out_of_plane: Any, theta: Any) -> Any:
     """Return sqrt(3/2 s : s) with the stress out of plane: zero in plane stress, in plane strain from eps_yy = 0."""
     sigma = stress(displacement, *elastic.lame)
     plane_stress = system.case.model.plane == "stress"
     thermal: Any = 0.0
-    if theta is not None and system.case.heat is not None:
-        thermal = elastic.thermal_modulus(system.case.materials) * (theta - system.case.heat.initial)
+    if theta is not None and system.heat is not None:
+        thermal = elastic.thermal_modulus(system.case.materials) * (theta - system.heat.initial)
         sigma = sigma - thermal * ufl.Identity(2)
     out = 0.0 if plane_stress else elastic.lame[0] * ufl.tr(strain(displacement)) - thermal
     xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
@@ -185,7 +185,7 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
 
 def write_fields(
     directory: Path,
-    system: System,
+    system: Tribosystem,
     half_cycle: int,
     fields: tuple[BodyFields, BodyFields],
     direction: int,
@@ -206,11 +206,11 @@ def write_fields(
     """
     comm = system.comm
     folder = directory / FOLDER
-    nodes = sum(body.space.dofmap.index_map.size_global for body in (system.punch, system.strip))
+    nodes = sum(body.space.dofmap.index_map.size_global for body in (system.bodies.punch, system.bodies.strip))
     on_root(comm, lambda: _make_folder(folder, BYTES_PER_NODE * nodes + BYTES_PER_RANK * comm.size))
     stem = f"half_cycle_{half_cycle:06d}"
     data: dict[str, Any] = {}
-    for elastic, body in zip((system.punch, system.strip), fields, strict=True):
+    for elastic, body in zip((system.bodies.punch, system.bodies.strip), fields, strict=True):
         name = elastic.body.name
         given = (body.displacement, body.out_of_plane, body.von_mises, body.temperature, body.heat_flux)
         functions = [f for f in given if f is not None]
@@ -222,10 +222,10 @@ def write_fields(
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
 
 
-def _contact_surfaces(system: System, worn: Worn) -> dict[str, Any]:
+def _contact_surfaces(system: Tribosystem, worn: Worn) -> dict[str, Any]:
     """Return where the contact nodes of both bodies are, and what is worn there that the meshes do not follow."""
-    rest = worn if system.moved is None else worn - system.moved
-    facing = system.facing
+    rest = worn if system.bodies.moved is None else worn - system.bodies.moved
+    facing = system.pair
     data: dict[str, Any] = {}
     for name, nodes, depth in (("punch", facing.punch, rest.punch), ("strip", facing.strip, rest.strip)):
         at = f"{name}_contact"

@@ -11,7 +11,7 @@ import ufl
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fenwear import System, load_case
+from fenwear import Tribosystem, assemble, load_case
 from fenwear.bodies import elasticity
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.surface import condense, surface_nodes
@@ -38,9 +38,9 @@ def solve_directly(body: ElasticBody, traction: Callable[[ufl.SpatialCoordinate]
 
 @pytest.mark.parametrize("name", ["punch", "strip"])
 @pytest.mark.mpi
-def test_compliance_is_symmetric_and_positive(assemble: Callable[..., System], name: str) -> None:
+def test_compliance_is_symmetric_and_positive(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Maxwell and Betti, and the work of any pressure is positive."""
-    body = getattr(assemble("example1", *SMALL), name)
+    body = getattr(assembled("example1", *SMALL), name)
     matrix = condense(body, surface_nodes(body)).normal_by_normal
     np.testing.assert_array_equal(matrix, matrix.T)
     assert np.linalg.eigvalsh(matrix).min() > 1e-6 * np.abs(matrix).max()
@@ -49,12 +49,12 @@ def test_compliance_is_symmetric_and_positive(assemble: Callable[..., System], n
 @pytest.mark.parametrize("kind", ["normal", "tangential"])
 @pytest.mark.parametrize("name", ["punch", "strip"])
 @pytest.mark.mpi
-def test_compliance_equals_a_direct_solve(assemble: Callable[..., System], name: str, kind: str) -> None:
+def test_compliance_equals_a_direct_solve(assembled: Callable[..., Tribosystem], name: str, kind: str) -> None:
     """D_nn W p and D_nt W p are the normal displacement under that traction, integrated consistently and solved by CG.
 
     Lumping at Gauss-Lobatto nodes is exact for p of degree k - 1 (here 3).
     """
-    body = getattr(assemble("example1", *SMALL), name)
+    body = getattr(assembled("example1", *SMALL), name)
     surface = condense(body, nodes := surface_nodes(body))
 
     def p(x):  # type: ignore[no-untyped-def]
@@ -76,9 +76,9 @@ def test_compliance_equals_a_direct_solve(assemble: Callable[..., System], name:
 
 @pytest.mark.parametrize("degree", range(1, 9))
 @pytest.mark.mpi
-def test_weights_integrate_polynomials(assemble: Callable[..., System], degree: int) -> None:
+def test_weights_integrate_polynomials(assembled: Callable[..., Tribosystem], degree: int) -> None:
     """Gauss-Lobatto with degree + 1 nodes: exact up to degree 2 k - 1, positive; the interval is [-30, 30]."""
-    nodes = surface_nodes(assemble("example1", *SMALL, f"geometry.degree={degree}").punch)
+    nodes = surface_nodes(assembled("example1", *SMALL, f"geometry.degree={degree}").punch)
     assert (nodes.weights > 0).all()
     xi = nodes.x[:, 0] / 30
     for power in range(2 * degree):
@@ -104,9 +104,9 @@ def test_further_supports_carry_nothing(name: str, monkeypatch: pytest.MonkeyPat
     """The supports that make K regular are arbitrary: others give the same pressure and the same gap."""
 
     def solve() -> tuple[set[int], NDArray[np.float64], NDArray[np.float64]]:
-        system = System(load_case(name, [*SMALL, "contact.friction=0.4", "geometry.parameters.pin_height_1=40"]))
-        state = system.contact((1,)).solve(system.facing.initial_gap + 1e-4 * np.cos(system.facing.x))
-        return set(system.punch.supported.tolist()), state.pressure, state.gap
+        system = assemble(load_case(name, [*SMALL, "contact.friction=0.4", "geometry.parameters.pin_height_1=40"]))
+        state = system.contact((1,)).solve(system.pair.initial_gap + 1e-4 * np.cos(system.pair.x))
+        return set(system.bodies.punch.supported.tolist()), state.pressure, state.gap
 
     best_rows = elasticity._best_rows
     supported, pressure, gap = solve()

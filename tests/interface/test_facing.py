@@ -7,29 +7,29 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import System
+from fenwear import Tribosystem, assemble
 
 
-def test_transfer_between_unmatched_nodes(unmatched: System) -> None:
+def test_transfer_between_unmatched_nodes(unmatched: Tribosystem) -> None:
     """Taking values from the strip's nodes to the punch's is exact for polynomials of the elements' degree."""
-    facing = unmatched.facing
+    facing = unmatched.pair
     strip, punch = facing.strip.x[:, 0], facing.x
     assert len(strip) > len(punch)
     for power in range(facing.strip.degree + 1):
         np.testing.assert_allclose(facing.transfer @ (strip / 30) ** power, (punch / 30) ** power, atol=1e-12)
 
 
-def test_interpolate(unmatched: System) -> None:
+def test_interpolate(unmatched: Tribosystem) -> None:
     """A nodal field is a finite-element function between its nodes."""
-    facing, x = unmatched.facing, np.linspace(-30, 30, 77)
+    facing, x = unmatched.pair, np.linspace(-30, 30, 77)
     np.testing.assert_allclose(facing.interpolate(facing.x**3, x), x**3, rtol=1e-10, atol=1e-9)
 
 
 @pytest.mark.mpi
-def test_statics_of_example_1(assemble: Callable[..., System]) -> None:
+def test_statics_of_example_1(assembled: Callable[..., Tribosystem]) -> None:
     """H and H_t by hand: the gap opened and the slip made by lambda_F and lambda_M about O = (30, 120)."""
-    statics = assemble("example1").statics
-    x = statics.facing.x
+    statics = assembled("example1").rigid
+    x = statics.pair.x
     assert statics.mode_names == ("lambda_F", "lambda_M")
     np.testing.assert_allclose(statics.rigid_normal, np.stack([0 * x + 1, 30 - x], axis=1), atol=1e-10)
     np.testing.assert_allclose(statics.rigid_tangential, np.stack([0 * x, 0 * x - 20], axis=1), atol=1e-10)
@@ -38,10 +38,10 @@ def test_statics_of_example_1(assemble: Callable[..., System]) -> None:
 
 
 @pytest.mark.mpi
-def test_compliance_of_mirrored_directions(assemble: Callable[..., System]) -> None:
+def test_compliance_of_mirrored_directions(assembled: Callable[..., Tribosystem]) -> None:
     """Example 2 is its own mirror image: without the rigid part S_n is even and S_t odd under x -> -x."""
-    interface = assemble("example2").interface
-    weights = interface.statics.facing.weights
+    interface = assembled("example2").interface
+    weights = interface.rigid.pair.weights
     balanced = np.eye(len(weights)) - 1 / len(weights)  # forces without resultant, gaps without mean
     for compliance, sign in ((interface.normal_compliance, 1), (interface.tangential_compliance, -1)):
         per_force = balanced @ (compliance / weights) @ balanced

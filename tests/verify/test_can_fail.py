@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import System, system
+from fenwear import Tribosystem, assemble, system
 from fenwear.bodies import elasticity
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Model
@@ -240,11 +240,11 @@ def test_it_is_found(monkeypatch: pytest.MonkeyPatch, name: str, break_it: Calla
 def test_ranks_that_differ_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A friction that depends on the number of ranks, by a part in a million."""
 
-    def contact(self: System, directions: tuple[int, ...]) -> CondensedContact:
+    def contact(self: Tribosystem, directions: tuple[int, ...]) -> CondensedContact:
         return CondensedContact(
-            [Sliding(self.interface, self.slip(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
+            [SlidingContact(self.interface, self.slip(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
         )
 
-    monkeypatch.setattr(System, "contact", contact)
+    monkeypatch.setattr(Tribosystem, "contact", contact)
     (outcome,) = run_cases(registered(["ranks"]))
     assert outcome.verdict == "differs"

@@ -40,7 +40,6 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 
 # %%
 system = assemble(load_case("example1", settings))
-system.prepare()
 state = steady(system)
 
 x, mean = system.pair.x, system.rigid.mean_pressure

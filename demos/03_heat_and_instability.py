@@ -46,7 +46,6 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 
 # %%
 system = assemble(load_case("example1-heat", settings))
-system.prepare()
 x, mean = system.pair.x, system.rigid.mean_pressure
 speed = system.motion.mean_speed
 print(f"mean sliding speed {speed:.2f} mm/s, mean pressure {mean:.2f} MPa")

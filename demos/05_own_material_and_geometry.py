@@ -197,7 +197,6 @@ except CaseError as error:
 
 # %%
 system = assemble(case)
-system.prepare()
 colours = {"punch_lining": "#E69F00", "punch_back": "#56B4E9", "strip_rail": "0.8"}
 figure, ax = plt.subplots(figsize=(7.5, 3.4), layout="constrained")
 for body in (system.bodies.punch.body, system.bodies.strip.body):

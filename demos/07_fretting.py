@@ -42,7 +42,6 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 # %%
 settings = [f"geometry.parameters.elements_along_contact={ELEMENTS}"]
 system = assemble(load_case("fretting", settings))
-system.prepare()
 
 load, radius, modulus = 18.5, 6.0, 200e3 / (2 * (1 - 0.3**2))  # N/mm, mm, MPa
 a = np.sqrt(4 * load * radius / (np.pi * modulus))

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from mpi4py import MPI
@@ -52,6 +53,7 @@ from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
+Preparation = Literal["as set", "reduced", "none"]  # of the heat
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
 
 # ------------------------------------------------------------------------------ the bodies
@@ -78,6 +80,11 @@ class Bodies:
     def comm(self) -> MPI.Comm:
         """The ranks."""
         return self.punch.body.mesh.comm
+
+    @property
+    def unknowns(self) -> int:
+        """Number of degrees of freedom of both displacements."""
+        return self.punch.stiffness.size[0] + self.strip.stiffness.size[0]
 
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""
@@ -186,7 +193,7 @@ class Placed:
         sliding: Motion, friction and wear.
         heat: Settings of the heat between the bodies; None without.
         solver: Of the contact: "condensed", or "full" for the reference on both bodies' meshes.
-        case: What it was made from; None where it was made in Python.
+        made_from: The case; None where it was made in Python.
         loaded: The bodies under the loads of each phase.
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
         rigid: The same in the middle position under the mean loads.
@@ -197,7 +204,7 @@ class Placed:
     sliding: Sliding
     heat: Heat | None
     solver: str
-    case: Case | None
+    made_from: Case | None
     loaded: tuple[Bodies, ...]
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
@@ -207,6 +214,17 @@ class Placed:
     def comm(self) -> MPI.Comm:
         """The ranks."""
         return self.bodies.comm
+
+    @property
+    def case(self) -> Case:
+        """The case that it was made from.
+
+        Raises:
+            CaseError: it was made in Python, without one.
+        """
+        if self.made_from is None:
+            raise CaseError(Problem("", "expected bodies made from a case: those made in Python have none"))
+        return self.made_from
 
     @property
     def motion(self) -> Motion:
@@ -279,9 +297,10 @@ class Placed:
 
     def outworn(self, worn: Worn) -> bool:
         """Return whether the wear since the meshes were moved is large against the elements at the contact."""
-        if self.case is None or self.case.geometry.follow_wear is None:
+        limit = None if self.made_from is None else self.made_from.geometry.follow_wear
+        if limit is None:
             return False
-        limit, followed = self.case.geometry.follow_wear, self.bodies.followed
+        followed = self.bodies.followed
         rest = worn if followed is None else worn - followed
         heights = self.element_heights
         return bool(
@@ -312,17 +331,19 @@ class Placed:
             (initial, initial) if temperatures is None else temperatures,
         )
 
-    def friction_ratio(self, direction: int, pair: ContactPair | None = None, mu: Array | None = None) -> Array:
-        """Return tau (n, d), the traction of friction on the punch over the pressure.
+    def friction_ratio(self, direction: int) -> Array:
+        """Return tau (n, d) in the middle position at the mean pressure.
 
         Args:
             direction: d, the sign of the sliding.
-            pair: The surfaces; by default in the middle position.
-            mu: (n,); by default at the mean pressure.
         """
-        pair = pair or self.pair
-        mu = self.friction.values(self.conditions(0)) if mu is None else mu
-        return in_model(self.friction.ratio(direction, mu, pair), pair.punch.dim)
+        mu = self.friction.values(self.conditions(0))
+        return in_model(self.friction.ratio(direction, mu, self.pair), self.pair.punch.dim)
+
+    def phase_friction(self, phase: int, mu: Array) -> Array:
+        """Return tau of a phase (n, d), the traction of friction on the punch over the pressure, for mu (n,)."""
+        pair = self.pairs[phase]
+        return in_model(self.friction.ratio(self.motion.phases[phase].direction, mu, pair), pair.punch.dim)
 
     def friction_ratios(self, conditions: Sequence[ContactConditions] | None = None) -> list[Array]:
         """Return tau of each phase (n, d), the traction of friction on the punch over the pressure.
@@ -333,12 +354,8 @@ class Placed:
         Raises:
             CaseError: the friction coefficient is negative or not finite there.
         """
-        phases = self.motion.phases
-        states = [self.conditions(k) for k in range(len(phases))] if conditions is None else conditions
-        return [
-            self.friction_ratio(phase.direction, pair, self.friction.values(state))
-            for phase, pair, state in zip(phases, self.pairs, states, strict=True)
-        ]
+        states = [self.conditions(k) for k in range(len(self.pairs))] if conditions is None else conditions
+        return [self.phase_friction(k, self.friction.values(state)) for k, state in enumerate(states)]
 
     @cached_property
     def phases_wear(self) -> PhasesWear:
@@ -411,7 +428,7 @@ def place(
         sliding=sliding,
         heat=heat,
         solver=solver,
-        case=case,
+        made_from=case,
         loaded=loaded,
         rigids=tuple(rigids),
         rigid=rigid,
@@ -519,7 +536,7 @@ class Tribosystem(Placed):
         Raises:
             CaseError: an override does not fit, or the punch would tip over.
         """
-        return vary(self, changed_case(_case(self), *settings))
+        return vary(self, changed_case(self.case, *settings))
 
 
 def elastic(placed: Placed) -> Tribosystem:
@@ -601,9 +618,16 @@ def with_exchange(system: Tribosystem, *, reduced: bool | None = None) -> Tribos
 
 def with_reduced_heat(system: Tribosystem) -> Tribosystem:
     """Return the system with its heat on a small basis, whatever the settings say; collective."""
-    if system.exchange is not None and system.exchange.reduced:
+    if system.heat is None or (system.exchange is not None and system.exchange.reduced):
         return system
     return with_exchange(system, reduced=True)
+
+
+def preparation(system: Tribosystem) -> Preparation:
+    """Return how the heat of a system was prepared."""
+    if system.exchange is None:
+        return "none"
+    return "reduced" if system.exchange.reduced else "as set"
 
 
 def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExchange:
@@ -648,7 +672,7 @@ def heating_friction(system: Placed, mu: Array | None = None) -> Array:
 
 
 def assemble(
-    case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None, *, exchange: bool = True
+    case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None, *, heat: Preparation = "as set"
 ) -> Tribosystem:
     """Return the system of a case: all steps; collective.
 
@@ -656,14 +680,17 @@ def assemble(
         case: The problem.
         comm: The ranks.
         followed: Worn depths that the meshes follow; by default they are as they were made.
-        exchange: Whether the heat of the motion is prepared, which takes longest.
+        heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
+            small basis as whole cycles need it, or not at all.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
     system = elastic(place_case(case, comm, followed))
-    return with_exchange(system) if exchange else system
+    if heat == "none":
+        return system
+    return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)
 
 
 def place_case(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None) -> Placed:
@@ -696,9 +723,9 @@ def vary(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
     Raises:
         CaseError: the punch would tip over.
     """
-    before = _case(system)
+    before = system.case
     if not _same_bodies(before, case):
-        return assemble(case, system.comm, system.bodies.followed, exchange=system.exchange is not None)
+        return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
     bodies, condensed = system.bodies, system.condensed
     if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
         bodies = bodies.under(case)
@@ -713,20 +740,14 @@ def vary(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
     if system.exchange is None or case.heat is None:
         return _joined(placed, condensed)
     if not conducts_alike or placed.motion != system.motion:
-        return with_exchange(_joined(placed, condensed))
+        return with_exchange(_joined(placed, condensed), reduced=system.exchange.reduced)
     friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
     return _joined(placed, condensed, system.exchange.varied(case.heat, friction))
 
 
 def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     """Return the system with each phase of the motion cut into parts of equal time; collective."""
-    return vary(system, _case(system), parts)
-
-
-def _case(system: Placed) -> Case:
-    if system.case is None:
-        raise CaseError(Problem("", "expected a system made from a case: one made in Python is assembled anew"))
-    return system.case
+    return vary(system, system.case, parts)
 
 
 def _same_bodies(one: Case, other: Case) -> bool:

@@ -90,12 +90,11 @@ def run(
 @app.command("steady")
 def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
     """Solve for the cyclic steady state directly."""
+    from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
-    from fenwear.assembly import Tribosystem, assemble
 
-    system = assemble(_load(case, settings))
     begin = time.perf_counter()
-    system.prepare()  # here, so that the two times are told apart
+    system = assemble(_load(case, settings), heat="reduced")
     setup = time.perf_counter() - begin
     state = steady(system)
     rate = growth_rate(system, state.phase_pressure)
@@ -146,9 +145,9 @@ def _velocities(velocity: dict[str, float], per: str) -> str:
 @app.command("optimum")
 def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
     """Print lambda_F, lambda_M, the optimal pressure and the angle chi of the wear velocity in both directions."""
-    from fenwear.assembly import Tribosystem, assemble
+    from fenwear.assembly import place_case
 
-    system = assemble(_load(case, settings))
+    system = place_case(_load(case, settings))
     found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
     if as_json:
         x = system.pair.x.tolist()
@@ -169,19 +168,19 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
+    from fenwear.assembly import assemble
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
-    from fenwear.assembly import Tribosystem, assemble
 
     loaded = _load(case, settings)
-    system = assemble(loaded)
+    system = assemble(loaded, heat="none")
     number = stability_number(system)
     system.check_touching()
     for warning in position_warnings(system):
         log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
-        f"{system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0]:,} displacement degrees of freedom, "
+        f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
 
 

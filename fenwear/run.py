@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
+from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
@@ -33,7 +34,6 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
-from fenwear.assembly import Tribosystem, assemble
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 Log = Callable[[str], None]
@@ -72,8 +72,7 @@ def run_case(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     begin = time.perf_counter()
-    system = assemble(case, comm)
-    system.prepare()
+    system = assemble(case, comm, heat=preparation_of(case))
     if not resume:
         system.check_touching()
     setup = time.perf_counter() - begin
@@ -104,6 +103,11 @@ def _run(
     return summary
 
 
+def preparation_of(case: Case) -> Preparation:
+    """Return how the heat of a case's run is prepared: jumps need it reduced."""
+    return "reduced" if case.run.integration == "jump" else "as set"
+
+
 def _way_on(directory: Path) -> str:
     """Say how to go on after a fault of the disk."""
     reached = checkpoint.reached(directory)
@@ -122,8 +126,7 @@ class _Run:
         if resume:
             followed = checkpoint.followed(directory, system)
             if followed is not None:
-                system = assemble(self.case, self.comm, followed)
-                system.prepare()
+                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case))
             start = checkpoint.load(directory, system, self._exchange(system))
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
@@ -180,7 +183,7 @@ class _Run:
 
     def _exchange(self, system: Tribosystem) -> HeatExchange | None:
         """Return the heat exchange that the run integrates."""
-        return system.reduced_exchange if self.case.run.integration == "jump" else system.exchange
+        return system.exchange
 
     def _blocks(self) -> Iterator[Block]:
         return follow(self.system, self._integrate, self._exchange, self.start)

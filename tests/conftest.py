@@ -37,7 +37,7 @@ def _assembled(name: str, settings: tuple[str, ...]) -> Tribosystem:
 
 
 @pytest.fixture(scope="session")
-def assemble() -> Iterator[Callable[..., Tribosystem]]:
+def assembled() -> Iterator[Callable[..., Tribosystem]]:
     """Return assembled(name, *settings): the system of a built-in case, made once a session."""
     yield lambda name, *settings: _assembled(name, settings)
     _assembled.cache_clear()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fenwear as package
-from fenwear import Tribosystem, assemble, steady
+from fenwear import Tribosystem, steady
 from fenwear.case import builtin_cases
 
 Run = Callable[..., Any]

@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, load_case, march, steady
+from fenwear import assemble, load_case, march, steady
 from fenwear.paper import (
     FULL,
     Row,

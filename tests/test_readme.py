@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, jump, load_case
+from fenwear import assemble, jump, load_case
 from fenwear.case import Case
 
 README = Path(__file__).resolve().parents[1] / "README.md"

@@ -94,7 +94,9 @@ def condense(
     # The forces of column l a: pattern l along its direction a.
     for start in range(0, q * count, BLOCK):
         columns = np.arange(start, min(start + BLOCK, q * count))
-        forces = np.einsum("Nk,kd->Ndk", patterns[:, columns // count].toarray(), along[columns // count, :, columns % count])
+        forces = np.einsum(
+            "Nk,kd->Ndk", patterns[:, columns // count].toarray(), along[columns // count, :, columns % count]
+        )
         displacement, by_temperature = _solve(elastic, forces, thermal_coupling)
         if by_temperature is not None:
             rows.append(by_temperature)
@@ -110,7 +112,7 @@ def condense(
 
 def _symmetric(response: Array, along: Array) -> Array:
     """Return the response with its part along the directions made symmetric: Maxwell and Betti, up to rounding."""
-    q, d, _, count = response.shape
+    q, _, _, count = response.shape
     part = np.einsum("kca,kclb->kalb", along, response).reshape(q * count, q * count)
     change = ((part.T - part) / 2).reshape(q, count, q, count)
     return response + np.einsum("kca,kalb->kclb", along, change)

@@ -188,9 +188,7 @@ def _facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.in
     return np.array(found, dtype=np.int32).reshape(-1, len(closures[0])), cells
 
 
-def _in_reference_order(
-    local: NDArray[np.int32], points: Array, cell: str, degree: int
-) -> NDArray[np.int64]:
+def _in_reference_order(local: NDArray[np.int32], points: Array, cell: str, degree: int) -> NDArray[np.int64]:
     """Return the order (f, k) that brings the nodes of each facet to those of the reference element.
 
     Edges that elements share may run either way in the numbering: nodes are told by their place.
@@ -237,9 +235,7 @@ def _integrals(
     return weights, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def _on_vertices(
-    name: str, trace: Array, facets: NDArray[np.int64], degree: int, inner: Array
-) -> ContactSurface:
+def _on_vertices(name: str, trace: Array, facets: NDArray[np.int64], degree: int, inner: Array) -> ContactSurface:
     """Return the surface of triangles, with the pressure on the vertices in the dual linear basis."""
     corners = facets[:, :3]
     cross = np.cross(trace[corners[:, 1]] - trace[corners[:, 0]], trace[corners[:, 2]] - trace[corners[:, 0]]) / 2

@@ -20,8 +20,8 @@ from ufl.algorithms.check_arities import ArityMismatch
 from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
-from fenwear.bodies.factor import Factor
 from fenwear.bodies.contact_surface import contact_surface
+from fenwear.bodies.factor import Factor
 from fenwear.bodies.material import ElasticLaw, Kind
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Load, Support
@@ -245,7 +245,7 @@ class ElasticBody:
         The integral of the thermal stress of theta times the strain of v. Supports take no force.
         """
         law, dim = self.law, self.dim
-        # dolfinx assembles square blocks only: blocks of temperatures, numbered as the single ones, of which one counts.
+        # dolfinx assembles square blocks only: blocks of temperatures, numbered as single ones, of which one counts.
         element = basix.ufl.blocked_element(temperature.ufl_element(), shape=(dim,))
         theta, v = ufl.TrialFunction(fem.functionspace(self.body.mesh, element))[0], ufl.TestFunction(self.space)
         work = ufl.inner(law.thermal_stress(theta), law.strain(v)) * law.measure(self.body.mesh) * ufl.dx

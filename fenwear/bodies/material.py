@@ -66,6 +66,13 @@ class ElasticLaw(Protocol):
     def thermal_stress(self, theta: Any) -> Any:
         """Return the stress that holds back the free expansion of a change of temperature, MPa; linear in theta."""
 
+    def stress_out_of_plane(self, u: Any, theta: Any) -> Any:
+        """Return sigma_yy of a plane model at a change of temperature, None for none, MPa."""
+
+    @property
+    def shear_modulus(self) -> Any:
+        """G of shear out of a plane, MPa."""
+
     def measure(self, mesh: Mesh) -> Any:
         """Return what one unit of the mesh's volume stands for: 1, or 2 pi r."""
 
@@ -97,6 +104,18 @@ class Isotropic:
         """Return gamma theta I, MPa."""
         dim = 2 if self.kind in ("stress", "strain") else 3
         return self.thermal_modulus * theta * ufl.Identity(dim)
+
+    def stress_out_of_plane(self, u: Any, theta: Any) -> Any:
+        """Return sigma_yy: zero in plane stress, in plane strain from eps_yy = 0."""
+        if self.kind == "stress":
+            return ufl.as_ufl(0.0)
+        thermal = 0.0 if theta is None else self.thermal_modulus * theta
+        return self.lame[0] * ufl.tr(strain(u)) - thermal
+
+    @property
+    def shear_modulus(self) -> Any:
+        """Lame's mu, MPa."""
+        return self.lame[1]
 
     def measure(self, mesh: Mesh) -> Any:
         """Return 2 pi r in an axisymmetric model, else 1."""

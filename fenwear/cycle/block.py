@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
 from fenwear.sliding.wear import Worn
-from fenwear.assembly import Tribosystem, assemble
 
 
 @dataclass(frozen=True)
@@ -131,14 +131,14 @@ class PhaseRecord:
         contact: Its contact.
         before: Pressure of the same phase one cycle ago (n,), MPa; None in the first cycle.
         areas: Cross-sections worn off punch and strip, mm².
-        slip: tau = d mu (n,).
+        friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
     """
 
     phase: int
     contact: ContactState
     before: Array | None
     areas: tuple[float, float]
-    slip: Array
+    friction_ratio: Array
 
 
 @dataclass
@@ -151,7 +151,7 @@ class Recorder:
     _heat: list[HalfCycleHeat] = field(default_factory=list)
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
-    _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last slip
+    _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last friction
 
     def add(self, half_cycle: int, phases: Sequence[PhaseRecord], worn: Worn, heat: HalfCycleHeat | None) -> float:
         """Record one half-cycle and return its periodicity.
@@ -183,13 +183,16 @@ class Recorder:
 
     def _balance(self, record: PhaseRecord) -> float:
         """Return the largest error of the force and moment balance relative to the load."""
-        statics = self.system.interfaces[record.phase].rigid
+        equilibrium = self.system.interfaces[record.phase].rigid
         lengths = self.system.mode_lengths
-        scale = lengths * self.system.rigid.mean_pressure * statics.pair.weights.sum()
+        scale = lengths * self.system.rigid.mean_pressure * equilibrium.pair.weights.sum()
         known = self._equilibria.get(record.phase)
-        if known is None or known[0] is not record.slip:
-            self._equilibria[record.phase] = known = (record.slip, statics.equilibrium(record.slip))
-        balance = known[1] @ record.contact.pressure[0] + statics.resultant
+        if known is None or known[0] is not record.friction_ratio:
+            self._equilibria[record.phase] = known = (
+                record.friction_ratio,
+                equilibrium.equilibrium(record.friction_ratio),
+            )
+        balance = known[1] @ record.contact.pressure[0] + equilibrium.resultant
         return float(np.abs(balance / scale).max(initial=0.0))
 
     @property

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.heat.exchange import State
 from fenwear.sliding.wear import Worn
-from fenwear.assembly import Tribosystem, assemble
 
 
 @dataclass(frozen=True)

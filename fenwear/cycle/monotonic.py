@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, steady_exchange
 from fenwear.errors import CaseError, Problem
-from fenwear.assembly import Tribosystem, assemble
 
 DIRECTIONS = (-1, 1)
 

@@ -10,6 +10,7 @@ from functools import reduce
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.moment import Moment
@@ -18,7 +19,6 @@ from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.wear import Worn
-from fenwear.assembly import Tribosystem, assemble
 
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
 
@@ -71,7 +71,7 @@ class SmallerSteps:
 
     def _prepared(self, parts: int) -> tuple[Tribosystem, list[PhaseStep]]:
         if parts not in self._steps:
-            system = self.system.in_parts(parts)
+            system = in_parts(self.system, parts)
             phases = range(len(system.motion.phases))
             self._steps[parts] = (system, [PhaseStep(system, phase, implicit=self.implicit) for phase in phases])
         return self._steps[parts]
@@ -84,7 +84,7 @@ def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, tempe
     previous = None if before is None else before.pressure[0]
     heats = [end.heat for end in ends if end.heat is not None]
     return PhaseEnd(
-        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.slip),
+        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.friction_ratio),
         temperature,
         reduce(HalfCycleHeat.then, heats) if heats else None,
         reduce(Worn.__add__, [end.worn for end in ends]),

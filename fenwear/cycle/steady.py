@@ -24,13 +24,13 @@ import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
+from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
-from fenwear.assembly import Tribosystem, assemble
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 MAX_ITERATIONS, CLOSE = 60, 1e-9  # of coefficients that depend on the state; change of pressure over the mean
@@ -88,17 +88,17 @@ class _SteadyInequality:
     """Unknown: p of each phase, omega, the rigid modes a of all phases but the first, lambda."""
 
     def __init__(self, system: Tribosystem) -> None:
-        statics, interface = system.rigid, system.interface
+        rigid, interface = system.rigid, system.interface
         self.system = system
-        m, n, r = len(system.motion.phases), len(system.pair.weights), len(statics.resultant)
+        m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
         self.m, self.n, self.r = m, n, r
         self.wear = system.phases_wear
-        self.p_scale = statics.mean_pressure
+        self.p_scale = rigid.mean_pressure
         self.gap_scale = self.p_scale * interface.elastic_length
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
         self.lengths = system.mode_lengths
-        self.moment = self.lengths[:, None] * self.p_scale * statics.pair.weights.sum()
-        shape = statics.rigid_normal / self.lengths
+        self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
+        shape = rigid.rigid_normal / self.lengths
         size = m * n + n + m * r
         self.matrix = np.zeros((size, size))
         self.offset = np.zeros(size)
@@ -126,14 +126,14 @@ class _SteadyInequality:
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
 
-    def _slide(self, slips: Sequence[Array]) -> None:
+    def _slide(self, ratios: Sequence[Array]) -> None:
         """Fill in what friction changes."""
         n, r, last = self.n, self.r, self.m * self.n + self.n
-        for k, (own, slip) in enumerate(zip(self.system.interfaces, slips, strict=True)):
+        for k, (own, friction_ratio) in enumerate(zip(self.system.interfaces, ratios, strict=True)):
             rows, balance = slice(k * n, (k + 1) * n), slice(last + k * r, last + (k + 1) * r)
-            self.matrix[rows, rows] = own.compliance(slip) * (self.p_scale / self.gap_scale)
-            self.matrix[balance, rows] = own.rigid.equilibrium(slip) * self.p_scale / self.moment
-        self.slips = list(slips)
+            self.matrix[rows, rows] = own.compliance(friction_ratio) * (self.p_scale / self.gap_scale)
+            self.matrix[balance, rows] = own.rigid.equilibrium(friction_ratio) * self.p_scale / self.moment
+        self.ratios = list(ratios)
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""
@@ -227,7 +227,7 @@ def steady(system: Tribosystem) -> Steady:
         conditions = _conditions(system, pressure, heat, temperature)
         problem.take(conditions)
         if heat is not None and not system.friction.constant:
-            mu = np.array([system.friction.values(state) for state in conditions])
+            mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
             heat = CycleHeat(heat.exchange.with_friction(mu))
         contact, heat, temperature = _solve(problem, heat)
         if np.abs(contact.pressure - pressure).max() < CLOSE * system.rigid.mean_pressure:
@@ -337,10 +337,10 @@ def _uniform_wear_exists(system: Tribosystem) -> bool:
     equality = np.zeros((n + m * r, m * n + r))
     target = np.zeros(n + m * r)
     equality[:n, m * n :] = -system.rigid.rigid_normal / lengths
-    for k, (own, slip) in enumerate(zip(system.interfaces, system.friction_ratios(), strict=True)):
+    for k, (own, friction_ratio) in enumerate(zip(system.interfaces, system.friction_ratios(), strict=True)):
         equality[:n, k * n : (k + 1) * n] = np.eye(n)
         rows = slice(n + k * r, n + (k + 1) * r)
-        equality[rows, k * n : (k + 1) * n] = own.rigid.equilibrium(slip) / lengths[:, None]
+        equality[rows, k * n : (k + 1) * n] = own.rigid.equilibrium(friction_ratio) / lengths[:, None]
         target[rows] = -own.rigid.resultant / lengths
     bounds = [(0, None)] * (m * n) + [(None, None)] * r
     return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=target, bounds=bounds).status != 2)

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactSolver, ContactState, Layer
 from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import HeatExchange, State
-from fenwear.assembly import Tribosystem, assemble
 
 MAX_ITERATIONS = 200
 SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
@@ -53,7 +53,7 @@ class ThermalContact:
         self._asked, self._repeats = b"", 0  # conductances asked for last, and how often in a row
 
     def slide(self, mu: Array) -> None:
-        """Set the friction coefficient (n,)."""
+        """Set the friction of the nodes times what they slide for a unit of the stroke (n,)."""
         friction = self.exchange.friction.copy()
         if not np.array_equal(friction[self.phase], mu):
             friction[self.phase] = mu

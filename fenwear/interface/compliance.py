@@ -28,11 +28,11 @@ class Interface:
     gap_by_force: Array
     load_gap: Array
 
-    def compliance(self, friction_ratio: Array) -> Array:
+    def compliance(self, friction_ratio: Array | float) -> Array:
         """Return S (n, n), mm/MPa: the gap from unit pressures with their friction.
 
         Args:
-            friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
+            friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; 0.0 for none.
         """
         traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
         return np.einsum("ijd,jd->ij", self.gap_by_force, traction)
@@ -40,7 +40,7 @@ class Interface:
     @cached_property
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps."""
-        elastic = self.compliance(np.zeros_like(self.pair.normal))
+        elastic = self.compliance(0.0)
         modes = self.rigid.rigid_normal
         elastic = elastic - modes @ np.linalg.lstsq(modes, elastic, rcond=None)[0]
         return float(np.abs(elastic).sum(axis=1).mean())

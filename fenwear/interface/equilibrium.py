@@ -36,11 +36,11 @@ class RigidEquilibrium:
         """H (n, modes), the gap opened by each rigid mode."""
         return np.einsum("id,idm->im", self.pair.normal, self.motion)
 
-    def equilibrium(self, friction_ratio: Array) -> Array:
+    def equilibrium(self, friction_ratio: Array | float) -> Array:
         """Return the load on each mode (modes, n) that pressure at each node balances.
 
         Args:
-            friction_ratio: tau (n, d).
+            friction_ratio: tau (n, d); 0.0 for none.
         """
         traction = self.pair.normal + friction_ratio
         return np.einsum("id,idm->mi", traction, self.motion) * self.pair.weights
@@ -57,10 +57,14 @@ class RigidEquilibrium:
 def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:
     """Gather the rigid modes at the interface; collective."""
     of_punch = np.einsum("Ni,Ndm->idm", pair.punch.spread.toarray(), punch.rigid_motion)
-    of_strip = np.stack(
-        [pair.transfer @ pair.placement.vectors(strip.rigid_motion[:, :, m]) for m in range(len(strip.mode_names))],
-        axis=2,
-    ) if strip.mode_names else np.zeros((*of_punch.shape[:2], 0))
+    of_strip = (
+        np.stack(
+            [pair.transfer @ pair.placement.vectors(strip.rigid_motion[:, :, m]) for m in range(len(strip.mode_names))],
+            axis=2,
+        )
+        if strip.mode_names
+        else np.zeros((*of_punch.shape[:2], 0))
+    )
     return RigidEquilibrium(
         pair,
         np.concatenate([of_punch, -of_strip], axis=2),

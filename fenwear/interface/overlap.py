@@ -123,12 +123,8 @@ class NodeAreas:
 def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     """Return quadrature points on all pairs of facets that lie over each other.
 
-<<<<<<< HEAD
-    Uncovered is a facet of the first surface where more than a strip of SLACK times the surface's size is left.
-=======
     Uncovered is a facet of the first surface where a strip wider than SLACK times the surface's size is left, or
     more than half of it.
->>>>>>> h-overlap
     """
     corners1, corners2 = first.corners, second.corners
     ring1, ring2 = corners1[:, RING[first.cell]], corners2[:, RING[second.cell]]
@@ -141,16 +137,10 @@ def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     s = (simplices[:, :1] + points @ edges).reshape(-1, flat)
     weights = (np.abs(np.linalg.det(edges))[:, None] * gauss).ravel()
     facet1, facet2 = np.repeat(facet1, len(gauss)), np.repeat(facet2, len(gauss))
-<<<<<<< HEAD
-    left = np.abs(_sizes(ring1)) - np.bincount(facet1, weights, minlength=len(corners1))
-    diameter = np.linalg.norm(np.ptp(corners1, axis=1), axis=1)
-    covered_facets = left <= SLACK * first.extent * diameter ** (flat - 1)
-=======
     size1 = np.abs(_sizes(ring1))
     left = size1 - np.bincount(facet1, weights, minlength=len(corners1))
     diameter = np.linalg.norm(np.ptp(corners1, axis=1), axis=1)
     covered_facets = left <= np.minimum(SLACK * first.extent * diameter ** (flat - 1), size1 / 2)
->>>>>>> h-overlap
     covered = np.ones(len(first.nodes), dtype=bool)
     covered[first.pressure_facets[~covered_facets]] = False
     return Overlap(
@@ -173,11 +163,7 @@ def node_areas(surface: ChartedSurface) -> NodeAreas:
     integrals of the nodes' shape functions, on quadrilaterals if they are parallelograms.
     """
     reference = _reference_parts(surface.cell, surface.pressure_degree)
-<<<<<<< HEAD
-    shares, count, flat = reference.shape
-=======
     _, count, flat = reference.shape
->>>>>>> h-overlap
     corners = surface.corners
     polygons = tabulate(surface.cell, 1, reference.reshape(-1, flat)) @ corners
     polygons = polygons.reshape(-1, count, flat)
@@ -257,12 +243,7 @@ def _pull_back(cell: str, corners: Array, facet: Indices, s: Array) -> Array:
     a, b, c = a[facet], b[facet], c[facet]
     square, linear, constant = -side * _cross(a, c), side * (_cross(r, c) - _cross(a, b)), side * _cross(r, b)
     root = np.sqrt(np.maximum(linear**2 - 4 * square * constant, 0.0))
-<<<<<<< HEAD
-    below = linear <= 0  # no cancellation in either form
-    x = np.where(below, 2 * constant, -linear - root) / np.where(below, root - linear, 2 * square)
-=======
     x = 2 * constant / (root - linear)  # root is the determinant at (x, y), root - linear twice that at (0, y)
->>>>>>> h-overlap
     along = b + c * x[:, None]
     y = np.einsum("qc,qc->q", r - a * x[:, None], along) / np.einsum("qc,qc->q", along, along)
     return np.stack([x, y], axis=1)
@@ -344,13 +325,8 @@ def _clip(subject: Array, clip: Array) -> tuple[Indices, Array]:
         crosses = inside != (after >= 0)
         share = height / np.where(crosses, height - after, 1.0)
         crossing = polygons + np.where(crosses, share, 0.0)[:, :, None] * (following - polygons)
-<<<<<<< HEAD
-        vertices = np.stack([polygons, crossing], axis=2).reshape(len(pair), -1, 2)
-        present = np.stack([inside, crosses], axis=2).reshape(len(pair), -1)
-=======
         vertices = np.stack([polygons, crossing], axis=2).reshape(len(pair), 2 * polygons.shape[1], 2)
         present = np.stack([inside, crosses], axis=2).reshape(vertices.shape[:2])
->>>>>>> h-overlap
         count = present.sum(axis=1)
         kept = count > 2
         pair, count = pair[kept], count[kept]

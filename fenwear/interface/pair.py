@@ -171,7 +171,9 @@ def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int
         worst = int(np.argmin(facing))
         angle = np.degrees(np.arccos(np.clip(facing[worst], -1, 1)))
         place = ", ".join(f"{c:g}" for c in punch.x[worst][: punch.dim - 1])
-        _not_facing(f"their outward normals do not point at each other at x = {place} mm: they are {angle:.0f} degrees off")
+        _not_facing(
+            f"their outward normals do not point at each other at x = {place} mm: they are {angle:.0f} degrees off"
+        )
     if punch.dim == 2 and axis == 1 and normal[:, 1].mean() < 0:
         _not_facing("the punch lies below the strip; expected it above, with z upwards")
 

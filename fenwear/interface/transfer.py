@@ -45,11 +45,7 @@ def dual_transfer(first: ChartedSurface, second: ChartedSurface, common: Overlap
     own = first.pressure_functions(common.points1[used]).reshape(*points, -1)
     other = second.shape_functions(common.points2[used]).reshape(*points, -1)
     weighted = (own * common.weights[used].reshape(*points, 1)).swapaxes(1, 2)
-<<<<<<< HEAD
-    facets, number = np.unique(facet1, return_inverse=True)
-=======
     number = np.unique(facet1, return_inverse=True)[1]
->>>>>>> h-overlap
     sums = csr_array((np.ones(len(number)), (number, np.arange(len(number)))))
     functions = own.shape[2]
     mass = (sums @ (weighted @ own).reshape(len(number), -1)).reshape(-1, functions, functions)
@@ -101,9 +97,5 @@ def _assemble(rows: Indices, columns: Indices, parts: Array, shape: tuple[int, i
 def _rows_to_one(matrix: csr_array) -> csr_array:
     """Divide each row by its sum; empty rows stay empty."""
     sums = matrix.sum(axis=1)
-<<<<<<< HEAD
-    return csr_array(diags_array(1 / np.where(sums == 0, 1.0, sums)) @ matrix)
-=======
     data = matrix.data / np.repeat(np.where(sums == 0, 1.0, sums), np.diff(matrix.indptr))
     return csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
->>>>>>> h-overlap

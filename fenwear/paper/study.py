@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import load_case
 from fenwear.cycle import Steady, growth_rate, jump, march, monotonic, steady
 from fenwear.paper.published import PEAK_HALF_CYCLE, TEMPERATURE_HALF_CYCLE, VELOCITIES
-from fenwear.assembly import Tribosystem, assemble
 
 TRANSIENT = 100  # half-cycles in which the flat punch's edges carry the largest pressure
 

@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
 from fenwear.errors import CaseError, OutputError, Problem
@@ -27,7 +28,6 @@ from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
-from fenwear.assembly import Tribosystem, assemble
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS = "case.toml", "moment.npz"

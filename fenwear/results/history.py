@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, Problem
 from fenwear.heat.exchange import TERMS
 from fenwear.results.disk import check_room, claim, write_text, writing
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
@@ -81,15 +81,15 @@ def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
 
 def _coordinates(system: Tribosystem) -> dict[str, tuple[str, Array, str]]:
     """Return, by name, what does not change in a run: its dimension, values (mm) and long name."""
-    facing = system.pair
+    pair = system.pair
     coordinates = {
-        "x": ("x", facing.x, "position along the contact, from the centre of the geometry"),
-        "weight": ("x", facing.weights, "length that each contact node stands for"),
+        "x": ("x", pair.x, "position along the contact, from the centre of the geometry"),
+        "weight": ("x", pair.weights, "length that each contact node stands for"),
     }
     if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
-        coordinates["x_strip"] = ("x_strip", facing.strip.x[:, 0], along)
-        coordinates["weight_strip"] = ("x_strip", facing.strip.weights, "length that each node stands for")
+        coordinates["x_strip"] = ("x_strip", pair.strip.x[:, 0], along)
+        coordinates["weight_strip"] = ("x_strip", pair.strip.weights, "length that each node stands for")
     return coordinates
 
 
@@ -307,9 +307,9 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         extremes: Largest errors over all half-cycles.
         run: How the run went: stop, times, warnings.
     """
-    facing = system.pair
-    width = facing.x[-1] - facing.x[0]
-    centre = (facing.x[-1] + facing.x[0]) / 2
+    pair = system.pair
+    width = pair.x[-1] - pair.x[0]
+    centre = (pair.x[-1] + pair.x[0]) / 2
     places = centre + width * np.array([-0.25, 0.0, 0.25])
     phases = system.motion.half_cycles
     names = {1: "rightward", -1: "leftward"}
@@ -319,13 +319,13 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **run,
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
-        "wear_mm": facing.interpolate(last.wear[-1], places).tolist(),
+        "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
         **_strip_summary(system, last),
         **{
             names[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
                 "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
-                "pressure_MPa": facing.interpolate(last.pressure[-phases:][i], places).tolist(),
+                "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
                 "contact_width_mm": float(last.contact_width[-phases:][i]),
             }
             for i, d in enumerate(last.direction[-phases:])
@@ -333,7 +333,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **({} if last.heat is None else _heat_summary(system, last, places)),
         "periodicity": float(last.periodicity[-1]),
         **extremes,
-        "contact_nodes": len(facing.x),
+        "contact_nodes": len(pair.x),
         "degrees_of_freedom": system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0],
         "ranks": system.comm.size,
         "versions": versions(),

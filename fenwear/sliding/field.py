@@ -37,7 +37,7 @@ class SlidingField:
         return np.linalg.norm(self.velocity(x), axis=1)
 
     def direction(self, x: Array, normal: Array) -> Array:
-        """Return e_v (n, 3), the unit direction of sliding within the contact of normal e_n (n, d); 0 without sliding."""
+        """Return e_v (n, 3), the unit direction of sliding within the contact of normal e_n (n, d), or zero."""
         v, n = self.velocity(x), in_space(normal)
         tangential = v - np.einsum("ic,ic->i", v, n)[:, None] * n
         size = np.linalg.norm(tangential, axis=1, keepdims=True)
@@ -48,8 +48,8 @@ class SlidingField:
         """Return where the counter-body is after this amount of the motion, mm or rad."""
         if amount == 0.0:
             return Placement()
-        shift, turn = (tuple((amount * np.array(v)).tolist()) for v in (self.shift, self.turn))
-        return Placement(shift, turn, self.centre)
+        (x, y, z), (a, b, c) = self.shift, self.turn
+        return Placement((amount * x, amount * y, amount * z), (amount * a, amount * b, amount * c), self.centre)
 
 
 ALONG_X = SlidingField(shift=(1.0, 0.0, 0.0))

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from fenwear.case import load_case, make_case
 from fenwear.assembly import Tribosystem, assemble
+from fenwear.case import load_case, make_case
 
 STEEL = {"young": 2e5, "poisson": 0.3}
 

@@ -205,7 +205,7 @@ def thermal_strain() -> Result:
                 s, t = np.sin(pi * (x + 0.5)) ** 2, np.sin(pi * z) ** 2
                 c, d = np.cos(2 * pi * (x + 0.5)), np.cos(2 * pi * z)
                 theta = heat.function(2 * pi**2 * (c * t + s * d) / factor)
-                coupling = system.bodies.strip.thermal_coupling(heat.space, system.case.materials)
+                coupling = system.bodies.strip.thermal_coupling(heat.space)
                 force = system.bodies.strip.load.duplicate()
                 coupling.mult(theta.x.petsc_vec, force)
                 pairs.append(errors(displacement(system.bodies.strip, force), exact))

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
+from fenwear.assembly import Tribosystem
 from fenwear.verify.bodies import builtin, rigid_punch, two_blocks
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble
+from fenwear.assembly import Tribosystem
 from fenwear.verify.bodies import STEEL, builtin
 from fenwear.verify.contact import measured_half_width, semi_ellipse
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.assembly import assemble
 from fenwear.case import load_case
 from fenwear.cycle import jump, march, steady
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.verify.suite import Result, Row, profile, verification
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem, steady_exchange
 from fenwear.cycle import critical_speed, growth_rate, jump, march
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.verify.bodies import builtin, two_blocks
 from fenwear.verify.suite import Line, Plot, Result, Row, number, profile, verification
 
@@ -55,7 +55,7 @@ def conductance() -> Result:
     ):
         for velocity in (0.0, -SPEED):
             varied = system.vary(*heat)
-            exchange = varied.steady_exchange([velocity])
+            exchange = steady_exchange(varied, [velocity])
             pressure = np.ones(len(varied.pair.x))
             state, _ = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
             exact = series(value, (1 - DEBRIS) * FRICTION * abs(velocity))

@@ -9,8 +9,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.cycle import growth_rate, jump, march, stability_number, steady
-from fenwear.assembly import Tribosystem, assemble
 from fenwear.verify.bodies import builtin, rigid_punch
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -44,9 +44,7 @@ def wear_volume() -> Result:
                 profile(f"{contact}, {name}: per half-cycle (mm²)", np.full_like(area, exact), area, 1e-9, scale=exact)
             )
             total = exact * run[-1].half_cycle[-1]
-            rows.append(
-                number(f"{contact}, {name}: in all (mm²)", total, run[-1].wear[-1] @ system.pair.weights, 1e-9)
-            )
+            rows.append(number(f"{contact}, {name}: in all (mm²)", total, run[-1].wear[-1] @ system.pair.weights, 1e-9))
     return Result([*rows, *_areas_of_both()])
 
 
@@ -123,12 +121,12 @@ def half_plane_rates(terms: int = 24) -> Array:
 
 def stiffness_rates(system: Tribosystem, effective: float) -> Array:
     """Return the same rates of fenwear's interface: eigenvalues of the pressure that a worn depth takes away."""
-    statics = system.rigid
-    n, r = statics.rigid_normal.shape
+    rigid = system.rigid
+    n, r = rigid.rigid_normal.shape
     matrix = np.zeros((n + r, n + r))
     matrix[:n, :n] = system.interface.compliance(0.0) * effective
-    matrix[:n, n:] = statics.rigid_normal
-    matrix[n:, :n] = statics.equilibrium(0.0)
+    matrix[:n, n:] = rigid.rigid_normal
+    matrix[n:, :n] = rigid.equilibrium(0.0)
     values = np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n]).real * HALF_WIDTH
     return np.sort(values[values > 1e-6])
 

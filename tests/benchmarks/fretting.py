@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-from fenwear import Tribosystem, assemble, jump, load_case
+from fenwear import assemble, jump, load_case
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 
@@ -52,7 +52,6 @@ def run(elements: int, tolerance: float, positions: int) -> None:
     settings = (f"geometry.parameters.elements_along_contact={elements}", f"motion.positions={positions}")
     system = assemble(load_case("fretting", settings))
     begin = time.perf_counter()
-    system.prepare()
     setup = time.perf_counter() - begin
     first = system.contact((1,)).solve(system.gap(0, system.unworn())).pressure[0]
     width = float(system.pair.weights @ (first > 0)) / 2

@@ -20,17 +20,15 @@ def row(elements: str, growth: str) -> None:
     """Set up once and print the row of the table."""
     from mpi4py import MPI
 
-    from fenwear import Tribosystem, assemble, load_case, steady
+    from fenwear import assemble, load_case, steady
 
     comm = MPI.COMM_WORLD
     parameters = [f"geometry.parameters.elements_along_contact={elements}", f"geometry.parameters.growth={growth}"]
     small = assemble(load_case("example1"))
-    small.prepare()  # compiles the forms
     comm.Barrier()
     begin = time.perf_counter()
     system = assemble(load_case("example1", parameters))
     assembled = time.perf_counter()
-    system.prepare()
     comm.Barrier()
     done = time.perf_counter()
     state = steady(system)

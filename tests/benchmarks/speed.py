@@ -94,7 +94,6 @@ def with_heat() -> None:
 
 def _prepared(case: str, *settings: str) -> Tribosystem:
     system = assemble(load_case(case, settings))
-    system.prepare()
     return system
 
 

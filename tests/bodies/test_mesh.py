@@ -61,11 +61,11 @@ def test_facing_nodes_coincide(degree: int) -> None:
     system = assemble(
         load_case("example1", [f"geometry.degree={degree}", "geometry.parameters.elements_along_contact=6"])
     )
-    facing = system.pair
-    assert len(facing.x) == 6 * degree + 1
-    np.testing.assert_allclose(facing.punch.x, facing.strip.x, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(facing.x, -facing.x[::-1], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(facing.initial_gap, 0, atol=1e-12)
+    pair = system.pair
+    assert len(pair.x) == 6 * degree + 1
+    np.testing.assert_allclose(pair.punch.x, pair.strip.x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pair.x, -pair.x[::-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pair.initial_gap, 0, atol=1e-12)
 
 
 def test_meshes_are_mirror_images() -> None:

@@ -50,9 +50,7 @@ def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..
     """An even depth shrinks the punch between contact and pins; gap and stiffness change as little as it is."""
     system = assembled("example1", *COARSE)
     depth = 1e-6
-    moved = assemble(
-        system.case, system.comm, Worn(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights)
-    )
+    moved = assemble(system.case, system.comm, Worn(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights))
     scale = np.abs(system.interface.normal_compliance).max()
     difference = np.abs(moved.interface.normal_compliance - system.interface.normal_compliance).max()
     assert 0 < difference < 1e-5 * scale

@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import ufl
+from fenwear.bodies.surface import condense, surface_nodes
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
 from fenwear.bodies import elasticity
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.surface import condense, surface_nodes
 from fenwear.interface import interpolation
 
 SMALL = ("geometry.parameters.elements_along_contact=8",)

@@ -72,7 +72,10 @@ def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> N
 def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Two discretisations of the algebra, (p, a) and (u, p, a), give the same pressure to 1e-8 in worn half-cycles."""
     system = assembled(name, *OPENING, "geometry.parameters.elements_along_contact=8")
-    full = [FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(d)) for d in (1, -1)]
+    full = [
+        FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(d))
+        for d in (1, -1)
+    ]
     condensed = [system.contact((d,)) for d in (1, -1)]
     wear, opened = np.zeros_like(system.pair.x), False
     for half_cycle in range(4):

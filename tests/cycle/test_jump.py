@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, jump, march
+from fenwear import Tribosystem, jump, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.sliding.wear import WornLayer

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, jump, march, steady
+from fenwear import CaseError, ConvergenceError, Tribosystem, jump, march, steady
 from fenwear.cycle import growth_rate
 from fenwear.run import position_warnings
 

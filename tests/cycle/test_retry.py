@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import ConvergenceError, Tribosystem, assemble, jump, march
+from fenwear import ConvergenceError, Tribosystem, jump, march
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle import Block
@@ -59,7 +59,11 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Tribosystem], list[int
 )
 @pytest.mark.mpi
 def test_half_cycles_in_parts(
-    assembled: Assemble, failing: Callable[[Tribosystem], list[int]], case: str, settings: tuple[str, ...], implicit: bool
+    assembled: Assemble,
+    failing: Callable[[Tribosystem], list[int]],
+    case: str,
+    settings: tuple[str, ...],
+    implicit: bool,
 ) -> None:
     """A half-cycle in five parts wears and heats what it does as a whole, but for the size of the steps."""
     system = assembled(case, *settings)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, march
+from fenwear import Tribosystem, march
 from fenwear.cycle import stability_number
 
 MEAN = 1e4 / 600

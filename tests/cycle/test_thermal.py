@@ -90,7 +90,9 @@ def test_slow_split_gives_advice(assembled: Assemble, monkeypatch: pytest.Monkey
 def test_order_in_time_steps(assembled: Assemble, partition: float) -> None:
     """1, 5 and 20 steps in a half-cycle: of first order toward 80."""
     ends = [
-        temperatures(run(assembled("example1-heat", *COARSE, f"heat.steps={n}", f"heat.partition={partition}"), 40))[-2:]
+        temperatures(run(assembled("example1-heat", *COARSE, f"heat.steps={n}", f"heat.partition={partition}"), 40))[
+            -2:
+        ]
         for n in (5, 10, 20, 80, 1)
     ]
     errors = np.array([np.abs(end - ends[3]).max() for end in ends])
@@ -197,7 +199,10 @@ def test_growth_of_a_disturbance(assembled: Assemble, coefficient: float) -> Non
 def test_ranks_agree(assembled: Assemble, operator: str) -> None:
     """Issue 4: march, jump, steady state and growth rate on these ranks and on one alone, to 1e-8."""
     settings = [*COARSE, f"heat.operator={operator}", "heat.partition=0.2", "heat.initial=-10"]
-    together, alone = assembled("example1-heat", *settings), assemble(load_case("example1-heat", settings), MPI.COMM_SELF)
+    together, alone = (
+        assembled("example1-heat", *settings),
+        assemble(load_case("example1-heat", settings), MPI.COMM_SELF),
+    )
     for solve in (
         lambda s: run(s, 30).pressure,
         lambda s: temperatures(run(s, 30)),

@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import bases
 import cases
 
-from fenwear import CaseError, Tribosystem, assemble, make_case
+from fenwear import CaseError, assemble, make_case
 from fenwear.case.dependence import evaluate, parse_expression
 from fenwear.errors import FenwearError
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, jump, march
+from fenwear import Tribosystem, jump, march
 from fenwear.arrays import Array
+from fenwear.assembly import steady_exchange
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
 

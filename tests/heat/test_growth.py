@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import newton
 
-from fenwear import Tribosystem, assemble
+from fenwear import Tribosystem
 from fenwear.cycle import growth_rate
 
 Make = Callable[..., Any]

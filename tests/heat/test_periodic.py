@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble
+from fenwear import Tribosystem
 from fenwear.arrays import Array
 from fenwear.cycle.jump import cycle_heat
 from fenwear.heat.exchange import State

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, march
+from fenwear import Tribosystem, march
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 
@@ -59,7 +59,9 @@ def test_steady_state_is_in_the_basis(assembled: Callable[..., Tribosystem]) -> 
     """Long times too: half-cycles without number end at the same temperatures."""
     ends = []
     for operator in ("full", "reduced"):
-        system = assembled("example1-heat", *COARSE, *WARM, "motion.angular_frequency=0.01", f"heat.operator={operator}")
+        system = assembled(
+            "example1-heat", *COARSE, *WARM, "motion.angular_frequency=0.01", f"heat.operator={operator}"
+        )
         exchange, pressure = system.exchange, np.full(len(system.pair.x), 5.0)
         state = exchange.initial()
         for half_cycle in range(200):  # of 314 s each

@@ -6,9 +6,9 @@ import basix
 import numpy as np
 import pytest
 from charted import grid, integrals, line, surface
+from mortar import transfer_matrix
 
 from fenwear.arrays import Array
-from fenwear.interface.mortar import transfer_matrix
 from fenwear.interface.overlap import ChartedSurface, node_areas, overlap, tabulate
 from fenwear.interface.transfer import dual_transfer, trace_spread, wear_transfer
 

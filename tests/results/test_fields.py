@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import Tribosystem, assemble, march
+from fenwear import Tribosystem, march
 from fenwear.results.fields import body_fields, write_fields
 
 COARSE = ("geometry.degree=3", "geometry.parameters.elements_along_contact=8")

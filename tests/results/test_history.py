@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, load_case, march, run
+from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
 from fenwear.report.figures import open_history
 from fenwear.results.history import free_directory, make_directory
 from fenwear.run import run_case

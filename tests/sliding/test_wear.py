@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import CaseError, Tribosystem, assemble, load_case
+from fenwear import CaseError, Tribosystem, load_case
 from fenwear.arrays import Array
 from fenwear.case import Contact, Dependence, WearLaw
 from fenwear.sliding.friction import ContactConditions, Friction

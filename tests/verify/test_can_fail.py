@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import Tribosystem, assemble, system
+from fenwear import Tribosystem, system
 from fenwear.bodies import elasticity
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Model
-from fenwear.contact import CondensedContact, Sliding
+from fenwear.contact import CondensedContact
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
-from fenwear.interface import Facing, Interface, Statics, facing, interpolation
+from fenwear.interface import Facing, Interface, Statics, interpolation, pair
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.wear import Wear
 from fenwear.verify import registered, run_cases
@@ -103,7 +103,7 @@ def strip_does_not_wear(patch: Patch) -> None:
 
 def collocated(patch: Patch) -> None:
     """Values picked at the punch's nodes in place of the mortar."""
-    patch.setattr(facing, "transfer_matrix", lambda x, degree, other, own: interpolation(other, own, x))
+    patch.setattr(pair, "transfer_matrix", lambda x, degree, other, own: interpolation(other, own, x))
 
 
 def half_distance(patch: Patch) -> None:
@@ -242,7 +242,7 @@ def test_ranks_that_differ_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def contact(self: Tribosystem, directions: tuple[int, ...]) -> CondensedContact:
         return CondensedContact(
-            [SlidingContact(self.interface, self.slip(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
+            [SlidingContact(self.interface, self.friction_ratio(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
         )
 
     monkeypatch.setattr(Tribosystem, "contact", contact)

@@ -130,6 +130,6 @@ try:
 except ConvergenceError as error:
     print(error)
 try:
-    system.vary("motion.amplitude=0.5 mm").prepare()
+    system.vary("motion.amplitude=0.5 mm")
 except CaseError as error:
     print(error)

@@ -109,7 +109,7 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
     """
     meshes = build_meshes(case.geometry, case.folder, comm)
     moved = None if followed is None else _moved(case, meshes, followed)
-    punch, strip = (_elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
+    punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
     return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
 
 
@@ -124,7 +124,8 @@ def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tupl
     return of_punch, of_strip
 
 
-def _elastic_body(case: Case, mesh: BodyMesh, description: Body) -> ElasticBody:
+def elastic_body(case: Case, mesh: BodyMesh, description: Body) -> ElasticBody:
+    """Assemble the elasticity of one body of a case under the mean of its loads; collective."""
     law = isotropic(mesh, description.regions, case.materials, case.model.plane)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
     return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)

@@ -10,7 +10,7 @@ from functools import reduce
 
 import numpy as np
 
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Tribosystem, in_parts
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.moment import Moment

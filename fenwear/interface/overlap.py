@@ -22,6 +22,7 @@ from fenwear.arrays import Array, Mask
 Indices: TypeAlias = NDArray[np.int64]
 
 SLACK = 1e-6  # of the surface's size: how far the first surface may reach beyond the second
+CURVED, CURVED_STEPS = 1e-13, 20  # of the surface's size: rounding of a point's place; Newton steps to it
 NOTHING = 1e-12  # of the smaller of two polygons: they share an edge up to rounding, no area
 RING = {"interval": [0, 1], "triangle": [0, 1, 2], "quadrilateral": [0, 1, 3, 2]}  # basix' corners in order around
 
@@ -146,8 +147,8 @@ def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     return Overlap(
         facet1,
         facet2,
-        _pull_back(first.cell, corners1, facet1, s),
-        _pull_back(second.cell, corners2, facet2, s),
+        _pull_back_curved(first, facet1, s),
+        _pull_back_curved(second, facet2, s),
         weights,
         len(gauss),
         covered_facets,
@@ -224,6 +225,25 @@ def _sizes(polygons: Array) -> Array:
 
 def _cross(a: Array, b: Array) -> Array:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _pull_back_curved(surface: ChartedSurface, facet: Indices, s: Array) -> Array:
+    """Return the reference coordinates (q, d - 1) of the points s (q, d - 1) on facets whose edges may be curved.
+
+    Newton's method on s = sum of phi_a s_a over the facet's trace nodes, from the facet of straight edges on: the
+    transfer then takes every node's own place to just this place, so that moments are kept.
+    """
+    points = _pull_back(surface.cell, surface.corners, facet, s)
+    nodes = surface.s[surface.facets]
+    element = _element(surface.cell, surface.degree)
+    for _ in range(CURVED_STEPS):
+        table = element.tabulate(1, points)[..., 0]
+        rest = s - np.einsum("qa,qad->qd", table[0], nodes[facet])
+        if np.abs(rest).max(initial=0.0) <= CURVED * surface.extent:
+            break
+        slopes = np.einsum("cqa,qad->qdc", table[1:], nodes[facet])
+        points = points + np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
+    return points
 
 
 def _pull_back(cell: str, corners: Array, facet: Indices, s: Array) -> Array:

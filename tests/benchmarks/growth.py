@@ -24,7 +24,7 @@ def row(elements: str, growth: str) -> None:
 
     comm = MPI.COMM_WORLD
     parameters = [f"geometry.parameters.elements_along_contact={elements}", f"geometry.parameters.growth={growth}"]
-    small = assemble(load_case("example1"))
+    assemble(load_case("example1"))
     comm.Barrier()
     begin = time.perf_counter()
     system = assemble(load_case("example1", parameters))

@@ -93,8 +93,7 @@ def with_heat() -> None:
 
 
 def _prepared(case: str, *settings: str) -> Tribosystem:
-    system = assemble(load_case(case, settings))
-    return system
+    return assemble(load_case(case, settings))
 
 
 if __name__ == "__main__":

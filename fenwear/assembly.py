@@ -311,8 +311,7 @@ class Placed:
     @cached_property
     def element_heights(self) -> Worn:
         """Height of the elements at the contact nodes of both bodies, mm."""
-        degree = self.bodies.punch.surface.degree
-        return Worn(element_height(self.bodies.punch.body, degree), element_height(self.bodies.strip.body, degree))
+        return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
     def conditions(
         self, phase: int, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None

@@ -23,7 +23,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import FenwearError, assemble, jump, load_case, steady
+from fenwear import FenwearError, assemble, jump, load_case, steady, vary
 from fenwear.cycle import cycles_to_reach
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
@@ -115,7 +115,7 @@ plt.show()
 # %%
 def sweep(name, unit, values, setting):
     """Solve for each value of one parameter; `setting` turns a value into overrides."""
-    return name, unit, [(value, steady(system.vary(*setting(value)))) for value in values]
+    return name, unit, [(value, steady(vary(system, *setting(value)))) for value in values]
 
 
 def show(name, unit, states):
@@ -171,7 +171,7 @@ for value, found in law[2]:
 # %%
 print("cycles until the pressures are within 1 % of the mean pressure:")
 for factor in (0.5, 1.0, 2.0):
-    varied = system.vary(f"wear.punch.coefficient={factor * 3.93e-8}")
+    varied = vary(system, f"wear.punch.coefficient={factor * 3.93e-8}")
     found = steady(varied)
     print(f"  wear coefficient x {factor:3g}: {cycles_to_reach(varied, found, 0.01):7,} cycles")
 
@@ -200,7 +200,7 @@ def explore(friction=0.25, load_kN=10.0, b=1.0):
     """Solve and draw the steady state of these values."""
     try:
         found = steady(
-            system.vary(
+            vary(system,
                 f"contact.friction={friction}",
                 f"punch.loads.0.force=[0, {-1000 * load_kN}]",
                 f"wear.punch={{coefficient='3.93e-8 MPa^-{b}', pressure_exponent={b}}}",

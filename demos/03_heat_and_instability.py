@@ -27,7 +27,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import assemble, load_case, march, steady
+from fenwear import assemble, load_case, march, steady, vary
 from fenwear.cycle import critical_speed, growth_rate, monotonic
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles
@@ -66,7 +66,7 @@ shares = (0.1, 0.2, 0.3, 0.4, 0.5)
 states, rates, critical = [], [], []
 print("kappa   temperature   largest pressure   growth rate   critical speed without wear")
 for share in shares:
-    varied = system.vary(f"heat.partition={share}")
+    varied = vary(system, f"heat.partition={share}")
     state = steady(varied)
     states.append(state)
     rates.append(growth_rate(varied, state.pressure))
@@ -153,7 +153,7 @@ def follow(varied):
     }
 
 
-runs = {0.2: follow(system.vary("heat.partition=0.2")), 0.5: follow(system)}
+runs = {0.2: follow(vary(system, "heat.partition=0.2")), 0.5: follow(system)}
 for share, run in runs.items():
     print(f"kappa = {share}: at the end {run['peak'][-1]:.1f} MPa, {run['width'][-1]:.1f} mm in contact, "
           f"{run['temperature'][-1]:.1f} K; hottest {run['temperature'].max():.1f} K")  # fmt: skip
@@ -235,7 +235,7 @@ plt.show()
 #
 # ## Your turn
 #
-# - `system.vary("heat.partition=0.5", "wear.punch.coefficient=4e-7")`: ten times the wear. Is it stable?
-# - `system.vary("motion.angular_frequency=5")`: half the speed. (The steps of heat are prepared anew: some seconds.)
+# - `vary(system, "heat.partition=0.5", "wear.punch.coefficient=4e-7")`: ten times the wear. Is it stable?
+# - `vary(system, "motion.angular_frequency=5")`: half the speed. (The steps of heat are prepared anew: some seconds.)
 # - `"heat.conductance='perfect'"`: no jump of temperature between punch and strip. Then the two share the heat by
 #   themselves, whatever $\kappa$ is.

@@ -24,7 +24,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import CaseError, ConvergenceError, assemble, jump, load_case, steady
+from fenwear import CaseError, ConvergenceError, assemble, jump, load_case, steady, vary
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements and cycles
 ELEMENTS, CYCLES = (16, (100, 500, 1_000)) if COARSE else (30, (1_000, 5_000, 18_000))
@@ -112,7 +112,7 @@ for text, tolerance, varied in (
     ("5 positions", 0.05, ("motion.positions=5",)),
     ("21 positions", 0.05, ("motion.positions=21",)),
 ):
-    other = system.vary(*varied) if varied else system
+    other = vary(system, *varied) if varied else system
     begin = time.perf_counter()
     *_, block = jump(other, 2 * last, tolerance=tolerance)
     print(f"{text:14} after {last:,} cycles: flat {1e3 * block.wear_strip[-1].max():.4f} µm, "
@@ -130,6 +130,6 @@ try:
 except ConvergenceError as error:
     print(error)
 try:
-    system.vary("motion.amplitude=0.5 mm")
+    vary(system, "motion.amplitude=0.5 mm")
 except CaseError as error:
     print(error)

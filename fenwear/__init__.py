@@ -25,6 +25,7 @@ __all__ = [
     "make_case",
     "march",
     "steady",
+    "vary",
 ]
 
 _HOMES = {
@@ -36,6 +37,7 @@ _HOMES = {
     "FenwearError": "errors",
     "Tribosystem": "assembly",
     "assemble": "assembly",
+    "vary": "assembly",
     "jump": "cycle",
     "march": "cycle",
     "steady": "cycle",

@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import CellType, create_rectangle
 from mpi4py import MPI
 
-from fenwear import CaseError, Tribosystem, assemble
+from fenwear import CaseError, Tribosystem, assemble, vary
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import OwnLaw, lame, strain, stress
 from fenwear.bodies.mesh import own_mesh
@@ -77,7 +77,7 @@ def test_a_variant_equals_a_new_system(assembled: Callable[..., Tribosystem]) ->
         ("motion.amplitude=1", "wear.strip.coefficient=1e-8", "motion.positions=3"),
         ("motion.axis=y",),
     ):
-        shared, new = base.vary(*settings), assemble(base.vary(*settings).case)
+        shared, new = vary(base, *settings), assemble(vary(base, *settings).case)
         assert shared.bodies.punch.stiffness is base.bodies.punch.stiffness
         for one, other in zip(shared.interfaces, new.interfaces, strict=True):
             scale = np.abs(other.gap_by_force).max()

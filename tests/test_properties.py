@@ -15,7 +15,7 @@ from hypothesis import given, note, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from fenwear import Tribosystem, assemble, load_case, march, steady
+from fenwear import Tribosystem, assemble, load_case, march, steady, vary
 from fenwear.arrays import Array
 from fenwear.cycle import Block, stability_number
 from fenwear.heat.exchange import TERMS
@@ -221,7 +221,7 @@ def test_balances_without_heat(parameters: Parameters, implicit: bool) -> None:
     if not implicit:
         coefficient = min(1.0, 0.5 / stability_number(system)) * parameters.coefficient
         parameters = replace(parameters, coefficient=coefficient)
-        system = system.vary(f"wear.punch.coefficient={coefficient!r}")
+        system = vary(system, f"wear.punch.coefficient={coefficient!r}")
     check_contact(system, parameters, run(system, 6, implicit=implicit))
 
 

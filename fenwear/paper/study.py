@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import load_case
@@ -231,7 +232,7 @@ def neutral_share(scope: Scope = FULL) -> float | None:
     system, low, high = _prepared("example1-heat", scope.settings), min(scope.shares), max(scope.shares)
 
     def grows(share: float) -> bool:
-        varied = system.vary(f"heat.partition={share}")
+        varied = vary(system, f"heat.partition={share}")
         return growth_rate(varied, steady(varied).phase_pressure) > 0
 
     if grows(low) or not grows(high):
@@ -268,7 +269,7 @@ def _run(system: Tribosystem, half_cycles: int) -> HeatRun:
 def heat_runs(name: str, scope: Scope = FULL) -> tuple[HeatRun, ...]:
     """Return the runs of an example with heat, one for each share; collective."""
     system = _prepared(name, scope.settings)
-    return tuple(_run(system.vary(f"heat.partition={share}"), scope.half_cycles) for share in scope.shares)
+    return tuple(_run(vary(system, f"heat.partition={share}"), scope.half_cycles) for share in scope.shares)
 
 
 HINGES = ((40, 80), (20, 40), (20, 60), (60, 90))  # mm above the contact; first the built-in case's
@@ -293,7 +294,7 @@ def open_choices(scope: Scope = FULL) -> tuple[Variant, ...]:
         ("heat.conducting=nominal", "open nodes conduct, too"),
         ("heat.coupling=split", "heat and contact in turn, relaxed by 0.5"),
     ):
-        variants += _variants(base.vary(key), scope, "example 1", name)
+        variants += _variants(vary(base, key), scope, "example 1", name)
     for name, keys in {"plane strain": ("model.plane=strain",), **SUPPORTS, **MOVING}.items():
         variants += _variants(assemble(load_case("example1-heat", (*scope.settings, *keys))), scope, "example 1", name)
     built_in = _prepared("example2-heat", scope.settings)
@@ -314,7 +315,7 @@ def convergence(scope: Scope = FULL) -> tuple[Variant, ...]:
         system = assemble(load_case("example1-heat", (*scope.settings, *mesh)))
         variants += _variants(system, scope, "mesh", f"{elements} elements of degree {degree}")
     for steps in scope.steps:
-        system = _prepared("example1-heat", scope.settings).vary(f"heat.steps={steps}")
+        system = vary(_prepared("example1-heat", scope.settings), f"heat.steps={steps}")
         variants += _variants(system, scope, "steps", f"{steps} time steps in a half-cycle")
     return tuple(variants)
 
@@ -322,7 +323,7 @@ def convergence(scope: Scope = FULL) -> tuple[Variant, ...]:
 def _variants(system: Tribosystem, scope: Scope, group: str, name: str) -> list[Variant]:
     found = []
     for share in scope.variant_shares:
-        run = _run(system.vary(f"heat.partition={share}"), scope.variants)
+        run = _run(vary(system, f"heat.partition={share}"), scope.variants)
         numbers = (run.width.min(), run.middle_pressure[run.bulged].max(), run.central_pressure[run.bulged].max())
         found.append(Variant(group, name, share, run.steady, *(float(number) for number in numbers)))
     return found

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import k0e
 
+from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody
 from fenwear.parallel import total
@@ -237,7 +238,7 @@ def free_expansion() -> Result:
         theta = t0 + tx * x + tz * z
         strip = np.zeros(system.bodies.heat[1].owned)
         nothing = np.zeros(len(system.pair.x))
-        unloaded = system.vary("punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
+        unloaded = vary(system, "punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
         fields, _ = body_fields(unloaded, nothing, np.zeros(0), 0, (theta, strip))
         ours = fields.displacement.x.array[: 2 * len(x)].reshape(-1, 2)
         s, expansion = x + half, alpha if plane == "stress" else (1 + nu) * alpha

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.verify.bodies import builtin, rigid_punch, two_blocks
@@ -45,7 +46,7 @@ def half_planes(friction: float, elements: int = 40) -> Tribosystem:
 
 def pressed(load: float, friction: float = 0.0, elements: int = 40) -> Tribosystem:
     """Return the half-planes under a load, N/mm; collective."""
-    return half_planes(friction, elements).vary(f"punch.loads=[{{on='punch_far', force=[0, {-load!r}]}}]")
+    return vary(half_planes(friction, elements), f"punch.loads=[{{on='punch_far', force=[0, {-load!r}]}}]")
 
 
 def contact_modulus() -> float:

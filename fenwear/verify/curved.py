@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.verify.bodies import STEEL, builtin
@@ -29,7 +30,7 @@ def cylinder(elements: int) -> Tribosystem:
 def pressed(system: Tribosystem, load: float) -> tuple[Array, Array]:
     """Return x and the pressure under a load on the punch's top, N/mm."""
     thickness = system.case.model.thickness
-    loaded = system.vary(f"punch.loads=[{{on='punch_top', force=[0, {-float(load) * thickness!r}]}}]")
+    loaded = vary(system, f"punch.loads=[{{on='punch_top', force=[0, {-float(load) * thickness!r}]}}]")
     return system.pair.x, loaded.contact((1,)).solve(loaded.pair.initial_gap).pressure[0]
 
 

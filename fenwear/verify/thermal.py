@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fenwear import vary
 from fenwear.assembly import Tribosystem, steady_exchange
 from fenwear.cycle import critical_speed, growth_rate, jump, march
 from fenwear.verify.bodies import builtin, two_blocks
@@ -54,7 +55,7 @@ def conductance() -> Result:
         ("perfect", math.inf, ("heat.conductance=perfect",)),
     ):
         for velocity in (0.0, -SPEED):
-            varied = system.vary(*heat)
+            varied = vary(system, *heat)
             exchange = steady_exchange(varied, [velocity])
             pressure = np.ones(len(varied.pair.x))
             state, _ = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))

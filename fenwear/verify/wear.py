@@ -8,6 +8,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
+from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import growth_rate, jump, march, stability_number, steady
@@ -263,7 +264,7 @@ def cyclic() -> Result:
                 ]
     # 100 N/mm to the right, 30 mm above the pin, act as the load 3 mm off the centre.
     pushed = "[{on='punch_load', force=[0, -10000]}, {on='punch_free', force=[1000, 0]}]"
-    system = builtin("example1").vary(f"punch.loads={pushed}")
+    system = vary(builtin("example1"), f"punch.loads={pushed}")
     x, both = system.pair.x, steady(system).pressure.sum(axis=0)
     linear = 2 * MEAN * (1 + 3 * 3.0 * x / HALF_WIDTH**2)
     rows.append(profile("example1, load 3 mm off the centre: p+ + p- (MPa)", linear, both, 1e-8, scale=2 * MEAN))
@@ -283,7 +284,7 @@ EVEN = ("geometry.degree=1", "geometry.parameters.edge_grading=1", "geometry.par
 def at_number(ratio: float) -> Tribosystem:
     """Return one-way sliding of Example 1, even linear elements, whose wear step is `ratio` of the explicit limit."""
     base = builtin("example1", *EVEN, one_way("leftward"), "wear.punch.coefficient=1e-7")
-    return base.vary(f"wear.punch.coefficient={1e-7 * ratio / stability_number(base)!r}")
+    return vary(base, f"wear.punch.coefficient={1e-7 * ratio / stability_number(base)!r}")
 
 
 def settles(ratio: float) -> bool:

@@ -12,7 +12,8 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import csr_array
 
-from fenwear import Tribosystem, assembly
+from fenwear import Tribosystem
+from fenwear.assembly import bodies, placed
 from fenwear.bodies import material
 from fenwear.bodies.material import Isotropic
 from fenwear.contact import CondensedContact, SlidingContact
@@ -56,12 +57,12 @@ def opposite_moment(patch: Patch) -> None:
 
 def punch_without_poisson(patch: Patch) -> None:
     """The punch in plane stress, so that E* lacks its 1 - nu²."""
-    right = assembly.isotropic
+    right = bodies.isotropic
 
     def isotropic(body: Any, regions: Any, materials: Any, kind: Any) -> Isotropic:
         return right(body, regions, materials, "stress" if body.name == "punch" else kind)
 
-    patch.setattr(assembly, "isotropic", isotropic)
+    patch.setattr(bodies, "isotropic", isotropic)
 
 
 def lame_of_the_other_plane(patch: Patch) -> None:
@@ -72,13 +73,13 @@ def lame_of_the_other_plane(patch: Patch) -> None:
 
 
 def _pairs_with(patch: Patch, change: Callable[[ContactPair], dict[str, Any]]) -> None:
-    right = assembly.pair
+    right = placed.pair
 
     def pair(*surfaces: Any) -> ContactPair:
         found = right(*surfaces)
         return replace(found, **change(found))
 
-    patch.setattr(assembly, "pair", pair)
+    patch.setattr(placed, "pair", pair)
 
 
 def even_weights(patch: Patch) -> None:
@@ -162,14 +163,14 @@ def other_share(patch: Patch) -> None:
 def thermal_modulus_without_poisson(patch: Patch) -> None:
     """E alpha in place of E alpha / (1 - nu) and E alpha / (1 - 2 nu)."""
 
-    right = assembly.isotropic
+    right = bodies.isotropic
 
     def isotropic(body: Any, regions: Any, materials: Any, kind: Any) -> Isotropic:
         of_region = {region: materials[name] for region, name in regions.items()}
         modulus = {r: m.young * (m.expansion or 0.0) for r, m in of_region.items()}
         return replace(right(body, regions, materials, kind), thermal_modulus=material.region_field(body, modulus))
 
-    patch.setattr(assembly, "isotropic", isotropic)
+    patch.setattr(bodies, "isotropic", isotropic)
 
 
 def material_the_other_way(patch: Patch) -> None:

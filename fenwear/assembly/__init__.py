@@ -1,0 +1,53 @@
+"""The whole way from a case to bodies that are ready to slide, step by step.
+
+    bodies  = build_bodies(case)             meshes, stiffness, supports, loads, conduction
+    sliding = make_sliding(case)             motion, sliding field, friction, wear laws
+    placed  = place(bodies, sliding)         surfaces opposite each other in every phase, in equilibrium
+    system  = elastic(placed)                both bodies condensed and joined in every phase
+    system  = with_exchange(system)          heat: the steps of the motion, prepared
+
+`assemble` takes all of them. Each step returns plain data and is collective: every rank takes it. `vary`
+takes again what a changed case makes necessary, and keeps the rest.
+"""
+
+from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
+from fenwear.assembly.placed import Placed, Sliding, make_sliding, place
+from fenwear.assembly.tribosystem import (
+    Condensed,
+    Preparation,
+    Tribosystem,
+    elastic,
+    gap_rows,
+    heating_friction,
+    preparation,
+    steady_exchange,
+    with_exchange,
+    with_reduced_heat,
+)
+from fenwear.assembly.variants import assemble, in_parts, place_case, vary, with_case
+
+__all__ = [
+    "Bodies",
+    "Condensed",
+    "Placed",
+    "Preparation",
+    "Sliding",
+    "Tribosystem",
+    "assemble",
+    "build_bodies",
+    "build_conduction",
+    "elastic",
+    "elastic_body",
+    "gap_rows",
+    "heating_friction",
+    "in_parts",
+    "make_sliding",
+    "place",
+    "place_case",
+    "preparation",
+    "steady_exchange",
+    "vary",
+    "with_case",
+    "with_exchange",
+    "with_reduced_heat",
+]

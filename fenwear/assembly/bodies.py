@@ -1,0 +1,100 @@
+"""Both bodies on their meshes: elasticity, and conduction with heat."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.material import isotropic
+from fenwear.bodies.mesh import BodyMesh, build_meshes
+from fenwear.bodies.shape import follow_wear
+from fenwear.case import Body, Case
+from fenwear.heat.conduction import HeatBody
+from fenwear.sliding.wear import Worn
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Both bodies on their meshes, under the mean of their loads.
+
+    Attributes:
+        punch, strip: Elasticity.
+        heat: Conduction in both; None without heat.
+        followed: Worn depths that the meshes follow; None where they are as they were made.
+        moved: How far the contact nodes have moved for it.
+    """
+
+    punch: ElasticBody
+    strip: ElasticBody
+    heat: tuple[HeatBody, HeatBody] | None = None
+    followed: Worn | None = None
+    moved: Worn | None = None
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """The ranks."""
+        return self.punch.body.mesh.comm
+
+    @property
+    def unknowns(self) -> int:
+        """Number of degrees of freedom of both displacements."""
+        return self.punch.stiffness.size[0] + self.strip.stiffness.size[0]
+
+    def under(self, case: Case, fraction: float | None = None) -> Bodies:
+        """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""
+        punch, strip = (
+            body.with_loads([load.mean() if fraction is None else load.at(fraction) for load in description.loads])
+            for body, description in ((self.punch, case.punch), (self.strip, case.strip))
+        )
+        return replace(self, punch=punch, strip=strip)
+
+
+def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None) -> Bodies:
+    """Mesh both bodies and assemble them; collective.
+
+    Args:
+        case: The problem.
+        comm: The ranks.
+        followed: Worn depths that the meshes follow; by default they are as they were made.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong, such as a missing group.
+        MeshQualityError: an element does not survive the motion.
+    """
+    meshes = build_meshes(case.geometry, case.folder, comm)
+    moved = None if followed is None else _moved(case, meshes, followed)
+    punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
+    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
+
+
+def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:
+    """Prepare conduction in both bodies; None for a case without heat; collective."""
+    if case.heat is None:
+        return None
+    of_punch, of_strip = (
+        HeatBody(elastic.body, description, case.materials, case.model, case.heat, case.geometry.degree)
+        for elastic, description in ((punch, case.punch), (strip, case.strip))
+    )
+    return of_punch, of_strip
+
+
+def elastic_body(case: Case, mesh: BodyMesh, description: Body) -> ElasticBody:
+    """Assemble the elasticity of one body of a case under the mean of its loads; collective."""
+    law = isotropic(mesh, description.regions, case.materials, case.model.plane)
+    at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
+    return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)
+
+
+def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Worn:
+    """Let the meshes follow the wear; return how far their contact nodes have moved into the bodies."""
+    moved = []
+    for mesh, depth, description in zip(
+        meshes, (followed.punch, followed.strip), (case.punch, case.strip), strict=True
+    ):
+        pins = [np.array(support.at) for support in description.supports if support.at is not None]
+        groups = [point for points in mesh.points.values() for point in points]
+        moved.append(follow_wear(mesh, depth, case.geometry.degree, [*pins, *groups]))
+    return Worn(moved[0], moved[1])

@@ -1,0 +1,333 @@
+"""Both bodies opposite each other in every phase of the sliding, in equilibrium; nothing elastic in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array, Mask
+from fenwear.assembly.bodies import Bodies
+from fenwear.bodies.shape import element_height
+from fenwear.case import Case, Heat, OneWay, WearLaw
+from fenwear.errors import CaseError, Problem
+from fenwear.interface import (
+    ContactPair,
+    RigidEquilibrium,
+    check_distance,
+    pair,
+    pass_material,
+    rigid_equilibrium,
+)
+from fenwear.interface.placement import in_model
+from fenwear.optimum import Optimum, check_equilibrium, optimum
+from fenwear.remedies import Remedies
+from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
+from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.motion import Motion, make_motion
+from fenwear.sliding.wear import PhasesWear, Wear, Worn
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """How the counter-body slides, and what that does to both surfaces.
+
+    Attributes:
+        motion: The phases of a cycle.
+        field: The velocity of the counter-body over the contact.
+        friction: The law of friction.
+        wear: The wear laws of punch and strip; None where a body does not wear.
+        track: Length of the closed track that the strip runs on, mm; None for its own nodes.
+        to_and_fro: Whether the strip's worn track passes to and fro under the punch.
+    """
+
+    motion: Motion
+    field: SlidingField
+    friction: Friction
+    wear: tuple[WearLaw | None, WearLaw | None]
+    track: float | None = None
+    to_and_fro: bool = False
+
+
+def make_sliding(case: Case, parts: int = 1) -> Sliding:
+    """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
+    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None).in_parts(parts)
+    sliding_field = ALONG_X if case.motion.axis == "x" else ALONG_Y
+    one_way = isinstance(case.motion, OneWay)
+    return Sliding(
+        motion,
+        sliding_field,
+        Friction(case.contact, sliding_field),
+        (case.wear.punch, case.wear.strip),
+        case.motion.track if isinstance(case.motion, OneWay) else None,
+        case.motion.axis == "x" and not one_way,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Placed:
+    """Both bodies opposite each other in every phase, in equilibrium; nothing elastic in it.
+
+    Attributes:
+        bodies: Under the mean loads.
+        sliding: Motion, friction and wear.
+        heat: Settings of the heat between the bodies; None without.
+        solver: Of the contact: "condensed", or "full" for the reference on both bodies' meshes.
+        made_from: The case; None where it was made in Python.
+        loaded: The bodies under the loads of each phase.
+        rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
+        rigid: The same in the middle position under the mean loads.
+        remedies: What had to be solved in another way.
+    """
+
+    bodies: Bodies
+    sliding: Sliding
+    heat: Heat | None
+    solver: str
+    made_from: Case | None
+    loaded: tuple[Bodies, ...]
+    rigids: tuple[RigidEquilibrium, ...]
+    rigid: RigidEquilibrium
+    remedies: Remedies = field(default_factory=Remedies)
+
+    def __repr__(self) -> str:
+        """Say in a line what it is."""
+        title = "made in Python" if self.made_from is None else repr(self.made_from.title)
+        return f"<{type(self).__name__} {title}: {len(self.pair.weights)} contact nodes, {len(self.pairs)} phases>"
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """The ranks."""
+        return self.bodies.comm
+
+    @property
+    def case(self) -> Case:
+        """The case that it was made from.
+
+        Raises:
+            CaseError: it was made in Python, without one.
+        """
+        if self.made_from is None:
+            raise CaseError(Problem("", "expected bodies made from a case: those made in Python have none"))
+        return self.made_from
+
+    @property
+    def motion(self) -> Motion:
+        """The phases of a cycle."""
+        return self.sliding.motion
+
+    @property
+    def friction(self) -> Friction:
+        """The law of friction."""
+        return self.sliding.friction
+
+    @property
+    def pair(self) -> ContactPair:
+        """The surfaces in the middle position of the strip."""
+        return self.rigid.pair
+
+    @cached_property
+    def pairs(self) -> tuple[ContactPair, ...]:
+        """The surfaces opposite each other in each phase."""
+        return tuple(rigid.pair for rigid in self.rigids)
+
+    @property
+    def strip_wears(self) -> bool:
+        """Whether the strip has a wear law."""
+        return self.sliding.wear[1] is not None
+
+    @cached_property
+    def wear(self) -> Wear:
+        """The wear rule of both bodies over the phases of the motion."""
+        rate = self.sliding.field.rate(self.pair.punch.x)
+        slid = []
+        for law in self.sliding.wear:
+            exponent = 1.0 if law is None else law.speed_exponent
+            slid.append(self.motion.sliding(exponent)[:, None] * rate**exponent)
+        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.sliding.track)
+
+    @property
+    def position_spacing(self) -> float:
+        """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
+        offsets = np.unique([phase.offset for phase in self.motion.phases])
+        return float(np.diff(offsets).max(initial=0.0) / np.median(np.diff(self.pair.x)))
+
+    @property
+    def track_deepens(self) -> bool:
+        """Whether the strip wears to and fro under the punch, so that no shape of its track stays."""
+        return self.strip_wears and self.sliding.to_and_fro
+
+    @property
+    def constant_coefficients(self) -> bool:
+        """Whether friction and wear are the same at any temperature, pressure and speed."""
+        return self.friction.constant and self.wear.constant
+
+    @cached_property
+    def mode_lengths(self) -> Array:
+        """Largest displacement along e_n of each rigid mode for a unit velocity (modes,): 1, and mm for a rotation."""
+        return np.abs(self.rigid.rigid_normal).max(axis=0, initial=1e-300)
+
+    def gap(self, phase: int, worn: Worn) -> Array:
+        """Return the gap of the unloaded, worn bodies in a phase (n,), mm."""
+        pair = self.pairs[phase]
+        if self.bodies.moved is not None:
+            worn = worn - self.bodies.moved
+        elif not self.strip_wears:
+            return pair.initial_gap + worn.punch
+        return pair.initial_gap + pair.opening(worn.punch, worn.strip)
+
+    def unworn(self) -> Worn:
+        """Return the worn depths at the start: none."""
+        return Worn(np.zeros(len(self.pair.punch.weights)), np.zeros(len(self.pair.strip.weights)))
+
+    def outworn(self, worn: Worn) -> bool:
+        """Return whether the wear since the meshes were moved is large against the elements at the contact."""
+        limit = None if self.made_from is None else self.made_from.geometry.follow_wear
+        if limit is None:
+            return False
+        followed = self.bodies.followed
+        rest = worn if followed is None else worn - followed
+        heights = self.element_heights
+        return bool(
+            (np.abs(rest.punch) > limit * heights.punch).any() or (np.abs(rest.strip) > limit * heights.strip).any()
+        )
+
+    @cached_property
+    def element_heights(self) -> Worn:
+        """Height of the elements at the contact nodes of both bodies, mm."""
+        return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
+
+    def conditions(
+        self, phase: int, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
+    ) -> ContactConditions:
+        """Return what coefficients depend on in a phase.
+
+        Args:
+            phase: Its number.
+            pressure: (n,), MPa; by default the mean pressure.
+            temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
+        """
+        n = len(self.pair.weights)
+        initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
+        return ContactConditions(
+            np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
+            self.motion.phases[phase].speed * self.sliding.field.rate(self.pair.punch.x),
+            (initial, initial) if temperatures is None else temperatures,
+        )
+
+    def friction_ratio(self, direction: int) -> Array:
+        """Return tau (n, d) in the middle position at the mean pressure.
+
+        Args:
+            direction: d, the sign of the sliding.
+        """
+        mu = self.friction.values(self.conditions(0))
+        return in_model(self.friction.ratio(direction, mu, self.pair), self.pair.punch.dim)
+
+    def phase_friction(self, phase: int, mu: Array) -> Array:
+        """Return tau of a phase (n, d), the traction of friction on the punch over the pressure, for mu (n,)."""
+        pair = self.pairs[phase]
+        return in_model(self.friction.ratio(self.motion.phases[phase].direction, mu, pair), pair.punch.dim)
+
+    def friction_ratios(self, conditions: Sequence[ContactConditions] | None = None) -> list[Array]:
+        """Return tau of each phase (n, d), the traction of friction on the punch over the pressure.
+
+        Args:
+            conditions: Of each phase, for friction that depends on them; by default at the mean pressure.
+
+        Raises:
+            CaseError: the friction coefficient is negative or not finite there.
+        """
+        states = [self.conditions(k) for k in range(len(self.pairs))] if conditions is None else conditions
+        return [self.phase_friction(k, self.friction.values(state)) for k, state in enumerate(states)]
+
+    @cached_property
+    def phases_wear(self) -> PhasesWear:
+        """The wear of all phases at the mean pressure and the initial temperature."""
+        return self.wear.phases([self.conditions(k) for k in range(len(self.motion.phases))])
+
+    def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
+        """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
+
+        K is the sum over both bodies of the mean of beta~ v^a (the punch's alone where their pressure
+        exponents differ), at the mean pressure. On a closed track the strip recedes evenly instead.
+
+        Args:
+            direction: Sliding direction d.
+            zone: Nodes in contact (n,) bool; by default all.
+        """
+        wear = self.phases_wear
+        laws = [law for law in self.sliding.wear if law is not None]
+        exponent = laws[0].pressure_exponent
+        bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.exponent == exponent]
+        on_track = wear.track is not None and wear.punch is not None
+        rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
+        rate = rates[0] if on_track else np.sum(rates, axis=0)
+        found = optimum(self.rigid, self.friction_ratio(direction), rate, exponent, zone)
+        if on_track and wear.strip is not None and "lambda_F" in found.velocity:
+            depth = wear.worn(np.tile(found.pressure, (len(self.motion.phases), 1))).strip.mean()
+            velocity = {**found.velocity, "lambda_F": found.velocity["lambda_F"] + depth / self.motion.period}
+            return replace(found, velocity=velocity)
+        return found
+
+
+def place(
+    bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, solver: str = "condensed", case: Case | None = None
+) -> Placed:
+    """Bring the surfaces opposite each other in every phase of the motion; collective.
+
+    Without heat the strip moves as a whole. With heat it is described in the punch's frame, where its
+    material moves: then only its worn depth changes place.
+
+    Args:
+        bodies: Both bodies.
+        sliding: Motion, friction and wear.
+        heat: Settings of the heat between the bodies.
+        solver: Of the contact, "condensed" or "full".
+        case: What they were made from: it gives the loads of each phase, and whether meshes follow the wear.
+
+    Raises:
+        CaseError: the surfaces do not face each other, or no pressure balances the loads.
+    """
+    middle = pair(bodies.punch.surface, bodies.strip.surface)
+    if bodies.followed is None:
+        check_distance(middle)
+    whole = heat is None
+    pairs = {
+        offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
+        for offset in sorted({phase.offset for phase in sliding.motion.phases} - {0.0})
+        for moved in [sliding.field.placement(offset)]
+    }
+    pairs[0.0] = middle
+    loaded = _loaded(bodies, sliding.motion, case)
+    rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
+    rigids: list[RigidEquilibrium] = []
+    for phase, own in zip(sliding.motion.phases, loaded, strict=True):
+        if phase.offset == 0.0 and own is bodies:
+            rigids.append(rigid)
+        else:
+            rigids.append(rigid_equilibrium(pairs[phase.offset], own.punch, own.strip))
+    placed = Placed(
+        bodies=bodies,
+        sliding=sliding,
+        heat=heat,
+        solver=solver,
+        made_from=case,
+        loaded=loaded,
+        rigids=tuple(rigids),
+        rigid=rigid,
+    )
+    for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
+        check_equilibrium(one, phase.direction, ratio)
+    return placed
+
+
+def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:
+    """Return the bodies under the loads of each phase; collective."""
+    loads = [] if case is None else [*case.punch.loads, *case.strip.loads]
+    if case is None or all(load.over_cycle is None for load in loads):
+        return (bodies,) * len(motion.phases)
+    return tuple(bodies.under(case, phase.fraction) for phase in motion.phases)

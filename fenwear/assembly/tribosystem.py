@@ -1,0 +1,251 @@
+"""Punch and strip, condensed and joined in every phase of the motion, with the heat of the motion prepared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.placed import Placed
+from fenwear.bodies.condensation import CondensedBody, condense, respond_to_load
+from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
+from fenwear.contact.full import FullContact
+from fenwear.errors import CaseError, Problem
+from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.prepare import prepare_exchange, prepare_steady
+from fenwear.interface import (
+    Interface,
+    join,
+)
+
+Preparation = Literal["as set", "reduced", "none"]  # of the heat
+ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Both bodies condensed onto the contact.
+
+    Attributes:
+        punch: Onto the contact nodes.
+        strip: Onto its own trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        strip_moves: Which of the two.
+    """
+
+    punch: CondensedBody
+    strip: CondensedBody
+    strip_moves: bool
+
+    def under_loads(self, bodies: Bodies) -> Condensed:
+        """Return the same under the loads of these bodies; collective."""
+        punch, strip = (
+            replace(condensed, by_load=respond_to_load(elastic, condensed.patterns))
+            for condensed, elastic in ((self.punch, bodies.punch), (self.strip, bodies.strip))
+        )
+        return replace(self, punch=punch, strip=strip)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Tribosystem(Placed):
+    """Punch and strip, condensed and joined in every phase of the motion: ready for contact, wear and cycles.
+
+    Attributes:
+        condensed: Both bodies' answers to forces on the contact.
+        interface: The condensed interface in the middle position, under the mean loads.
+        interfaces: The same in each phase.
+        exchange: The bodies' temperatures over the phases; None without heat, or where it was not asked for.
+    """
+
+    condensed: Condensed
+    interface: Interface
+    interfaces: tuple[Interface, ...]
+    exchange: HeatExchange | None = None
+
+    def contact(self, directions: Sequence[int]) -> ContactSolver:
+        """Return the contact in the middle position under the mean loads.
+
+        Args:
+            directions: Sliding direction d of each phase that is solved for.
+        """
+        return self._contact([SlidingContact(self.interface, self.friction_ratio(d)) for d in directions])
+
+    def phase_contact(self, phases: Sequence[int]) -> ContactSolver:
+        """Return the contact of phases of the motion, given by their numbers."""
+        ratios = self.friction_ratios()
+        return self._contact([SlidingContact(self.interfaces[k], ratios[k]) for k in phases])
+
+    def _contact(self, phases: list[SlidingContact]) -> ContactSolver:
+        if self.solver == "full":
+            return FullContact(self.bodies.punch, self.bodies.strip, phases[0].interface, phases[0].friction_ratio)
+        return CondensedContact(phases, self.remedies)
+
+    def check_touching(self) -> None:
+        """Make sure that the surfaces touch in some phase; collective.
+
+        Raises:
+            CaseError: they never meet: no pressure, no wear, nothing to follow.
+            ConvergenceError: the contact of a phase did not converge.
+        """
+        gaps = []
+        for phase in range(len(self.motion.phases)):
+            contact = self.phase_contact((phase,)).solve(self.gap(phase, self.unworn()))
+            if contact.pressure.max() > 0:
+                return
+            gaps.append(float(contact.gap.min()))
+        raise CaseError(
+            Problem(
+                "geometry",
+                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
+                "expected a punch that its supports let come down, or that starts in contact",
+            )
+        )
+
+
+def elastic(placed: Placed) -> Tribosystem:
+    """Condense both bodies and join them in every phase: factors both stiffnesses; collective."""
+    condensed = condense_bodies(placed)
+    return joined(placed, condensed)
+
+
+def condense_bodies(placed: Placed) -> Condensed:
+    """Condense both bodies onto what the phases of the motion ask for; collective."""
+    bodies, middle = placed.bodies, placed.pair
+    couplings: list[PETSc.Mat | None] = [None, None]
+    if bodies.heat is not None:
+        couplings = [
+            body.thermal_coupling(conduction.space)
+            for body, conduction in zip((bodies.punch, bodies.strip), bodies.heat, strict=True)
+        ]
+    # In one frame, forces and displacements along its normals are all that is ever asked for.
+    moves, fixed, flat = _frame(placed)
+    punch = condense(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
+    if not moves:
+        onto_contact = csr_array(middle.transfer.T)
+        return Condensed(punch, condense(bodies.strip, onto_contact, middle.normal_on_strip, couplings[1]), moves)
+    trace = middle.strip.trace
+    along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
+    return Condensed(punch, condense(bodies.strip, _identity(len(trace)), along, couplings[1]), moves)
+
+
+def _identity(size: int) -> csr_array:
+    every = np.arange(size)
+    return csr_array((np.ones(size), (every, every)), shape=(size, size))
+
+
+def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
+    """Join the condensed bodies in every phase; what phases share is made once; collective."""
+    interface = join(placed.rigid, condensed.punch, condensed.strip, strip_moves=condensed.strip_moves)
+    found: list[Interface] = []
+    for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
+        earlier = next((j for j in range(k) if placed.rigids[j] is rigid and placed.loaded[j] is bodies), None)
+        if rigid is placed.rigid:
+            found.append(interface)
+        elif earlier is not None:
+            found.append(found[earlier])
+        else:
+            own = condensed if bodies is placed.bodies else condensed.under_loads(bodies)
+            found.append(join(rigid, own.punch, own.strip, strip_moves=condensed.strip_moves))
+    parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
+    return Tribosystem(**parts, condensed=condensed, interface=interface, interfaces=tuple(found), exchange=exchange)
+
+
+def same_frame(system: Tribosystem, placed: Placed) -> bool:
+    """Return whether bodies condensed for one motion answer for another one, too."""
+    return _frame(system) == _frame(placed)
+
+
+def _frame(placed: Placed) -> tuple[bool, bool, bool]:
+    """Return whether the strip moves as a whole, whether the frame stays, and whether the strip is flat."""
+    middle = placed.pair
+    moves = any(pair.transfer is not middle.transfer for pair in placed.pairs)
+    fixed = all(_close(pair.normal, middle.normal) for pair in placed.pairs)
+    return moves, fixed, not moves or _close(middle.normal_on_strip, middle.normal_on_strip[:1])
+
+
+def _close(first: Array, second: Array) -> bool:
+    return bool(np.abs(first - second).max() < ROUNDING)
+
+
+def with_exchange(system: Tribosystem, *, reduced: bool | None = None) -> Tribosystem:
+    """Return the system with the heat of its motion prepared; collective.
+
+    Args:
+        system: With condensed bodies.
+        reduced: Whether temperatures are reduced to a small basis, as whole cycles need; by default as
+            the settings say.
+
+    Raises:
+        CaseError: with heat, half-cycles of unequal duration.
+    """
+    if system.heat is None or system.bodies.heat is None:
+        return system
+    reduced = system.heat.operator == "reduced" if reduced is None else reduced
+    exchange = prepare_exchange(
+        system.heat,
+        system.bodies.heat,
+        system.pair,
+        gap_rows(system),
+        system.motion,
+        heating_friction(system),
+        system.bodies.punch.thickness,
+        reduced=reduced,
+    )
+    return replace(system, exchange=exchange)
+
+
+def with_reduced_heat(system: Tribosystem) -> Tribosystem:
+    """Return the system with its heat on a small basis, whatever the settings say; collective."""
+    if system.heat is None or (system.exchange is not None and system.exchange.reduced):
+        return system
+    return with_exchange(system, reduced=True)
+
+
+def preparation(system: Tribosystem) -> Preparation:
+    """Return how the heat of a system was prepared."""
+    if system.exchange is None:
+        return "none"
+    return "reduced" if system.exchange.reduced else "as set"
+
+
+def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExchange:
+    """Return the exchange whose phases are steady states at these velocities of the strip; collective.
+
+    Raises:
+        CaseError: there is no heat, or a body has no heat sink.
+    """
+    if system.heat is None or system.bodies.heat is None:
+        raise CaseError(Problem("heat", "missing, but required here"))
+    return prepare_steady(
+        system.heat,
+        system.bodies.heat,
+        system.pair,
+        gap_rows(system),
+        velocities,
+        heating_friction(system),
+        system.bodies.punch.thickness,
+    )
+
+
+def gap_rows(system: Tribosystem) -> tuple[Array, Array]:
+    """Return the gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K."""
+    punch, strip = system.condensed.punch.by_temperature, system.condensed.strip.by_temperature
+    if punch is None or strip is None:
+        raise CaseError(Problem("heat", "missing, but required here"))
+    return punch, -strip
+
+
+def heating_friction(system: Placed, mu: Array | None = None) -> Array:
+    """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
+
+    Args:
+        system: The placed bodies.
+        mu: (n,); by default at the mean pressure.
+    """
+    mu = system.friction.values(system.conditions(0)) if mu is None else mu
+    return mu * system.sliding.field.rate(system.pair.punch.x)

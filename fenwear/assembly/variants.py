@@ -1,0 +1,142 @@
+"""A whole case in one call, and variants of it that share what they do not change."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.assembly.bodies import build_bodies, build_conduction
+from fenwear.assembly.placed import Placed, make_sliding, place
+from fenwear.assembly.tribosystem import (
+    Preparation,
+    Tribosystem,
+    condense_bodies,
+    elastic,
+    heating_friction,
+    joined,
+    preparation,
+    same_frame,
+    with_exchange,
+    with_reduced_heat,
+)
+from fenwear.case import Case, Heat, changed_case
+from fenwear.sliding.wear import Worn
+
+
+def assemble(
+    case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None, *, heat: Preparation = "as set"
+) -> Tribosystem:
+    """Return the system of a case: all steps; collective.
+
+    Args:
+        case: The problem.
+        comm: The ranks.
+        followed: Worn depths that the meshes follow; by default they are as they were made.
+        heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
+            small basis as whole cycles need it, or not at all.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong.
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    system = elastic(place_case(case, comm, followed))
+    if heat == "none":
+        return system
+    return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)
+
+
+def place_case(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None) -> Placed:
+    """Return both bodies of a case opposite each other, without any elasticity; collective.
+
+    Args:
+        case: The problem.
+        comm: The ranks.
+        followed: Worn depths that the meshes follow.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong.
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    bodies = build_bodies(case, comm, followed)
+    return place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case)
+
+
+def vary(system: Tribosystem, *settings: str) -> Tribosystem:
+    """Return the system with changed keys of its case, sharing all operators which the change leaves; collective.
+
+    Args:
+        system: Of a case.
+        settings: Overrides `key.path=value`, as on the command line.
+
+    Raises:
+        CaseError: an override does not fit, or the punch would tip over.
+    """
+    return with_case(system, changed_case(system.case, *settings))
+
+
+def with_case(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
+    """Return the system of another case that shares all operators which the change leaves; collective.
+
+    Loads, friction, wear, motion and the exchange of heat factor no stiffness again; another motion
+    prepares the steps of heat again. Anything else makes a new system.
+
+    Args:
+        system: Of a case.
+        case: The other one.
+        parts: Into which each phase of the motion is cut.
+
+    Raises:
+        CaseError: the punch would tip over.
+    """
+    before = system.case
+    if not _same_bodies(before, case):
+        return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
+    bodies, condensed = system.bodies, system.condensed
+    if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
+        bodies = bodies.under(case)
+    conducts_alike = _same_conduction(before, case)
+    if not conducts_alike:
+        bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip))
+    placed = place(bodies, make_sliding(case, parts), case.heat, solver=case.contact.solver, case=case)
+    if not same_frame(system, placed):
+        condensed = condense_bodies(placed)
+    elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
+        condensed = condensed.under_loads(bodies)
+    if system.exchange is None or case.heat is None:
+        return joined(placed, condensed)
+    if not conducts_alike or placed.motion != system.motion:
+        return with_exchange(joined(placed, condensed), reduced=system.exchange.reduced)
+    friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
+    return joined(placed, condensed, system.exchange.varied(case.heat, friction))
+
+
+def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
+    """Return the system with each phase of the motion cut into parts of equal time; collective."""
+    return with_case(system, system.case, parts)
+
+
+def _same_bodies(one: Case, other: Case) -> bool:
+    """Return whether two cases have the same meshes, stiffnesses and thermal expansion."""
+    first, second = (
+        (
+            case.geometry,
+            case.folder,
+            case.model,
+            case.materials,
+            case.heat is None,
+            *((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip)),
+        )
+        for case in (one, other)
+    )
+    return first == second
+
+
+def _same_conduction(one: Case, other: Case) -> bool:
+    """Return whether heat is conducted alike in the bodies of two cases, whatever passes between them."""
+    if one.heat is None or other.heat is None:
+        return one.heat is other.heat
+    own, others = (case.heat.model_dump(exclude=set(Heat.exchange_keys)) for case in (one, other) if case.heat)
+    held = [(case.punch.temperatures, case.strip.temperatures) for case in (one, other)]
+    return own == others and held[0] == held[1]

@@ -27,7 +27,7 @@ from pydantic import (
 
 from fenwear.arrays import Array
 from fenwear.case.dependence import evaluate, parse_expression, variables_of
-from fenwear.case.units import convert, quantity_text
+from fenwear.case.units import convert, quantity_text, shown
 from fenwear.errors import CaseError, Problem
 
 
@@ -47,7 +47,8 @@ Time = Annotated[float, *_quantity("s")]
 AngularFrequency = Annotated[float, *_quantity("rad/s")]
 Number = Annotated[float, *_quantity("")]
 Temperature = Annotated[float, *_quantity("K")]
-Conductance = Annotated[float, *_quantity("N/(mm*s*K)")]
+CONDUCTANCE = "N/(mm*s*K)"
+Conductance = Annotated[float, *_quantity(CONDUCTANCE)]
 Axis = Literal["x", "z"]
 
 
@@ -62,7 +63,7 @@ def _parameter(value: object) -> float:
     try:
         return convert(value, "mm")
     except ValueError:
-        raise ValueError(f"expected a number or a length such as '60 mm', got {value!r}") from None
+        raise ValueError(f"expected a number or a length such as '60 mm', got {shown(value)}") from None
 
 
 class Geometry(_Part):
@@ -422,6 +423,26 @@ class Tabulated(_ToAndFro):
         return self
 
 
+def _perfect_or_conductance(value: object) -> float | str:
+    """Convert a conductance, which may be perfect."""
+    if value == "perfect":
+        return "perfect"
+    try:
+        conductance = convert(value, CONDUCTANCE)
+    except ValueError as error:
+        raise ValueError(f"{error}; or 'perfect'") from None
+    if conductance < 0:
+        raise ValueError(f"expected greater than or equal to 0, got {shown(value)}")
+    return conductance
+
+
+PerfectOrConductance = Annotated[
+    float | Literal["perfect"],
+    BeforeValidator(_perfect_or_conductance),
+    PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
+]
+
+
 class Heat(_Part):
     """Friction heat and its conduction; without this table a case knows no temperature."""
 
@@ -429,8 +450,9 @@ class Heat(_Part):
         default=0.5, description="kappa, the punch's share of the friction heat"
     )
     debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
-    conductance: Annotated[Conductance, Field(ge=0)] | Literal["perfect"] = Field(
-        default=0.0, description="h_c between punch and strip where they touch"
+    conductance: PerfectOrConductance = Field(
+        default="perfect",
+        description="h_c between punch and strip where they touch; by default 0 where partition is given",
     )
     conductance_per_pressure: tuple[Annotated[float, *_quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
         default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
@@ -465,6 +487,15 @@ class Heat(_Part):
     reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
         default=3e-5, description="of the reduced operator's basis, relative"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _conductance_by_default(cls, data: object) -> object:
+        """Let a partition that is given rule, and leave the sharing to conduction where none is."""
+        if not isinstance(data, Mapping) or data.get("conductance") is not None:
+            return data
+        ruled = data.get("partition") is not None or data.get("conductance_per_pressure") is not None
+        return {**data, "conductance": 0.0 if ruled else "perfect"}
 
 
 class Run(_Part):

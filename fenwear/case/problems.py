@@ -23,7 +23,7 @@ EXPECTED = {
 }
 
 
-def problems_of(error: Any, data: Mapping[str, Any]) -> list[Problem]:
+def problems_of(error: Any, data: Mapping[str, Any]) -> list[Problem]:  # noqa: PLR0911
     """Turn one error of pydantic into problems with the key's path as in the case file.
 
     Args:
@@ -75,10 +75,9 @@ def _key(location: Sequence[str | int], data: object, *, missing: bool) -> str:
     """Return the path of an error: the steps that lead through the tables, not those through the types in between."""
     steps, place = [], data
     for number, step in enumerate(location):
-        if isinstance(place, Mapping) and step in place:
-            place = place[step]
-        elif isinstance(place, list | tuple) and isinstance(step, int) and step < len(place):
-            place = place[step]
+        in_list = isinstance(place, list | tuple) and isinstance(step, int) and step < len(place)
+        if in_list or (isinstance(place, Mapping) and step in place):
+            place = place[step]  # type: ignore[index]
         elif step in getattr(type(place), "model_fields", {}):
             place = getattr(place, str(step))
         elif not (missing and number == len(location) - 1):

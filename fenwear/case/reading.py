@@ -10,6 +10,7 @@ from typing import Any
 
 import pydantic
 
+from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
 from fenwear.case.schema import Case
 from fenwear.case.units import shown
@@ -86,9 +87,10 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
     try:
-        return Case.model_validate(data).at(folder)
+        case = Case.model_validate(data)
     except pydantic.ValidationError as error:
         raise CaseError([p for e in error.errors() for p in problems_of(e, data)]) from None
+    return case.at(folder, written(data, case.resolved()))
 
 
 def _read_text(path: Path) -> str:

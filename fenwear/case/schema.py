@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -528,6 +529,19 @@ class Output(_Part):
     )
 
 
+@dataclass(frozen=True)
+class Written:
+    """How the quantities of a case were written; no part of what the case is, so that all compare as equal.
+
+    Attributes:
+        bare: Keys of those that were numbers without a unit.
+        united: Those with a unit, as they were written.
+    """
+
+    bare: frozenset[str] = field(default=frozenset(), compare=False)
+    united: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+
 class Case(_Part):
     """A problem: the root of the case file."""
 
@@ -545,6 +559,7 @@ class Case(_Part):
     output: Output = Output()
 
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
+    _written: Written = Written()
 
     @model_validator(mode="after")
     def _materials_known(self) -> Self:
@@ -632,10 +647,16 @@ class Case(_Part):
         """The folder of the case file, None for a built-in case or one made in Python."""
         return self._folder
 
-    def at(self, folder: Path | None) -> Case:
-        """Return this case with the folder that its geometry's path starts from."""
+    @property
+    def written(self) -> Written:
+        """How its quantities were written; nothing is known of those of a case made from its parts."""
+        return self._written
+
+    def at(self, folder: Path | None, written: Written | None = None) -> Case:
+        """Return this case with the folder that its geometry's path starts from, and how it was written."""
         placed = self.model_copy()
         placed._folder = folder
+        placed._written = written or self._written
         return placed
 
     def resolved(self) -> dict[str, Any]:

@@ -70,7 +70,7 @@ def _convert_text(text: str, unit: str, expected: str) -> float:
         raise ValueError(f"{expected}, got {text!r}, whose unit is not known") from error
 
 
-def shown(value: object) -> str:
+def shown(value: object) -> str:  # noqa: PLR0911
     """Return a value as a message shows it, in the words of case files."""
     match value:
         case bool():

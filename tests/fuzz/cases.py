@@ -288,8 +288,9 @@ def compute(case: Case) -> None:
 
 # Words of Python and its libraries: nobody who writes a case file has to know them.
 PYTHON = re.compile(
-    r"Traceback|functools|\blambda\b|<class|NoneType|\bNone\b|\b(?:True|False)\b|object at 0x|np\.\w+\(|\barray\(|dtype|numpy"
-    r"|pydantic|validat(?:or|ion)|validate|instance of|\bdictionary\b|\btuple\b|\bTuple\b|\bstr\b|\bfloat\b|\bdict\b"
+    r"Traceback|functools|\blambda\b|<class|NoneType|\bNone\b|\b(?:True|False)\b|object at 0x|np\.\w+\("
+    r"|\barray\(|dtype|numpy|pydantic|validat(?:or|ion)|validate|instance of|\bdictionary\b|\b[tT]uple\b|\bstr\b"
+    r"|\bfloat\b|\bdict\b"
     r"|function-|\w+Error\b|keyword|argument of type|__\w+__|discriminator|\btag\b"
 )
 
@@ -305,9 +306,8 @@ def said(error: FenwearError) -> str:
     if not text.strip() or any(len(line) >= 2000 for line in text.splitlines()):
         return f"BAD MESSAGE {text[:500]}"
     for line in text.splitlines():
-        found = PYTHON.search(own_words(line.partition(": ")[2] or line)) or re.search(
-            r"[\[(]", line.partition(": ")[0]
-        )
+        key, _, message = line.partition(": ")
+        found = PYTHON.search(own_words(line if " " in key else message))
         if found:
             return f"BAD MESSAGE speaks Python ({found[0]}): {line}"
     return text

@@ -39,14 +39,14 @@ def test_the_fuzzer_finds(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_messages_speak_no_python() -> None:
     """Of many mutated cases, as far as their validation."""
-    refused = 0
+    said = []
     for seed in range(2_000_000, 2_001_500):
         try:
             make_case(cases.mutated(seed)[0])
         except CaseError as error:
-            refused += 1
-            assert not cases.said(error).startswith("BAD"), seed
-    assert refused > 500
+            said.append(cases.said(error))
+    assert len(said) > 500
+    assert not [text for text in said if text.startswith("BAD")]
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import FenwearError, System, jump, load_case, steady
+from fenwear import FenwearError, assemble, jump, load_case, steady
 from fenwear.cycle import cycles_to_reach
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
@@ -36,14 +36,13 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 
 
 # %% [markdown]
-# `System` makes the meshes and factors the two bodies. That is the costly part, done once by `prepare`.
+# `Tribosystem` makes the meshes and factors the two bodies. That is the costly part, done once by `prepare`.
 
 # %%
-system = System(load_case("example1", settings))
-system.prepare()
+system = assemble(load_case("example1", settings))
 state = steady(system)
 
-x, mean = system.facing.x, system.statics.mean_pressure
+x, mean = system.pair.x, system.rigid.mean_pressure
 print(f"solved in {1000 * state.seconds:.0f} ms, {state.iterations} Newton iterations")
 for d, pressure, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
     way = "rightward" if d > 0 else "leftward"
@@ -184,7 +183,7 @@ for factor in (0.5, 1.0, 2.0):
 
 # %%
 for height in (20, 40):
-    other = System(load_case("example1", [*settings, f"geometry.parameters.pin_height_1={height}"]))
+    other = assemble(load_case("example1", [*settings, f"geometry.parameters.pin_height_1={height}"]))
     found = steady(other)
     print(f"l_z = {height} mm: largest pressure {found.pressure.max():.3f} MPa, "
           f"width in contact {found.contact_width.min():.1f} mm")  # fmt: skip

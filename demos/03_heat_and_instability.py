@@ -27,7 +27,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import System, load_case, march, steady
+from fenwear import assemble, load_case, march, steady
 from fenwear.cycle import critical_speed, growth_rate, monotonic
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles
@@ -45,9 +45,8 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 # conduction: some seconds. Everything after it shares that work, because $\kappa$ leaves it as it is.
 
 # %%
-system = System(load_case("example1-heat", settings))
-system.prepare()
-x, mean = system.facing.x, system.statics.mean_pressure
+system = assemble(load_case("example1-heat", settings))
+x, mean = system.pair.x, system.rigid.mean_pressure
 speed = system.motion.mean_speed
 print(f"mean sliding speed {speed:.2f} mm/s, mean pressure {mean:.2f} MPa")
 print(f"mean friction power {0.001 * system.case.contact.friction * 10_000 * speed:.1f} W")

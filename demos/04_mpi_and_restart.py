@@ -159,7 +159,7 @@ assert refused.returncode == 2
 #
 # Meshes, factors and full temperature fields are distributed, so large meshes fit and are set up faster. The contact
 # itself is small, and every process holds it: half-cycles do not get faster. For a mesh like the one here one process
-# is best. To sweep a parameter, start several runs side by side instead, or use `System.vary` (notebook 2).
+# is best. To sweep a parameter, start several runs side by side instead, or use `Tribosystem.vary` (notebook 2).
 
 # %%
 temporary.cleanup()

@@ -27,7 +27,7 @@ import numpy as np
 import xarray
 from matplotlib.collections import PolyCollection
 
-from fenwear import CaseError, System, make_case, steady
+from fenwear import CaseError, assemble, make_case, steady
 from fenwear.compat import geometry_dofmap
 from fenwear.cycle import growth_rate
 from fenwear.report.figures import read_history
@@ -196,21 +196,20 @@ except CaseError as error:
 # Always look at it before you run.
 
 # %%
-system = System(case)
-system.prepare()
+system = assemble(case)
 colours = {"punch_lining": "#E69F00", "punch_back": "#56B4E9", "strip_rail": "0.8"}
 figure, ax = plt.subplots(figsize=(7.5, 3.4), layout="constrained")
-for body in (system.punch.body, system.strip.body):
+for body in (system.bodies.punch.body, system.bodies.strip.body):
     points, corners = body.mesh.geometry.x[:, :2], geometry_dofmap(body.mesh)
     for region, tag in body.regions.items():
         cells = corners[body.cell_tags.find(tag)]
         ax.add_collection(PolyCollection(points[cells], facecolor=colours[region], edgecolor="0.3", linewidth=0.4))
         ax.plot([], [], "s", color=colours[region], label=region)
-ax.plot(system.facing.x, 0 * system.facing.x, color="#D55E00", linewidth=2, label="contact")
+ax.plot(system.pair.x, 0 * system.pair.x, color="#D55E00", linewidth=2, label="contact")
 ax.set(aspect="equal", xlim=(-82, 82), ylim=(-32, 22), xlabel="x (mm)", ylabel="z (mm)")
 figure.legend(loc="outside upper center", ncols=4, frameon=False)
 plt.show()
-print(f"{len(system.facing.x)} contact nodes, mean pressure {system.statics.mean_pressure:.2f} MPa")
+print(f"{len(system.pair.x)} contact nodes, mean pressure {system.rigid.mean_pressure:.2f} MPa")
 
 # %% [markdown]
 # ## Steady state first
@@ -220,7 +219,7 @@ print(f"{len(system.facing.x)} contact nodes, mean pressure {system.statics.mean
 # %%
 state = steady(system)
 rate = growth_rate(system, state.pressure)
-print(f"largest pressure {state.pressure.max():.2f} MPa, twice the mean is {2 * system.statics.mean_pressure:.2f} MPa")
+print(f"largest pressure {state.pressure.max():.2f} MPa, twice the mean is {2 * system.rigid.mean_pressure:.2f} MPa")
 print(f"largest temperature: lining {state.heat.punch.max():.1f} K, rail {state.heat.strip.max():.1f} K")
 print(f"growth rate {rate:+.2g} 1/s: {'stable' if rate < 0 else 'unstable'}")
 
@@ -246,7 +245,7 @@ for d, colour, name in ((1, BLUE, "rightward"), (-1, RED, "leftward")):
         x, state.pressure[state.directions.index(d)], "k--", linewidth=1, label=None if d > 0 else "steady state"
     )
 axes[0].set(ylabel="pressure (MPa)", title="Contact pressure")
-axes[0].set_ylim(0, 3 * system.statics.mean_pressure)
+axes[0].set_ylim(0, 3 * system.rigid.mean_pressure)
 axes[0].legend(frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
 axes[1].plot(x, 1000 * (history.wear[-1] - history.wear[-1].min()), color="0", label="run")
 axes[1].plot(x, 1000 * (state.shape - state.shape.min()), "--", color="#56B4E9", label="steady state")

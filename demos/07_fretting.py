@@ -24,7 +24,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import CaseError, ConvergenceError, System, jump, load_case, steady
+from fenwear import CaseError, ConvergenceError, assemble, jump, load_case, steady
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements and cycles
 ELEMENTS, CYCLES = (16, (100, 500, 1_000)) if COARSE else (30, (1_000, 5_000, 18_000))
@@ -41,15 +41,14 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 
 # %%
 settings = [f"geometry.parameters.elements_along_contact={ELEMENTS}"]
-system = System(load_case("fretting", settings))
-system.prepare()
+system = assemble(load_case("fretting", settings))
 
 load, radius, modulus = 18.5, 6.0, 200e3 / (2 * (1 - 0.3**2))  # N/mm, mm, MPa
 a = np.sqrt(4 * load * radius / (np.pi * modulus))
-start = system.contact((1,)).solve(system.facing.initial_gap)
-x = system.facing.x
+start = system.contact((1,)).solve(system.pair.initial_gap)
+x = system.pair.x
 print(f"Hertz:   half-width {1e3 * a:.1f} µm, largest pressure {2 * load / (np.pi * a):.1f} MPa")
-closed = system.facing.weights @ (start.pressure[0] > 0)  # the length that the nodes in contact stand for
+closed = system.pair.weights @ (start.pressure[0] > 0)  # the length that the nodes in contact stand for
 print(f"fenwear: half-width {1e3 * closed / 2:.1f} µm, largest pressure {start.pressure.max():.1f} MPa, "
       f"with nodes every {1e3 * np.diff(x).min():.0f} µm")  # fmt: skip
 
@@ -66,11 +65,11 @@ for block in jump(system, 2 * CYCLES[-1], tolerance=0.05, stops=frozenset(2 * n 
     blocks[int(block.half_cycle[-1]) // 2] = block
 print(f"{CYCLES[-1]:,} cycles in {time.perf_counter() - begin:.1f} s")
 
-strip = system.facing.strip
+strip = system.pair.strip
 for cycles in CYCLES:
     block = blocks[cycles]
     distance = cycles * 4 * 0.025  # mm
-    lost = system.facing.weights @ block.wear[-1], strip.weights @ block.wear_strip[-1]
+    lost = system.pair.weights @ block.wear[-1], strip.weights @ block.wear_strip[-1]
     exact = 1.9e-8 * load * distance, 2.9e-8 * load * distance
     print(f"after {cycles:6,} cycles: flat {1e3 * block.wear_strip[-1].max():.3f} µm deep, cylinder "
           f"{1e3 * block.wear[-1].max():.3f} µm, largest pressure {block.max_pressure[-1]:.0f} MPa; "
@@ -131,6 +130,6 @@ try:
 except ConvergenceError as error:
     print(error)
 try:
-    system.vary("motion.amplitude=0.5 mm").prepare()
+    system.vary("motion.amplitude=0.5 mm")
 except CaseError as error:
     print(error)

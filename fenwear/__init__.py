@@ -2,8 +2,8 @@
 
 From Python:
 
-    from fenwear import System, load_case, steady
-    system = System(load_case("example1"))
+    from fenwear import assemble, load_case, steady
+    system = assemble(load_case("example1"))
     print(steady(system).pressure.max())
 """
 
@@ -18,7 +18,8 @@ __all__ = [
     "CaseError",
     "ConvergenceError",
     "FenwearError",
-    "System",
+    "Tribosystem",
+    "assemble",
     "jump",
     "load_case",
     "make_case",
@@ -33,7 +34,8 @@ _HOMES = {
     "CaseError": "errors",
     "ConvergenceError": "errors",
     "FenwearError": "errors",
-    "System": "system",
+    "Tribosystem": "assembly",
+    "assemble": "assembly",
     "jump": "cycle",
     "march": "cycle",
     "steady": "cycle",

@@ -18,8 +18,8 @@ from fenwear.errors import CaseError, Problem
 from fenwear.parallel import on_root
 
 if TYPE_CHECKING:
+    from fenwear.assembly import Tribosystem
     from fenwear.cycle import Steady
-    from fenwear.system import System
 
 app = typer.Typer(
     help="Thermo-mechanical sliding wear with FEniCSx. Without a command: runs the built-in Example 1.",
@@ -94,14 +94,13 @@ def run(
 @app.command("steady")
 def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
     """Solve for the cyclic steady state directly."""
+    from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
-    from fenwear.system import System
     from fenwear.watch import steady_warnings
 
     begin = time.perf_counter()
     loaded = _load(case, settings)
-    system = System(loaded)
-    system.prepare()  # here, so that the times are told apart
+    system = assemble(loaded, heat="reduced")
     setup = time.perf_counter() - begin
     state = steady(system)
     warnings = [*doubts(loaded), *steady_warnings(system, state)]
@@ -119,7 +118,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     _print_json(
         {
-            "x": system.facing.x.tolist(),
+            "x": system.pair.x.tolist(),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
@@ -137,13 +136,13 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     )
 
 
-def _print_steady(case: str, system: System, state: Steady) -> None:
+def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     """Print the state as soon as it is there: the way to it may take longer."""
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
         print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
               f"contact width {width:7.3f} mm")  # fmt: skip
-    print(f"  mean pressure {system.statics.mean_pressure:.4f} MPa")
+    print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
     if state.heat is not None:
         punch, strip = state.heat.punch.max(), state.heat.strip.max()
@@ -176,12 +175,12 @@ def _velocities(velocity: dict[str, float], per: str) -> str:
 @app.command("optimum")
 def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
     """Print lambda_F, lambda_M, the optimal pressure and the angle chi of the wear velocity in both directions."""
-    from fenwear.system import System
+    from fenwear.assembly import place_case
 
-    system = System(_load(case, settings))
+    system = place_case(_load(case, settings))
     found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
     if as_json:
-        x = system.facing.x.tolist()
+        x = system.pair.x.tolist()
         _print_json(
             {
                 n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
@@ -193,26 +192,26 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
         print(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):
             chi = math.degrees(state.tilt[end])
-            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at x = {system.facing.x[end]:g} mm")
+            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at x = {system.pair.x[end]:g} mm")
 
 
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
+    from fenwear.assembly import assemble
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
-    from fenwear.system import System
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
-    system = System(loaded)
+    system = assemble(loaded, heat="none")
     number = stability_number(system)
     system.check_touching()
     for warning in [*position_warnings(system), *doubts(loaded), *initial_warnings(system)]:
         log(f"warning: {warning}")
     print(loaded.to_toml())
-    log(f"the case is valid: {len(system.facing.x)} contact nodes, "
-        f"{system.punch.stiffness.size[0] + system.strip.stiffness.size[0]:,} displacement degrees of freedom, "
+    log(f"the case is valid: {len(system.pair.x)} contact nodes, "
+        f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
 
 

@@ -23,10 +23,10 @@ from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Case
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
 
 SMOOTH = np.cos(np.radians(20))  # cosine of the angle between two facets up to which the boundary goes on
 FINE = 4001  # abscissae of the gap between the bodies
@@ -98,13 +98,13 @@ class ContactEnds:
         return highest if missing(highest) <= 0 else float(brentq(missing, 0.0, highest))
 
 
-def contact_ends(system: System) -> ContactEnds | None:
+def contact_ends(system: Tribosystem) -> ContactEnds | None:
     """Return how the contact surface of a system ends; collective. None where it has no two ends.
 
     Args:
         system: On meshes as they were made, not moved by wear.
     """
-    outlines = [_outline(elastic.body) for elastic in (system.punch, system.strip)]
+    outlines = [_outline(elastic.body) for elastic in (system.bodies.punch, system.bodies.strip)]
     if outlines[0] is None or outlines[1] is None:
         return None
     punch, strip = outlines[0], outlines[1]
@@ -127,9 +127,9 @@ def clipped_text(ends: ContactEnds, places: list[float], needed: float, case: Ca
     )
 
 
-def opened_area(system: System, worn: Worn) -> float:
+def opened_area(system: Tribosystem, worn: Worn) -> float:
     """Return the cross-section that depths worn off both bodies open in the middle position, mm²."""
-    return float(system.facing.weights @ system.facing.opening(worn.punch, worn.strip))
+    return float(system.pair.weights @ system.pair.opening(worn.punch, worn.strip))
 
 
 def _contact_modulus(case: Case) -> float:

@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, ConvergenceError, Problem
-from fenwear.interface import Statics
+from fenwear.interface import RigidEquilibrium
 
 
 @dataclass(frozen=True)
@@ -35,19 +35,19 @@ class Optimum:
     tilt: Array
 
 
-def check_equilibrium(statics: Statics, direction: int, slip: Array) -> None:
+def check_equilibrium(rigid: RigidEquilibrium, direction: int, friction_ratio: Array) -> None:
     """Make sure that some pressure p >= 0 balances the loads.
 
     Args:
         direction: Sliding direction d, for the message.
-        slip: tau = d mu (n,).
+        friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
 
     Raises:
         CaseError: the loads would lift the punch or tip it over.
     """
-    rows = statics.equilibrium(slip)
+    rows = rigid.equilibrium(friction_ratio)
     scale = np.abs(rows).max(axis=1, initial=1e-300)
-    target = -statics.resultant / scale
+    target = -rigid.resultant / scale
     size = np.abs(target).max(initial=0.0)
     # Not scipy 1.15's nnls: it stops before the solution of such a wide system.
     if len(target) and (
@@ -64,33 +64,34 @@ def check_equilibrium(statics: Statics, direction: int, slip: Array) -> None:
 
 
 def optimum(
-    statics: Statics,
-    slip: Array,
-    wear_rate: float,
+    rigid: RigidEquilibrium,
+    friction_ratio: Array,
+    wear_rate: Array,
     pressure_exponent: float,
     zone: Mask | None = None,
 ) -> Optimum:
     """Return the optimal pressure and the wear velocity.
 
     Args:
-        slip: tau = d mu (n,).
-        wear_rate: K, the mean of beta~ v^a, mm/s MPa^-b.
+        friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
+        wear_rate: K of the nodes (n,), the mean of beta~ v^a, mm/s MPa^-b.
         pressure_exponent: b.
         zone: Nodes that are in contact (n,) bool; by default all.
 
     Raises:
         ConvergenceError: Newton's method found no equilibrium.
     """
-    weights_rows = statics.equilibrium(slip)
-    modes = statics.rigid_normal
+    weights_rows = rigid.equilibrium(friction_ratio)
+    modes = rigid.rigid_normal
     if zone is not None:
         weights_rows = weights_rows * zone
-    p_mean, b = statics.mean_pressure, pressure_exponent
+    p_mean, b = rigid.mean_pressure, pressure_exponent
     lengths = np.abs(modes).max(axis=0, initial=1e-300)
-    shape = modes / lengths
-    rows = weights_rows / (lengths[:, None] * p_mean * statics.facing.weights.sum())
-    resultant = statics.resultant / (lengths * p_mean * statics.facing.weights.sum())
-    # Unknown y: w_n / (K p_mean^b) = shape y, so that p / p_mean = (shape y)_+^(1/b).
+    mean_rate = float(wear_rate.mean())
+    shape = modes / lengths * (mean_rate / wear_rate)[:, None]
+    rows = weights_rows / (lengths[:, None] * p_mean * rigid.pair.weights.sum())
+    resultant = rigid.resultant / (lengths * p_mean * rigid.pair.weights.sum())
+    # Unknown y: w_n / (K p_mean^b) = shape y at each node, so that p / p_mean = (shape y)_+^(1/b).
     y = np.linalg.lstsq(shape, np.ones(len(shape)), rcond=None)[0]
     pressure, residual = _pressure(shape @ y, b), np.inf
     force = rows @ pressure * p_mean + resultant
@@ -112,12 +113,22 @@ def optimum(
         y, pressure, force = trial, trial_pressure, trial_force
     if residual > 1e-10:
         raise ConvergenceError(f"the optimum did not converge: residual {residual:.3g} of the load")
-    velocity = wear_rate * p_mean**b * y / lengths
-    names = statics.mode_names
+    velocity = mean_rate * p_mean**b * y / lengths
+    names = rigid.mode_names
     if zone is not None:
         pressure = pressure * zone
-    tilt = np.arctan2(statics.rigid_tangential @ velocity, modes @ velocity)
+    tilt = np.arctan2(_tangential(rigid, velocity), modes @ velocity)
     return Optimum(pressure * p_mean, dict(zip(names, velocity.tolist(), strict=True)), residual, tilt)
+
+
+def _tangential(rigid: RigidEquilibrium, velocity: Array) -> Array:
+    """Return the wear velocity within the contact along +x in the plane, else its size (n,)."""
+    motion = rigid.motion @ velocity
+    normal = rigid.pair.normal
+    if normal.shape[1] == 2:
+        return motion[:, 0] * normal[:, 1] - motion[:, 1] * normal[:, 0]
+    within = motion - np.einsum("id,id->i", motion, normal)[:, None] * normal
+    return np.linalg.norm(within, axis=1)
 
 
 def _pressure(w: Array, b: float) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 from mpi4py import MPI
 from tqdm import tqdm
 
+from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
@@ -33,7 +34,6 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
-from fenwear.system import System
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -73,8 +73,7 @@ def run_case(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     begin = time.perf_counter()
-    system = System(case, comm)
-    system.prepare()
+    system = assemble(case, comm, heat=preparation_of(case))
     if not resume:
         system.check_touching()
     setup = time.perf_counter() - begin
@@ -86,7 +85,7 @@ def run_case(
 
 
 def _run(
-    system: System, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
+    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
@@ -110,6 +109,11 @@ def _run(
     return summary
 
 
+def preparation_of(case: Case) -> Preparation:
+    """Return how the heat of a case's run is prepared: jumps need it reduced."""
+    return "reduced" if case.run.integration == "jump" else "as set"
+
+
 def _way_on(directory: Path) -> str:
     """Say how to go on after a fault of the disk."""
     reached = checkpoint.reached(directory)
@@ -121,7 +125,7 @@ def _way_on(directory: Path) -> str:
 class _Run:
     """A run in its folder: takes the blocks, keeps history and checkpoints."""
 
-    def __init__(self, system: System, directory: Path, log: Log, *, resume: bool) -> None:
+    def __init__(self, system: Tribosystem, directory: Path, log: Log, *, resume: bool) -> None:
         self.directory, self.log = directory, log
         self.comm, self.case = system.comm, system.case
         self.watch = Watch(system)
@@ -129,8 +133,7 @@ class _Run:
         if resume:
             followed = checkpoint.followed(directory, system)
             if followed is not None:
-                system = System(self.case, self.comm, followed)
-                system.prepare()
+                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case))
             start = checkpoint.load(directory, system, self._exchange(system))
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
@@ -185,9 +188,9 @@ class _Run:
                 if interrupted:
                     raise InterruptedRunError(f"interrupted after half-cycle {self.moment.half_cycle}")
 
-    def _exchange(self, system: System) -> HeatExchange | None:
+    def _exchange(self, system: Tribosystem) -> HeatExchange | None:
         """Return the heat exchange that the run integrates."""
-        return system.reduced_exchange if self.case.run.integration == "jump" else system.exchange
+        return system.exchange
 
     def _blocks(self) -> Iterator[Block]:
         for block in follow(self.system, self._integrate, self._exchange, self.start):
@@ -201,7 +204,7 @@ class _Run:
         strokes = self.system.motion.half_cycles if self.case.run.integration == "jump" else 1
         return self.case.run.half_cycles // strokes * strokes
 
-    def _integrate(self, system: System, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+    def _integrate(self, system: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         run = self.case.run
         shared: dict[str, Any] = {"periodic_within": run.periodic_within, "start": start, "stops": self._fields_at}
         if run.integration == "jump":
@@ -306,7 +309,7 @@ class _Signals:
             signal.signal(number, handler)
 
 
-def position_warnings(system: System) -> list[str]:
+def position_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of the positions of a strip that wears."""
     spacing, motion = system.position_spacing, system.motion
     if not system.track_deepens or spacing <= FAR_APART:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
 from fenwear.clipped import clipped_text, contact_ends, opened_area
 from fenwear.cycle import Block, Steady
-from fenwear.system import System
 
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
 
@@ -21,14 +21,14 @@ class Watch:
         system: The assembled problem on meshes as they were made, not moved by wear; collective.
     """
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Tribosystem) -> None:
         self.system, self.ends = system, contact_ends(system)
         self._texts: dict[str, str] = {}
         self._first_clipped = 0
 
     def see(self, block: Block) -> list[str]:
         """Take the next block and return what is to be said of it that was not said of an earlier one."""
-        case, weights = self.system.case, block.system.facing.weights
+        case, weights = self.system.case, block.system.pair.weights
         found = {"clipped": self._clipped(block)}
         found["pressed"] = pressed(case, float(mean_pressures(block.pressure, weights).max()))
         if block.heat is not None:
@@ -59,7 +59,7 @@ class Watch:
         row = int(np.argmax((held & self.ends.goes_on).any(axis=1)))
         self._first_clipped = self._first_clipped or int(block.half_cycle[row])
         needed = self.ends.width_needed(
-            opened_area(self.system, block.end.worn), float(block.system.facing.weights @ block.pressure[-1])
+            opened_area(self.system, block.end.worn), float(block.system.pair.weights @ block.pressure[-1])
         )
         text = clipped_text(self.ends, places, needed, self.system.case)
         return f"from half-cycle {self._first_clipped:,} on {text}"
@@ -99,10 +99,10 @@ def hot(temperature: float, when: str) -> str:
     )
 
 
-def initial_warnings(system: System) -> list[str]:
+def initial_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of the contact before any wear; collective."""
     contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
-    pressure, weights, ends = contact.pressure[0], system.facing.weights, contact_ends(system)
+    pressure, weights, ends = contact.pressure[0], system.pair.weights, contact_ends(system)
     texts = [pressed(system.case, float(mean_pressures(pressure[None], weights)[0]))]
     places = [] if ends is None else ends.reached((bool(pressure[0] > 0), bool(pressure[-1] > 0)))
     if ends is not None and places:
@@ -110,9 +110,9 @@ def initial_warnings(system: System) -> list[str]:
     return [text for text in texts if text]
 
 
-def steady_warnings(system: System, state: Steady) -> list[str]:
+def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
     """Return what is to be said of a cyclic steady state; collective."""
-    weights, ends = system.facing.weights, contact_ends(system)
+    weights, ends = system.pair.weights, contact_ends(system)
     texts = [pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max()))]
     if state.heat is not None:
         texts.append(hot(float(max(state.heat.punch.max(), state.heat.strip.max())), "in the cyclic steady state"))

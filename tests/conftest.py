@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, settings
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenwear import Case, System, load_case, make_case
+from fenwear import Case, Tribosystem, assemble, load_case, make_case
 
 # The same examples on every machine and every rank; --hypothesis-profile=search looks for others.
 settings.register_profile(
@@ -32,19 +32,19 @@ Edit = Callable[[dict[str, Any]], object]
 
 
 @lru_cache(maxsize=24)  # the largest hold some hundred MB
-def _assembled(name: str, settings: tuple[str, ...]) -> System:
-    return System(load_case(name, settings))
+def _assembled(name: str, settings: tuple[str, ...]) -> Tribosystem:
+    return assemble(load_case(name, settings))
 
 
 @pytest.fixture(scope="session")
-def assemble() -> Iterator[Callable[..., System]]:
-    """Return assemble(name, *settings): the system of a built-in case, made once a session."""
+def assembled() -> Iterator[Callable[..., Tribosystem]]:
+    """Return assembled(name, *settings): the system of a built-in case, made once a session."""
     yield lambda name, *settings: _assembled(name, settings)
     _assembled.cache_clear()
 
 
 @pytest.fixture(scope="session")
-def unmatched(tmp_path_factory: pytest.TempPathFactory) -> System:
+def unmatched(tmp_path_factory: pytest.TempPathFactory) -> Tribosystem:
     """Return Example 1 on meshes whose contact nodes do not match: the strip has two elements more on each half."""
     from fenwear.bodies.mesh import meshes_folder
 
@@ -54,7 +54,7 @@ def unmatched(tmp_path_factory: pytest.TempPathFactory) -> System:
     folder = tmp_path_factory.mktemp("unmatched")
     (folder / "unmatched.geo").write_text(text.replace(old, old.replace("+ 1", "+ 3")), "utf-8")
     (folder / "case.toml").write_text('base = "example1"\ngeometry.file = "unmatched.geo"\n')
-    return System(load_case(folder / "case.toml"))
+    return assemble(load_case(folder / "case.toml"))
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fenwear as package
-from fenwear import System, steady
+from fenwear import Tribosystem, steady
 from fenwear.case import builtin_cases
 
 Run = Callable[..., Any]
@@ -36,7 +36,7 @@ def test_optimum_json(fenwear: Run) -> None:
     assert len(found["leftward"]["x"]) == len(found["leftward"]["pressure"]) == 65
 
 
-def test_steady_json(fenwear: Run, assemble: Callable[..., System]) -> None:
+def test_steady_json(fenwear: Run, assembled: Callable[..., Tribosystem]) -> None:
     """The keys of shared/design.md; p+ + p- = 2 p_m; the same numbers as from Python."""
     done = fenwear("steady", "example1", "--json")
     assert done.returncode == 0, done.stderr
@@ -45,7 +45,7 @@ def test_steady_json(fenwear: Run, assemble: Callable[..., System]) -> None:
     assert found["temperature"] is None
     total = np.add(found["pressure_plus"], found["pressure_minus"])
     np.testing.assert_allclose(total, 2 * MEAN, rtol=1e-9)
-    state = steady(assemble("example1"))
+    state = steady(assembled("example1"))
     np.testing.assert_allclose(found["pressure_plus"], state.pressure[0], atol=1e-9 * MEAN)
     np.testing.assert_allclose(found["shape"], state.shape, atol=1e-9 * np.ptp(state.shape))
 

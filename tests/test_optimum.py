@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import fsolve
 
-from fenwear import CaseError, System, load_case
+from fenwear import CaseError, Tribosystem, assemble, load_case
 from fenwear.arrays import Array
 
 A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
@@ -18,11 +18,11 @@ A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("name", ["example1", "example2"])
 @pytest.mark.parametrize("b", [0.5, 1.0, 2.0, 3.0])
-def test_equilibrium(assemble: Callable[..., System], name: str, b: float, direction: int) -> None:
+def test_equilibrium(assembled: Callable[..., Tribosystem], name: str, b: float, direction: int) -> None:
     """Verification 6: force and moment balance of the pressure to 1e-10, by hand; p^b is a rigid motion over K."""
-    system = assemble(name, f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
+    system = assembled(name, f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
     found = system.optimum(direction)
-    x, force = system.facing.x, system.facing.weights * found.pressure
+    x, force = system.pair.x, system.pair.weights * found.pressure
     assert found.residual < 1e-10
     assert (found.pressure >= 0).all()
     assert force.sum() == pytest.approx(1000, rel=1e-10)
@@ -36,9 +36,9 @@ def test_equilibrium(assemble: Callable[..., System], name: str, b: float, direc
 
 
 @pytest.mark.parametrize("b", [0.5, 2.0, 3.0])
-def test_power_law_against_adaptive_quadrature(assemble: Callable[..., System], b: float) -> None:
+def test_power_law_against_adaptive_quadrature(assembled: Callable[..., Tribosystem], b: float) -> None:
     """The same equilibrium with p = (f + g x)^(1/b), integrated by QUADPACK and solved by MINPACK."""
-    system = assemble("example1", f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
+    system = assembled("example1", f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
 
     def shape(x: float, f: float, g: float) -> float:
         return max(f + g * x / A, 0.0) ** (1 / b)
@@ -48,13 +48,13 @@ def test_power_law_against_adaptive_quadrature(assemble: Callable[..., System], 
         return [moments[0] / 60 - 1, moments[1] / 60 + 0.25 * 20]
 
     f, g = fsolve(balance, [1.0, -0.4], xtol=1e-12)
-    exact = np.array([shape(x, f, g) for x in system.facing.x]) * MEAN
-    inside = system.facing.x < 26  # b = 3: p meets zero near the right edge, with an infinite slope
+    exact = np.array([shape(x, f, g) for x in system.pair.x]) * MEAN
+    inside = system.pair.x < 26  # b = 3: p meets zero near the right edge, with an infinite slope
     np.testing.assert_allclose(system.optimum(1).pressure[inside], exact[inside], rtol=2e-5 if b < 3 else 2e-3)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_open_contact_is_a_triangle(assemble: Callable[..., System], direction: int) -> None:
+def test_open_contact_is_a_triangle(assembled: Callable[..., Tribosystem], direction: int) -> None:
     """b = 1 with c > 1: a triangle whose centroid lies at x = -d mu l_z, so 3 (a - mu l_z) long, peak 2 P / length.
 
     The kink lies inside an element; the error falls with the nodes' weights, second order.
@@ -64,30 +64,30 @@ def test_open_contact_is_a_triangle(assemble: Callable[..., System], direction: 
     errors = []
     for count in (16, 64):
         settings = (f"contact.friction={mu}", f"geometry.parameters.elements_along_contact={count}")
-        system = assemble("monotonic-lz40", "geometry.degree=1", *settings)
+        system = assembled("monotonic-lz40", "geometry.degree=1", *settings)
         edge = -direction * A
-        exact = 2 * 1000 / length * np.maximum(1 - np.abs(system.facing.x - edge) / length, 0)
+        exact = 2 * 1000 / length * np.maximum(1 - np.abs(system.pair.x - edge) / length, 0)
         found = system.optimum(direction)
         errors.append(np.abs(found.pressure - exact).max() / exact.max())
         assert found.residual < 1e-10
     assert errors[1] < min(1e-3, errors[0] / 8)
 
 
-def test_zone(assemble: Callable[..., System]) -> None:
+def test_zone(assembled: Callable[..., Tribosystem]) -> None:
     """Only nodes of the contact zone carry: on the middle half of Example 2 the optimum is 2 p_m."""
-    system = assemble("example2", "geometry.parameters.edge_grading=1")
-    zone = np.abs(system.facing.x) < 15.1
+    system = assembled("example2", "geometry.parameters.edge_grading=1")
+    zone = np.abs(system.pair.x) < 15.1
     pressure = system.optimum(1, zone).pressure
     assert (pressure[~zone] == 0).all()
     assert np.ptp(pressure[zone]) < 1e-10
-    assert system.facing.weights @ pressure == pytest.approx(1000, rel=1e-10)
+    assert system.pair.weights @ pressure == pytest.approx(1000, rel=1e-10)
 
 
 @pytest.mark.mpi
-def test_neither_speed_nor_wear_coefficient_changes_the_pressure(assemble: Callable[..., System]) -> None:
+def test_neither_speed_nor_wear_coefficient_changes_the_pressure(assembled: Callable[..., Tribosystem]) -> None:
     """shared/physics.md, part 5; lambda is proportional to both."""
-    one = assemble("monotonic-lz20").optimum(1)
-    other = assemble("monotonic-lz20", "motion.speed=50", "wear.punch.coefficient=3e-5").optimum(1)
+    one = assembled("monotonic-lz20").optimum(1)
+    other = assembled("monotonic-lz20", "motion.speed=50", "wear.punch.coefficient=3e-5").optimum(1)
     np.testing.assert_allclose(other.pressure, one.pressure, rtol=1e-12)
     for name, value in one.velocity.items():
         assert other.velocity[name] == pytest.approx(value * 3 / 4, rel=1e-10)
@@ -106,12 +106,12 @@ def test_neither_speed_nor_wear_coefficient_changes_the_pressure(assemble: Calla
 def test_tipping_punch_is_refused(settings: tuple[str, ...]) -> None:
     """No pressure balances a resultant beyond the contact's edges (issue 2, "Bad input")."""
     with pytest.raises(CaseError, match=r"punch\.loads: no pressure on the contact balances .*(tips|lifts)"):
-        System(load_case("example1", settings))
+        assemble(load_case("example1", settings))
 
 
 def test_almost_tipping_punch_is_accepted() -> None:
     """mu l_z just below a still has an equilibrium, at the edge."""
-    system = System(load_case("example1", ["contact.friction=0.74", "geometry.parameters.pin_height_1=40"]))
+    system = assemble(load_case("example1", ["contact.friction=0.74", "geometry.parameters.pin_height_1=40"]))
     for d in (1, -1):
-        p = system.contact((d,)).solve(system.facing.initial_gap).pressure[0]
-        assert system.facing.weights @ (p * system.facing.x) == pytest.approx(-d * 29.6 * 1000, rel=1e-9)
+        p = system.contact((d,)).solve(system.pair.initial_gap).pressure[0]
+        assert system.pair.weights @ (p * system.pair.x) == pytest.approx(-d * 29.6 * 1000, rel=1e-9)

@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from fenwear import System, load_case, march, steady
+from fenwear import assemble, load_case, march, steady
 from fenwear.paper import (
     FULL,
     Row,
@@ -87,9 +87,9 @@ def test_rows() -> None:
 
 
 def test_numbers_are_those_of_the_public_functions() -> None:
-    """What a row shows is what System, march and steady give by hand."""
+    """What a row shows is what Tribosystem, march and steady give by hand."""
     run = heat_runs("example1-heat", SCOPE)[1]
-    system = System(load_case("example1-heat", [*COARSE, "heat.partition=0.5"]))
+    system = assemble(load_case("example1-heat", [*COARSE, "heat.partition=0.5"]))
     block = next(march(system, 30))
     assert block.heat is not None
     np.testing.assert_allclose(run.pressure[:30], block.pressure, rtol=1e-6)
@@ -197,7 +197,7 @@ def test_the_full_comparison() -> None:
     rows = paper_rows(scope)
     verdicts = [row.verdict for row in rows]
     assert [verdicts.count(v) for v in get_args(Verdict)] == [3, 9, 3]
-    hot = System(load_case("example1-heat"))
+    hot = assemble(load_case("example1-heat"))
     states = [steady_heat(hot.vary(f"heat.partition={share}")) for share in FULL.shares]
     expected = {
         "monotonic": [11.1, 20.9, 30.7, 40.5, 50.3, 60.1],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, System, jump, load_case, march, steady
+from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.errors import Problem
 from fenwear.parallel import on_root
 
@@ -19,19 +19,19 @@ several = pytest.mark.skipif(COMM.size == 1, reason="needs several ranks: mpirun
 @several
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", ["example1", "example2"])
-def test_a_distributed_system_is_the_same_system(assemble: Callable[..., System], name: str) -> None:
+def test_a_distributed_system_is_the_same_system(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Verification 18: this communicator against each rank on its own, to 1e-9 relative."""
-    alone = System(load_case(name), MPI.COMM_SELF)
-    together = assemble(name)
+    alone = assemble(load_case(name), MPI.COMM_SELF)
+    together = assembled(name)
     assert (
         together.punch.body.mesh.topology.index_map(2).size_local
         < alone.punch.body.mesh.topology.index_map(2).size_local
     )
-    np.testing.assert_allclose(together.facing.x, alone.facing.x, atol=1e-12)
-    np.testing.assert_allclose(together.statics.resultant, alone.statics.resultant, rtol=1e-12)
+    np.testing.assert_allclose(together.pair.x, alone.pair.x, atol=1e-12)
+    np.testing.assert_allclose(together.rigid.resultant, alone.rigid.resultant, rtol=1e-12)
     for solve in (
-        lambda s: s.contact((1,)).solve(s.facing.initial_gap).pressure,
-        lambda s: s.contact((-1,)).solve(s.facing.initial_gap).pressure,
+        lambda s: s.contact((1,)).solve(s.pair.initial_gap).pressure,
+        lambda s: s.contact((-1,)).solve(s.pair.initial_gap).pressure,
         lambda s: next(march(s, 30)).pressure,
         lambda s: list(jump(s, 2000, tolerance=3e-3))[-1].pressure,
         lambda s: steady(s).pressure,
@@ -42,9 +42,9 @@ def test_a_distributed_system_is_the_same_system(assemble: Callable[..., System]
 
 @several
 @pytest.mark.mpi
-def test_all_ranks_hold_the_same_bits(assemble: Callable[..., System]) -> None:
+def test_all_ranks_hold_the_same_bits(assembled: Callable[..., Tribosystem]) -> None:
     """The replicated interface is equal to the last bit, so that no rank takes another Newton step."""
-    system = assemble("example1")
+    system = assembled("example1")
     mine = (system.interface.normal_compliance, system.interface.tangential_compliance, steady(system).pressure)
     for array in mine:
         for other in COMM.allgather(array):

@@ -15,7 +15,7 @@ from hypothesis import given, note, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
 
-from fenwear import System, load_case, march, steady
+from fenwear import Tribosystem, assemble, load_case, march, steady
 from fenwear.arrays import Array
 from fenwear.cycle import Block, stability_number
 from fenwear.heat.exchange import TERMS
@@ -132,10 +132,10 @@ class Parameters:
                 texts.append("heat.conductance=perfect")
         return texts
 
-    def system(self, *settings: str, units: Units = MILLIMETRES, comm: MPI.Comm = MPI.COMM_WORLD) -> System:
+    def system(self, *settings: str, units: Units = MILLIMETRES, comm: MPI.Comm = MPI.COMM_WORLD) -> Tribosystem:
         """Return the system of this case, changed once more."""
         name = f"example{self.example}" + ("" if self.heat is None else "-heat")
-        return System(load_case(name, [*self.settings(units), *settings]), comm)
+        return assemble(load_case(name, [*self.settings(units), *settings]), comm)
 
 
 def floats(low: float, high: float) -> st.SearchStrategy[float]:
@@ -190,14 +190,14 @@ def problems(heat: st.SearchStrategy[Any] = st.none(), lever: float = 0.9) -> st
     )
 
 
-def run(system: System, half_cycles: int, **options: Any) -> Block:
+def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
     (block,) = march(system, half_cycles, block=half_cycles, **options)
     return block
 
 
-def check_contact(system: System, parameters: Parameters, block: Block) -> None:
+def check_contact(system: Tribosystem, parameters: Parameters, block: Block) -> None:
     """Equilibrium by hand, p >= 0, gap >= 0, p gap = 0, and the worn area."""
-    x, weights = system.facing.x, system.facing.weights
+    x, weights = system.pair.x, system.pair.weights
     load = parameters.force / parameters.thickness
     force = block.pressure * weights
     np.testing.assert_allclose(force.sum(axis=1), load, rtol=1e-9)
@@ -258,10 +258,10 @@ def test_steady_state(parameters: Parameters, one_way: bool) -> None:
     else:
         np.testing.assert_allclose(state.pressure.sum(axis=0), 2 * mean, rtol=1e-8)
     assert (state.pressure >= 0).all()
-    np.testing.assert_allclose(state.pressure @ system.facing.weights, 60 * mean, rtol=1e-9)
+    np.testing.assert_allclose(state.pressure @ system.pair.weights, 60 * mean, rtol=1e-9)
     if parameters.example == 1:
         arm = -np.array(state.directions) * parameters.friction * parameters.pins[0]
-        centre = (state.pressure * system.facing.weights) @ system.facing.x / (60 * mean)
+        centre = (state.pressure * system.pair.weights) @ system.pair.x / (60 * mean)
         np.testing.assert_allclose(centre, arm, rtol=0, atol=1e-7 * HALF_WIDTH)
 
 
@@ -295,7 +295,7 @@ def test_units(parameters: Parameters, units: Units) -> None:
     one, two = run(system, 3, implicit=True), run(other, 3, implicit=True)
     note(f"contact width {one.contact_width}")
     # gmsh places the nodes of graded lines by an integral of its own tolerance, 2e-8 of the length.
-    np.testing.assert_allclose(other.facing.x / units.length, system.facing.x, rtol=0, atol=1e-7 * HALF_WIDTH)
+    np.testing.assert_allclose(other.pair.x / units.length, system.pair.x, rtol=0, atol=1e-7 * HALF_WIDTH)
 
     def same(found: Array, expected: Array, unit: float) -> None:
         np.testing.assert_allclose(found / unit, expected, rtol=0, atol=1e-6 * max(np.abs(expected).max(), 1e-300))
@@ -345,5 +345,5 @@ def test_large_friction() -> None:
     """
     case = Parameters(example=2, elements=6, young=(1e3, 1e3), poisson=(0, 0), pins=(20, 25))
     system = case.system("contact.friction=0.81")
-    right, left = (system.contact((d,)).solve(system.facing.initial_gap).pressure[0] for d in (1, -1))
+    right, left = (system.contact((d,)).solve(system.pair.initial_gap).pressure[0] for d in (1, -1))
     np.testing.assert_allclose(left[::-1], right, rtol=0, atol=1e-8 * right.max())

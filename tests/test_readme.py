@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenwear import System, jump, load_case
+from fenwear import assemble, jump, load_case
 from fenwear.case import Case
 
 README = Path(__file__).resolve().parents[1] / "README.md"
@@ -37,24 +37,24 @@ def slider(tmp_path_factory: pytest.TempPathFactory) -> Case:
 
 def test_own_mesh(slider: Case) -> None:
     """Both bodies of a mesh made with gmsh lose exactly K/H times force and distance; the wear widens the contact."""
-    system = System(slider)
+    system = assemble(slider)
     *_, last = jump(system, 1000, tolerance=0.02)
     force, distance = 6000 / 30, 1000 * 4  # N/mm, mm
-    assert system.facing.weights @ last.wear[-1] == pytest.approx(2e-5 / 1200 * force * distance, rel=1e-9)
-    assert system.facing.strip.weights @ last.wear_strip[-1] == pytest.approx(1e-6 / 2000 * force * distance, rel=1e-9)
-    start = system.contact((1,)).solve(system.facing.initial_gap).pressure[0]
+    assert system.pair.weights @ last.wear[-1] == pytest.approx(2e-5 / 1200 * force * distance, rel=1e-9)
+    assert system.pair.strip.weights @ last.wear_strip[-1] == pytest.approx(1e-6 / 2000 * force * distance, rel=1e-9)
+    start = system.contact((1,)).solve(system.pair.initial_gap).pressure[0]
     # Hertz: a cylinder on a flat, of different materials.
     compliance = (1 - 0.34**2) / 110e3 + (1 - 0.3**2) / 210e3
     peak = np.sqrt(force / (np.pi * 400 * compliance))
     assert start.max() == pytest.approx(peak, rel=0.05)  # a slider 20 mm wide and 15 mm high is no half-space
-    assert last.contact_width[-1] > 1.5 * float(system.facing.weights @ (start > 0))
+    assert last.contact_width[-1] > 1.5 * float(system.pair.weights @ (start > 0))
 
 
 @pytest.mark.parametrize("name", ["wide-punch.toml"])
 def test_case_files(name: str, tmp_path: Path) -> None:
     """The case to start from is valid as it is printed."""
     (tmp_path / name).write_text(saved_as(name), "utf-8")
-    assert System(load_case(tmp_path / name)).facing.x.max() == pytest.approx(40)
+    assert assemble(load_case(tmp_path / name)).pair.x.max() == pytest.approx(40)
 
 
 def test_laws_that_vary(tmp_path: Path) -> None:

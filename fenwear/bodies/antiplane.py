@@ -27,7 +27,7 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
         blocks: Global numbers of the blocks of displacements at the loaded nodes (n,).
         force: Per thickness (n,), N/mm.
     """
-    mesh, shear_modulus = elastic.body.mesh, elastic.lame[1]
+    mesh, shear_modulus = elastic.body.mesh, elastic.law.shear_modulus
     element = basix.ufl.element("Lagrange", mesh.basix_cell(), elastic.space.ufl_element().degree)
     space = fem.functionspace(mesh, element)
     # A space of one component may number its nodes in another way: go by the cells.

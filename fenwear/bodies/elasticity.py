@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any
 
 import basix.ufl
 import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
@@ -14,52 +15,38 @@ import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from ufl.algorithms.check_arities import ArityMismatch
 
 from fenwear import compat
+from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
+from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor
+from fenwear.bodies.material import ElasticLaw, Kind
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Body, Load, Material, Model, Support
+from fenwear.case import Body, Load, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.parallel import total
 
-AXES = {"x": 0, "z": 1}
 PREFIX = "fenwear_elasticity_"
+# For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
+# with their names, then those in which friction would carry the body away.
+SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about z: hold it against turning"
+PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
+RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
+    "stress": PLANE,
+    "strain": PLANE,
+    "axisymmetric": ({1: "lambda_F"}, {}),
+    "solid": (
+        {2: "lambda_F", 3: "lambda_Mx", 4: "lambda_My"},
+        {0: SLIDE.format("x"), 1: SLIDE.format("y"), 5: SPIN},
+    ),
+}
 
 
-def strain(u: Any) -> Any:
-    """Return eps(u) = (grad u + grad u^T) / 2."""
-    return ufl.sym(ufl.grad(u))
-
-
-def lame(young: Any, poisson: Any, plane: Literal["stress", "strain"]) -> tuple[Any, Any]:
-    """Return Lame's lambda and mu of the plane model, MPa.
-
-    In plane stress lambda is 2 lambda mu / (lambda + 2 mu), so that sigma_yy = 0.
-    """
-    mu = young / (2 * (1 + poisson))
-    if plane == "stress":
-        return young * poisson / (1 - poisson**2), mu
-    return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu
-
-
-def stress(u: Any, lmbda: Any, mu: Any) -> Any:
-    """Return sigma = lambda tr(eps) I + 2 mu eps, MPa."""
-    eps = strain(u)
-    return lmbda * ufl.tr(eps) * ufl.Identity(len(u)) + 2 * mu * eps
-
-
-def region_field(body: BodyMesh, values: dict[str, float]) -> fem.Function:
-    """Return the field that is constant on each material region.
-
-    Args:
-        values: The value on each region, by its name.
-    """
-    field = fem.Function(fem.functionspace(body.mesh, ("DG", 0)))
-    for region, value in values.items():
-        field.x.array[body.cell_tags.find(body.regions[region])] = value
-    field.x.scatter_forward()
-    return field
+def axes(dim: int) -> dict[str, int]:
+    """Return the component of each axis in a model of `dim` dimensions; a plane one has no y."""
+    return {"x": 0, "z": 1} if dim == 2 else {"x": 0, "y": 1, "z": 2}
 
 
 class ElasticBody:
@@ -78,57 +65,62 @@ class ElasticBody:
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
     """
 
-    def __init__(
-        self,
-        body: BodyMesh,
-        description: Body,
-        materials: dict[str, Material],
-        model: Model,
-        degree: int,
-    ) -> None:
-        """Assemble and factor the stiffness of `body`; collective.
+    def __init__(self, body: BodyMesh, description: Body, law: ElasticLaw, degree: int, thickness: float = 1.0) -> None:
+        """Assemble the stiffness of `body`; collective.
+
+        Args:
+            body: Its mesh.
+            description: Its supports, loads and pivot.
+            law: Its material.
+            degree: Of the displacement.
+            thickness: Of a plane model, mm; 1 for whole rings and solids.
 
         Raises:
-            CaseError: an unknown group or region, a support off the body, a body free to slide.
+            CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
         """
-        self.body = body
+        self.body, self.law, self.thickness = body, law, thickness
         mesh = body.mesh
-        _check_regions(body, description)
-        cell = mesh.basix_cell()
-        element = basix.ufl.element("Lagrange", cell, degree, shape=(mesh.geometry.dim,))
+        dim = mesh.geometry.dim
+        self.dim = dim
+        element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(dim,))
         self.space = fem.functionspace(mesh, element)
+        self.surface, self.trace = contact_surface(body, self.space, law.measure(mesh))
         self.pivot = _pivot(body, description)
         supports = self._supports(description.supports)
         modes, self.mode_names = self._free_modes(supports)
         self.rigid_modes = modes
 
-        self._regions, self._plane = description.regions, model.plane
-        of_region = {region: materials[name] for region, name in description.regions.items()}
-        young = region_field(body, {r: m.young for r, m in of_region.items()})
-        poisson = region_field(body, {r: m.poisson for r, m in of_region.items()})
-        self.lame = lame(young, poisson, model.plane)
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        a = ufl.inner(stress(u, *self.lame), strain(v)) * ufl.dx
-
+        a = ufl.inner(law.stress(u), law.strain(v)) * law.measure(mesh) * ufl.dx
         bcs = supports + self._regularise()
         self.supported = self._owned_dofs(bcs)
-        self._set_loads(description.loads, model.thickness)
-        self.stiffness = assembled(a, bcs)
+        self._set_loads(description.loads)
+        try:
+            form = fem.form(a)
+        except ArityMismatch:
+            raise CaseError(Problem(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
+        self.stiffness = assembled(form, bcs)
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
         self._factor: Factor | None = None
 
-    def _set_loads(self, loads: Sequence[Load], thickness: float) -> None:
-        load = self._assemble_load(loads, thickness)
+    def _set_loads(self, loads: Sequence[Load]) -> None:
+        load = self._assemble_load(loads)
         resultant = np.array([mode @ load.array_r for mode in self.rigid_modes])
         self.rigid_resultant = total(self.body.mesh.comm, resultant)
         load.array[self.supported] = 0.0
         self.load = load
 
-    def with_loads(self, loads: Sequence[Load], thickness: float) -> ElasticBody:
+    def with_loads(self, loads: Sequence[Load]) -> ElasticBody:
         """Return the same body under other loads, with the same stiffness and factor; collective."""
         body = copy.copy(self)
-        body._set_loads(loads, thickness)
+        body._set_loads(loads)
         return body
+
+    @cached_property
+    def rigid_motion(self) -> Array:
+        """Displacement of the contact surface's trace nodes by each rigid mode (N, d, modes); collective."""
+        modes = np.array(self.rigid_modes).reshape(len(self.rigid_modes), -1).T
+        return self.trace.pick(modes) if self.rigid_modes else np.zeros((*self.surface.trace.shape, 0))
 
     @property
     def factor(self) -> Factor:
@@ -142,8 +134,14 @@ class ElasticBody:
         return [
             self._held(component, self._support_dofs(support, component, f"{key}.{number}"))
             for number, support in enumerate(supports)
-            for component in (AXES[axis] for axis in support.fix)
+            for component in (self._component(axis, f"{key}.{number}.fix") for axis in support.fix)
         ]
+
+    def _component(self, axis: str, key: str) -> int:
+        known = axes(self.dim)
+        if axis not in known:
+            raise CaseError(Problem(key, f"expected {', '.join(known)}, got {axis!r}"))
+        return known[axis]
 
     def _held(self, component: int, dofs: NDArray[np.int32]) -> fem.DirichletBC:
         return fem.dirichletbc(PETSc.ScalarType(0), dofs, self.space.sub(component))
@@ -161,7 +159,7 @@ class ElasticBody:
         found = body.mesh.comm.allreduce((distance < tolerance).any(axis=0).astype(int))
         missing = points[found == 0]
         if len(missing):
-            place = ", ".join(f"({p[0]:g}, {p[1]:g})" for p in missing)
+            place = ", ".join("(" + ", ".join(f"{c:g}" for c in p) + ")" for p in missing)
             raise CaseError(Problem(f"{key}.at", f"a pin off the {body.name}: no node of its mesh at {place} mm"))
         return to_parent[(distance < tolerance).any(axis=1)]
 
@@ -175,41 +173,44 @@ class ElasticBody:
         return float((high - low).max())
 
     def _rigid_basis(self) -> NDArray[np.float64]:
-        """Return translations along x and z and the rotation about y at the pivot, on the owned dofs.
+        """Return the translations and the rotations omega x (x - x_O) on the owned dofs (owned, modes).
 
-        The rotation vector points along y = z cross x, so a positive one lowers what lies at
-        larger x: u = (z - z_O, -(x - x_O)). These are the paper's signs of lambda_M.
+        A positive rotation about y lowers what lies at larger x:
+        u = (z - z_O, -(x - x_O)). These are the paper's signs of lambda_M.
         """
         owned = self.space.dofmap.index_map.size_local
         x = self.space.tabulate_dof_coordinates()[:owned]
-        basis = np.zeros((owned, 2, 3))
-        basis[:, 0, 0] = basis[:, 1, 1] = 1.0
-        basis[:, 0, 2], basis[:, 1, 2] = x[:, 1] - self.pivot[1], -(x[:, 0] - self.pivot[0])
-        return basis.reshape(-1, 3)
+        dim = self.dim
+        arm = x[:, :dim] - self.pivot
+        if dim == 2:
+            turns = np.stack([arm[:, 1], -arm[:, 0]], axis=1)[:, :, None]
+        else:
+            turns = np.stack([np.cross(axis, arm) for axis in np.eye(3)], axis=2)
+        shifts = np.broadcast_to(np.eye(dim), (owned, dim, dim))
+        return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, -1)
 
     def _free_modes(self, supports: list[fem.DirichletBC]) -> tuple[list[NDArray[np.float64]], list[str]]:
         """Return the rigid modes that the supports leave, and their names.
 
         Raises:
-            CaseError: the body is free to slide along x.
+            CaseError: the body is free to slide along the contact, or to spin about its normal.
         """
-        basis, comm = self._rigid_basis(), self.body.mesh.comm
+        names, forbidden = RIGID_MODES[self.law.kind]
+        columns = [*names, *forbidden]
+        basis, comm = self._rigid_basis()[:, columns], self.body.mesh.comm
         held = basis[self._owned_dofs(supports)]
         gram = comm.allreduce(held.T @ held)
-        scale = np.array([1.0, 1.0, 1.0 / self._size()])
+        scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
         eigenvalues, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
         free = vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)] * scale[:, None]
-        # A basis in which lambda_F is the velocity along z at the pivot and lambda_M the rotation.
-        order = [1, 2, 0]
-        echelon, pivots = _column_echelon(free[order])
-        if any(order[p] == 0 for p in pivots):
+        # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
+        echelon, pivots = _column_echelon(free)
+        loose = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
+        if loose:
             name = self.body.name
-            message = f"the {name} is free to slide along x: hold its x somewhere, friction pulls it"
+            message = f"the {name} is free to {' and to '.join(loose)}, friction pulls it"
             raise CaseError(Problem(f"{name}.supports", message))
-        combined = np.zeros_like(echelon)
-        combined[order] = echelon
-        names = ["lambda_F" if order[p] == 1 else "lambda_M" for p in pivots]
-        return list((basis @ combined).T.copy()), names
+        return list((basis @ echelon).T.copy()), [names[columns[p]] for p in pivots]
 
     def _owned_dofs(self, supports: list[fem.DirichletBC]) -> NDArray[np.int32]:
         parts = [bc.dof_indices()[0][: bc.dof_indices()[1]] for bc in supports]
@@ -222,8 +223,7 @@ class ElasticBody:
         comm, count = self.body.mesh.comm, len(self.rigid_modes)
         scale = np.array([comm.allreduce(np.abs(m).max(initial=0)) for m in self.rigid_modes])
         modes = np.array(self.rigid_modes).T / scale
-        surface = self.contact_nodes()
-        modes[np.concatenate([2 * surface, 2 * surface + 1])] = 0.0
+        modes.reshape(-1, self.dim, count)[self.trace.local] = 0.0
         # Pivoted QR picks the rows that make R regular: here, then among all ranks' choices.
         local = _best_rows(modes, count)
         proposals = comm.allgather([(comm.rank, int(i), modes[i]) for i in local])
@@ -235,77 +235,46 @@ class ElasticBody:
         mark = fem.Function(self.space)
         mark.x.array[mine] = 1.0
         mark.x.scatter_forward()
-        held = np.flatnonzero(mark.x.array[: 2 * (index_map.size_local + index_map.num_ghosts)]).astype(np.int32)
-        return [self._held(component, held[held % 2 == component]) for component in (0, 1)]
+        known = self.dim * (index_map.size_local + index_map.num_ghosts)
+        held = np.flatnonzero(mark.x.array[:known]).astype(np.int32)
+        return [self._held(component, held[held % self.dim == component]) for component in range(self.dim)]
 
-    def thermal_modulus(self, materials: dict[str, Material]) -> fem.Function:
-        """Return gamma, the in-plane stress that holds back each kelvin of expansion, MPa/K.
-
-        E alpha / (1 - nu) in plane stress, E alpha / (1 - 2 nu) in plane strain.
-        """
-        held = 1 if self._plane == "stress" else 2
-        used = {region: materials[name] for region, name in self._regions.items()}
-        values = {r: m.young * (m.expansion or 0.0) / (1 - held * m.poisson) for r, m in used.items()}
-        return region_field(self.body, values)
-
-    def thermal_coupling(self, temperature: fem.FunctionSpace, materials: dict[str, Material]) -> PETSc.Mat:
+    def thermal_coupling(self, temperature: fem.FunctionSpace) -> PETSc.Mat:
         """Return G: the nodal forces G theta of free thermal expansion, N/mm per K; collective.
 
-        The integral of gamma theta div v, gamma the `thermal_modulus`. Supports take no force.
+        The integral of the thermal stress of theta times the strain of v. Supports take no force.
         """
-        gamma = self.thermal_modulus(materials)
-        # dolfinx assembles square blocks only: pairs of temperatures, numbered as the single ones, of which one counts.
-        element = basix.ufl.blocked_element(temperature.ufl_element(), shape=(self.body.mesh.geometry.dim,))
+        law, dim = self.law, self.dim
+        # dolfinx assembles square blocks only: blocks of temperatures, numbered as single ones, of which one counts.
+        element = basix.ufl.blocked_element(temperature.ufl_element(), shape=(dim,))
         theta, v = ufl.TrialFunction(fem.functionspace(self.body.mesh, element))[0], ufl.TestFunction(self.space)
-        coupling = assembled(gamma * theta * ufl.div(v) * ufl.dx, first_column=True)
-        start = 2 * self.space.dofmap.index_map.local_range[0]
+        work = ufl.inner(law.thermal_stress(theta), law.strain(v)) * law.measure(self.body.mesh) * ufl.dx
+        coupling = assembled(work, first_column=True)
+        start = dim * self.space.dofmap.index_map.local_range[0]
         coupling.zeroRows((self.supported + start).astype(np.int32), diag=0.0)
         return coupling
-
-    def contact_nodes(self) -> NDArray[np.int32]:
-        """Return this rank's own nodes (blocks of dofs) on the contact surface; collective."""
-        tag = self.body.curves[f"{self.body.name}_contact"]
-        dim = self.body.mesh.topology.dim - 1
-        nodes = fem.locate_dofs_topological(self.space, dim, self.body.facet_tags.find(tag))
-        return nodes[nodes < self.space.dofmap.index_map.size_local]
 
     def surface_integral(self, traction: Any, tag: int) -> PETSc.Vec:
         """Return the vector of the integral of traction . v over the facets tagged `tag`; collective."""
         ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.body.facet_tags)
-        vector = fem.petsc.assemble_vector(fem.form(ufl.inner(traction, ufl.TestFunction(self.space)) * ds(tag)))
+        work = ufl.inner(traction, ufl.TestFunction(self.space)) * self.law.measure(self.body.mesh)
+        vector = fem.petsc.assemble_vector(fem.form(work * ds(tag)))
         vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
         return vector
 
-    def _assemble_load(self, loads: Sequence[Load], thickness: float) -> PETSc.Vec:
+    def _assemble_load(self, loads: Sequence[Load]) -> PETSc.Vec:
         mesh = self.body.mesh
         zero = fem.Function(self.space)  # owns the memory of its petsc_vec
         total = zero.x.petsc_vec.copy()
         for number, load in enumerate(loads):
             tag = self.body.curve(load.on, f"{self.body.name}.loads.{number}.on")
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
-            one = fem.Constant(mesh, PETSc.ScalarType(1))
-            area = thickness * mesh.comm.allreduce(fem.assemble_scalar(fem.form(one * ds(tag))))
+            facets = fem.form(self.law.measure(mesh) * ds(tag))
+            area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
             resultant = load.force if load.traction is None else [area * component for component in load.traction]
             traction = np.array(resultant) / area
             total.axpy(1.0, self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag))
         return total
-
-
-def _check_regions(body: BodyMesh, description: Body) -> None:
-    problems = [
-        Problem(
-            f"{body.name}.regions.{name}",
-            f"no physical surface of that name; the geometry has {', '.join(body.regions)}",
-        )
-        for name in description.regions
-        if name not in body.regions
-    ] + [
-        Problem(f"{body.name}.regions", f"no material for the physical surface {name!r}")
-        for name in body.regions
-        if name not in description.regions
-    ]
-    if problems:
-        raise CaseError(problems)
 
 
 def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.float64]:
@@ -318,15 +287,14 @@ def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.fl
     return body.points[support.on]
 
 
-def _pivot(body: BodyMesh, description: Body) -> tuple[float, float]:
+def _pivot(body: BodyMesh, description: Body) -> NDArray[np.float64]:
     """Return the point O about which rotations are taken; by default the first support's centre."""
     if description.pivot is not None:
-        return description.pivot
+        return np.array(description.pivot)
     for number, support in enumerate(description.supports):
         if support.on is None or support.on in body.points:
-            x, z = _support_points(body, support, f"{body.name}.supports.{number}").mean(axis=0)
-            return float(x), float(z)
-    return 0.0, 0.0
+            return _support_points(body, support, f"{body.name}.supports.{number}").mean(axis=0)
+    return np.zeros(body.mesh.geometry.dim)
 
 
 def _column_echelon(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:

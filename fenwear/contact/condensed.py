@@ -2,10 +2,10 @@
 
 For every phase of the motion (a sliding direction d) and every contact node:
 
-    gap = (S_n + S_t tau) p + H a + g >= 0,    p >= 0,    p gap = 0,
-    (H + H_t tau)^T W p + F = 0   for the rigid modes a,
+    gap = S(tau) p + H a + g >= 0,    p >= 0,    p gap = 0,
+    sum of w_i p_i (e_n + tau)_i . m_i + F = 0   for the rigid modes a and their motions m,
 
-tau = d mu the traction of friction over the pressure, g the gap of the unloaded bodies with their
+tau the traction of friction over the pressure, g the gap of the unloaded bodies with their
 loads' effect and the worn depth. A `Layer` adds to the gaps of all phases what their own pressures
 open, such as the wear of the step they belong to.
 """
@@ -49,16 +49,16 @@ class ContactState:
 
 
 @dataclass(frozen=True)
-class Sliding:
+class SlidingContact:
     """What slides in one phase.
 
     Attributes:
         interface: The surfaces opposite each other, under the loads of the phase.
-        slip: tau = d mu (n,), the traction on the punch along e_t over the pressure.
+        friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
     """
 
     interface: Interface
-    slip: Array
+    friction_ratio: Array
 
 
 class Layer(Protocol):
@@ -92,49 +92,49 @@ class CondensedContact:
     there are many, one small elimination for each of them takes the place of one of all.
     """
 
-    def __init__(self, phases: Sequence[Sliding], remedies: Remedies | None = None) -> None:
+    def __init__(self, phases: Sequence[SlidingContact], remedies: Remedies | None = None) -> None:
         """Take the phases, and where to note that a contact was solved in another way than usual."""
         self.phases = list(phases)
         self._remedies = remedies or Remedies()
         interface = phases[0].interface
-        statics = interface.statics
-        n, r, m = len(statics.facing.weights), len(statics.resultant), len(self.phases)
+        rigid = interface.rigid
+        n, r, m = len(rigid.pair.weights), len(rigid.resultant), len(self.phases)
         self.shape = (m, n)
-        self._pressure_scale = statics.mean_pressure
+        self._pressure_scale = rigid.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
-        lengths = np.abs(statics.rigid_normal).max(axis=0, initial=0.0)
+        lengths = np.abs(rigid.rigid_normal).max(axis=0, initial=0.0)
         self._rigid_scale = self._gap_scale / lengths
-        self._resultant_scale = lengths * self._pressure_scale * statics.facing.weights.sum()
+        self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
         self._blocks = np.zeros((m, size, size))
         self._elastic: Array | None = None
         self._offset = np.zeros((m, size))
         self._loads = np.array([phase.interface.load_gap for phase in self.phases])
         for phase, block, offset in zip(self.phases, self._blocks, self._offset, strict=True):
-            offset[n:] = phase.interface.statics.resultant / self._resultant_scale
-            block[:n, n:] = phase.interface.statics.rigid_normal * (self._rigid_scale / self._gap_scale)
-        self._slips = [phase.slip for phase in self.phases]
-        for k, slip in enumerate(self._slips):
-            self._fill_slip(k, slip)
+            offset[n:] = phase.interface.rigid.resultant / self._resultant_scale
+            block[:n, n:] = phase.interface.rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
+        self._ratios = [phase.friction_ratio for phase in self.phases]
+        for k, ratio in enumerate(self._ratios):
+            self._fill_friction(k, ratio)
         self._coupling: Array | None = None
         self._layer: Layer | None = None
         self._filled = False
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         self._bounds = (lower, np.full(m * size, np.inf))
 
-    def _fill_slip(self, k: int, slip: Array) -> None:
+    def _fill_friction(self, k: int, ratio: Array) -> None:
         n, interface = self.shape[1], self.phases[k].interface
-        balance = interface.statics.equilibrium(slip)
-        self._blocks[k, :n, :n] = interface.compliance(slip) * (self._pressure_scale / self._gap_scale)
+        balance = interface.rigid.equilibrium(ratio)
+        self._blocks[k, :n, :n] = interface.compliance(ratio) * (self._pressure_scale / self._gap_scale)
         self._blocks[k, n:, :n] = balance * (self._pressure_scale / self._resultant_scale[:, None])
 
-    def slide(self, slips: Sequence[Array]) -> None:
+    def slide(self, ratios: Sequence[Array]) -> None:
         """Set tau of each phase, (n,) each."""
-        for k, (slip, before) in enumerate(zip(slips, self._slips, strict=True)):
-            if slip is not before and not np.array_equal(slip, before):
-                self._fill_slip(k, slip)
+        for k, (ratio, before) in enumerate(zip(ratios, self._ratios, strict=True)):
+            if ratio is not before and not np.array_equal(ratio, before):
+                self._fill_friction(k, ratio)
                 self._elastic, self._filled = None, False
-        self._slips = list(slips)
+        self._ratios = list(ratios)
 
     @cached_property
     def _dense(self) -> DenseInequality:

@@ -5,17 +5,17 @@ change of the active set factors the whole system again.
 
     K_1 u_1 - C_1 p = f_1,    K_2 u_2 + C_2 p = f_2,
     gap = N_1 u_1 - N_2 u_2 + H a + g >= 0,    p >= 0,    p gap = 0,
-    (H + H_t tau)^T W p + F = 0.
+    sum of w_i p_i (e_n + tau)_i . m_i + F = 0.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.surface import SurfaceNodes
 from fenwear.contact.condensed import ContactState, Layer
 from fenwear.contact.inequality import check, configure
 from fenwear.interface import Interface
@@ -28,26 +28,27 @@ class FullContact:
     rigid modes to rank 0, coupled through global numbers: no partition can lose a contact pair.
     """
 
-    def __init__(self, punch: ElasticBody, strip: ElasticBody, interface: Interface, slip: Array) -> None:
+    def __init__(self, punch: ElasticBody, strip: ElasticBody, interface: Interface, friction_ratio: Array) -> None:
         self.interface = interface
         self.comm = punch.body.mesh.comm
-        statics = interface.statics
-        facing = statics.facing
-        self._pressure_scale = statics.mean_pressure
+        rigid, pair = interface.rigid, interface.pair
+        self._pressure_scale = rigid.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
-        self._force_scale = self._pressure_scale * float(facing.weights.sum())
-        n, modes = len(facing.weights), len(statics.resultant)
+        self._force_scale = self._pressure_scale * float(pair.weights.sum())
+        n, modes = len(pair.weights), len(rigid.resultant)
         self._size = (n, modes)
 
-        weights = np.diag(facing.weights)
+        traction = (pair.normal + friction_ratio) * pair.weights[:, None]
+        on_punch, on_strip = pair.punch.spread, csr_array(pair.transfer.T)
+        back = pair.placement.back
         rows = [
-            [punch.stiffness, None, -_forces(punch, facing.punch, weights, slip)],
-            [None, strip.stiffness, _forces(strip, facing.strip, facing.transfer.T @ weights, slip)],
-            [_normals(punch, facing.punch, np.eye(n)), -_normals(strip, facing.strip, facing.transfer), None],
+            [punch.stiffness, None, -_forces(punch, on_punch, traction)],
+            [None, strip.stiffness, _forces(strip, on_strip, back(traction))],
+            [_normals(punch, on_punch, pair.normal), -_normals(strip, on_strip, pair.normal_on_strip), None],
         ]
         if modes:
-            rows = [[*rows[0], None], [*rows[1], None], [*rows[2], self._rank0_matrix(statics.rigid_normal)]]
-            rows.append([None, None, self._rank0_matrix(statics.equilibrium(slip)), None])
+            rows = [[*rows[0], None], [*rows[1], None], [*rows[2], self._rank0_matrix(rigid.rigid_normal)]]
+            rows.append([None, None, self._rank0_matrix(rigid.equilibrium(friction_ratio)), None])
         nest = PETSc.Mat().createNest(rows, comm=self.comm)
         self._operator = nest.convert("aij" if self.comm.size == 1 else "mpiaij")
         self._offset = self._operator.createVecLeft()
@@ -59,7 +60,7 @@ class FullContact:
         self._constant[: sizes[0]] = -punch.load.array_r / self._force_scale
         self._constant[sizes[0] : self._free] = -strip.load.array_r / self._force_scale
         if self.comm.rank == 0:
-            self._constant[self._free + n :] = statics.resultant / self._force_scale
+            self._constant[self._free + n :] = rigid.resultant / self._force_scale
         self._build_snes()
 
     def _scale_system(self) -> None:
@@ -140,42 +141,49 @@ class FullContact:
         return matrix
 
 
-def _forces(elastic: ElasticBody, nodes: SurfaceNodes, distribution: Array, slip: Array) -> PETSc.Mat:
-    """Return C (dofs, n): nodal forces p (e_n + tau e_t), zero where supported; collective.
+def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc.Mat:
+    """Return C (dofs, n): the nodal forces of each contact node's traction, zero where supported; collective.
 
     Args:
-        distribution: Force at each node of this surface from each pressure (nodes, n).
-        slip: tau = d mu of each pressure (n,).
+        elastic: The body.
+        patterns: Share of each of its trace nodes in the force of each contact node (N, n).
+        traction: Force of each contact node under unit pressure (n, d).
     """
-    vectors = nodes.normal[:, :, None] + nodes.tangent[:, :, None] * slip
-    values = vectors * distribution[:, None, :]  # node, component, pressure
+    part = patterns.tocoo()
+    nodes, columns = part.coords
+    values = part.data[:, None] * traction[columns]
+    dim = elastic.dim
+    place = np.full(len(elastic.trace.blocks), -1)
+    place[elastic.trace.own] = elastic.trace.local
+    own = place[nodes] >= 0
+    rows = (dim * place[nodes[own], None] + np.arange(dim)).ravel()
+    shape = (elastic.stiffness.getLocalSize()[0], len(traction))
+    local = csr_array((values[own].ravel(), (rows, np.repeat(columns[own], dim))), shape=shape)
+    free = np.ones(shape[0])
+    free[elastic.supported] = 0.0
+    local = csr_array(local.multiply(free[:, None]))
     comm = elastic.body.mesh.comm
-    count = distribution.shape[1]
-    sizes = (elastic.stiffness.getSizes()[0], (count if comm.rank == 0 else 0, count))
-    matrix = PETSc.Mat().createAIJ(sizes, nnz=(count, count), comm=comm)
-    start, stop = elastic.space.dofmap.index_map.local_range
-    held = set((elastic.supported + 2 * start).tolist())
-    for node, block in enumerate(nodes.block):
-        if start <= block < stop:
-            columns = np.flatnonzero(distribution[node]).astype(np.int32)
-            for component in (0, 1):
-                row = 2 * int(block) + component
-                if row not in held:
-                    matrix.setValues([row], columns, values[node, component, columns])
+    sizes = (elastic.stiffness.getSizes()[0], (shape[1] if comm.rank == 0 else 0, shape[1]))
+    csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
+    matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=comm)
     matrix.assemble()
     return matrix
 
 
-def _normals(elastic: ElasticBody, nodes: SurfaceNodes, transfer: Array) -> PETSc.Mat:
-    """Return N (n, dofs): the normal displacement of this surface at the interface nodes; collective."""
-    comm = elastic.body.mesh.comm
-    count = transfer.shape[0]
-    sizes = ((count if comm.rank == 0 else 0, count), elastic.stiffness.getSizes()[1])
-    matrix = PETSc.Mat().createAIJ(sizes, nnz=(2 * transfer.shape[1], 2 * transfer.shape[1]), comm=comm)
-    if comm.rank == 0:
-        columns = (2 * nodes.block[:, None] + np.arange(2)).astype(np.int32)
-        for row in range(count):
-            used = np.flatnonzero(transfer[row])
-            matrix.setValues([row], columns[used].ravel(), (transfer[row, used, None] * nodes.normal[used]).ravel())
+def _normals(elastic: ElasticBody, patterns: csr_array, normal: Array) -> PETSc.Mat:
+    """Return N (n, dofs): the displacement along e_n that each contact node sees of this body; collective."""
+    comm, count = elastic.body.mesh.comm, len(normal)
+    part = csr_array(patterns.T).tocoo()
+    rows, nodes = part.coords
+    dim = elastic.dim
+    columns = (dim * elastic.trace.blocks[nodes, None] + np.arange(dim)).ravel()
+    values = (part.data[:, None] * normal[rows]).ravel()
+    whole = csr_array((values, (np.repeat(rows, dim), columns)), shape=(count, elastic.stiffness.getSize()[0]))
+    here = comm.rank == 0
+    starts = whole.indptr if here else np.zeros(1)
+    columns, values = (whole.indices, whole.data) if here else (np.zeros(0), np.zeros(0))
+    sizes = ((count if here else 0, count), elastic.stiffness.getSizes()[1])
+    csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), values)
+    matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=comm)
     matrix.assemble()
     return matrix

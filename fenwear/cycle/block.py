@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Block:
         end: From where the run goes on.
     """
 
-    system: System
+    system: Tribosystem
     half_cycle: NDArray[np.int64]
     direction: NDArray[np.int64]
     pressure: Array
@@ -119,7 +119,7 @@ class Block:
     @property
     def contact_width(self) -> Array:
         """Width of the nodes in contact, by their weights (k,), mm."""
-        return (self.pressure > 0) @ self.system.statics.facing.weights
+        return (self.pressure > 0) @ self.system.rigid.pair.weights
 
 
 @dataclass(frozen=True)
@@ -131,27 +131,27 @@ class PhaseRecord:
         contact: Its contact.
         before: Pressure of the same phase one cycle ago (n,), MPa; None in the first cycle.
         areas: Cross-sections worn off punch and strip, mm².
-        slip: tau = d mu (n,).
+        friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
     """
 
     phase: int
     contact: ContactState
     before: Array | None
     areas: tuple[float, float]
-    slip: Array
+    friction_ratio: Array
 
 
 @dataclass
 class Recorder:
     """Collects half-cycles into blocks; one append a half-cycle, one copy a block."""
 
-    system: System
+    system: Tribosystem
     size: int
     _rows: list[tuple[object, ...]] = field(default_factory=list)
     _heat: list[HalfCycleHeat] = field(default_factory=list)
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
-    _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last slip
+    _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last friction
 
     def add(self, half_cycle: int, phases: Sequence[PhaseRecord], worn: Worn, heat: HalfCycleHeat | None) -> float:
         """Record one half-cycle and return its periodicity.
@@ -164,7 +164,7 @@ class Recorder:
         """
         middle = phases[len(phases) // 2]
         state, pressure = middle.contact, middle.contact.pressure[0]
-        scale = self.system.statics.mean_pressure
+        scale = self.system.rigid.mean_pressure
         direction = self.system.motion.phases[middle.phase].direction
         change = max(
             float("nan") if p.before is None else float(np.abs(p.contact.pressure[0] - p.before).max()) / scale
@@ -183,13 +183,16 @@ class Recorder:
 
     def _balance(self, record: PhaseRecord) -> float:
         """Return the largest error of the force and moment balance relative to the load."""
-        statics = self.system.interfaces[record.phase].statics
+        equilibrium = self.system.interfaces[record.phase].rigid
         lengths = self.system.mode_lengths
-        scale = lengths * self.system.statics.mean_pressure * statics.facing.weights.sum()
+        scale = lengths * self.system.rigid.mean_pressure * equilibrium.pair.weights.sum()
         known = self._equilibria.get(record.phase)
-        if known is None or known[0] is not record.slip:
-            self._equilibria[record.phase] = known = (record.slip, statics.equilibrium(record.slip))
-        balance = known[1] @ record.contact.pressure[0] + statics.resultant
+        if known is None or known[0] is not record.friction_ratio:
+            self._equilibria[record.phase] = known = (
+                record.friction_ratio,
+                equilibrium.equilibrium(record.friction_ratio),
+            )
+        balance = known[1] @ record.contact.pressure[0] + equilibrium.resultant
         return float(np.abs(balance / scale).max(initial=0.0))
 
     @property

@@ -17,18 +17,20 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, assemble, preparation
 from fenwear.compat import interpolation_points
 from fenwear.cycle.block import Block
 from fenwear.cycle.moment import Moment
 from fenwear.heat.exchange import HeatExchange, State
-from fenwear.system import System
 
 # Runs a system from a moment, or the beginning, and leaves at the first moment for which it is told to.
-Integrate = Callable[[System, Moment | None, Callable[[Moment], bool]], Iterator[Block]]
-Exchange = Callable[[System], HeatExchange | None]
+Integrate = Callable[[Tribosystem, Moment | None, Callable[[Moment], bool]], Iterator[Block]]
+Exchange = Callable[[Tribosystem], HeatExchange | None]
 
 
-def follow(system: System, integrate: Integrate, exchange: Exchange, start: Moment | None = None) -> Iterator[Block]:
+def follow(
+    system: Tribosystem, integrate: Integrate, exchange: Exchange, start: Moment | None = None
+) -> Iterator[Block]:
     """Yield the blocks of a run whose meshes follow large wear; collective. Each block knows its system.
 
     Args:
@@ -44,8 +46,7 @@ def follow(system: System, integrate: Integrate, exchange: Exchange, start: Mome
     moment = start
     while True:
         if moment is not None and system.outworn(moment.worn):  # a run may also go on from just there
-            moved = System(system.case, system.comm, moment.worn)
-            moved.prepare()
+            moved = assemble(system.case, system.comm, moment.worn, heat=preparation(system))
             moment = replace(moment, temperature=_carried(moment.temperature, (system, moved), exchange))
             system = moved
         for block in integrate(system, moment, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
@@ -55,13 +56,13 @@ def follow(system: System, integrate: Integrate, exchange: Exchange, start: Mome
             return
 
 
-def _carried(state: State | None, systems: tuple[System, System], exchange: Exchange) -> State | None:
+def _carried(state: State | None, systems: tuple[Tribosystem, Tribosystem], exchange: Exchange) -> State | None:
     """Return the state of the same temperatures on the moved meshes."""
     before, after = (exchange(system) for system in systems)
     if state is None or before is None or after is None:
         return None
     temperatures = before.temperatures(state)
-    bodies = [system.heat_bodies or () for system in systems]
+    bodies = [system.bodies.heat or () for system in systems]
     first, second = (
         _in_place(old.function(theta), new.function(theta))
         for theta, old, new in zip(temperatures, *bodies, strict=True)

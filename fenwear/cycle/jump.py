@@ -18,6 +18,7 @@ from functools import reduce
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.moment import Moment, beginning, joined, parted
@@ -26,7 +27,6 @@ from fenwear.heat.periodic import CycleHeat
 from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn, WornLayer
-from fenwear.system import System
 
 PARTS = 8  # of a cycle that does not converge as a whole
 MAX_ITERATIONS = 60  # of contact with the nodes that conduct
@@ -37,7 +37,7 @@ SolveContact = Callable[[Array, Array, ContactState], ContactState]
 
 
 def jump(
-    system: System,
+    system: Tribosystem,
     half_cycles: int,
     *,
     tolerance: float,
@@ -102,11 +102,11 @@ def jump(
 class _Stepper:
     """Implicit steps of any number of cycles."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: Tribosystem) -> None:
         self.system = system
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.heat = cycle_heat(system)
-        self.slips = system.slips()
+        self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
 
     def beginning(self) -> Moment:
@@ -143,7 +143,7 @@ class _Stepper:
         if not self.system.constant_coefficients:
             self._update(moment)
         layer = WornLayer(self.wear, cycles)
-        phases = range(len(self.slips))
+        phases = range(len(self.ratios))
         gap = np.array([self.system.gap(phase, moment.worn) for phase in phases])
         contact, temperature = joined(moment.contacts), moment.temperature
         if self.heat is None or temperature is None or contact is None:
@@ -156,7 +156,7 @@ class _Stepper:
                 cycles,
                 contact,
                 lambda thermal, coupling, start: self.contact.solve(gap + thermal, start, layer, coupling),
-                self.system.statics.mean_pressure,
+                self.system.rigid.mean_pressure,
             )
             temperature = self.heat.parts(end)
         worn = moment.worn + self.wear.worn(contact.pressure).times(cycles)
@@ -176,11 +176,11 @@ class _Stepper:
         self.wear = system.wear.phases(conditions)
         if system.friction.constant:
             return
-        self.slips = system.slips(conditions)
+        self.ratios = system.friction_ratios(conditions)
         if isinstance(self.contact, CondensedContact):
-            self.contact.slide(self.slips)
+            self.contact.slide(self.ratios)
         if self.heat is not None:
-            mu = np.array([system.friction.values(state) for state in conditions])
+            mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
             self.heat = CycleHeat(self.heat.exchange.with_friction(mu))
 
     def record(self, recorder: Recorder, before: Moment, after: Moment, cycles: int) -> float:
@@ -212,7 +212,7 @@ class _Stepper:
         if old is not None:
             previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
         areas = self.wear.some([phase]).worn_area(contact.pressure)
-        return PhaseRecord(phase, contact, previous, areas, self.slips[phase])
+        return PhaseRecord(phase, contact, previous, areas, self.ratios[phase])
 
     def _last_cycle_heat(self, moment: Moment) -> list[HalfCycleHeat | None]:
         """Return the heat of one more cycle at the pressures of the moment."""
@@ -227,9 +227,9 @@ class _Stepper:
         return heats
 
 
-def cycle_heat(system: System) -> CycleHeat | None:
+def cycle_heat(system: Tribosystem) -> CycleHeat | None:
     """Return the heat of whole cycles; None without heat."""
-    exchange = system.reduced_exchange
+    exchange = with_reduced_heat(system).exchange
     return None if exchange is None else CycleHeat(exchange)
 
 
@@ -264,17 +264,17 @@ def solve_with_heat(
     )
 
 
-def _difference(system: System, one: Moment, other: Moment) -> float:
+def _difference(system: Tribosystem, one: Moment, other: Moment) -> float:
     """Return the root mean square of the pressures' difference over what is in contact, over the mean pressure there.
 
     Not the largest: that is the whole pressure of the one node which is in contact here and not there.
     """
-    weights, largest = system.facing.weights, 0.0
+    weights, largest = system.pair.weights, 0.0
     for a, b in zip(one.contacts, other.contacts, strict=True):
         first, second = _present(a).pressure[0], _present(b).pressure[0]
         width = float(weights @ (np.maximum(first, second) > 0))
         largest = max(largest, float(weights @ (first - second) ** 2) * width)
-    return float(np.sqrt(largest) / (system.statics.mean_pressure * weights.sum()))
+    return float(np.sqrt(largest) / (system.rigid.mean_pressure * weights.sum()))
 
 
 def _present(contact: ContactState | None) -> ContactState:

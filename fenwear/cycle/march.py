@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import reduce
 
+from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
 from fenwear.cycle.moment import Moment, beginning
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
 from fenwear.errors import ConvergenceError
-from fenwear.system import System
 
 BLOCK = 200
 
 
 def march(
-    system: System,
+    system: Tribosystem,
     half_cycles: int,
     *,
     implicit: bool = False,

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.heat.exchange import State
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Moment:
     periodic_phases: int = 0
 
 
-def beginning(system: System, temperature: State | None) -> Moment:
+def beginning(system: Tribosystem, temperature: State | None) -> Moment:
     """Return the unworn bodies at their initial temperature."""
     return Moment(0, system.unworn(), (None,) * len(system.motion.phases), temperature)
 

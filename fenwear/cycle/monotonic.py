@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, steady_exchange
 from fenwear.errors import CaseError, Problem
-from fenwear.system import System
 
 DIRECTIONS = (-1, 1)
 
@@ -33,16 +33,16 @@ class Monotonic:
         return self.punch.mean(axis=0)
 
 
-def monotonic(system: System) -> Monotonic:
+def monotonic(system: Tribosystem) -> Monotonic:
     """Return the steady temperatures at the optimal pressures; collective.
 
     Raises:
         CaseError: the case has no heat, or a body loses heat nowhere.
     """
-    if system.case.heat is None:
+    if system.heat is None:
         raise CaseError(Problem("heat", "missing, but required here"))
     speed = system.motion.mean_speed
-    exchange = system.steady_exchange([d * speed for d in DIRECTIONS])
+    exchange = steady_exchange(system, [d * speed for d in DIRECTIONS])
     pressures = [system.optimum(d).pressure for d in DIRECTIONS]
     punch, strip = [], []
     for phase, pressure in enumerate(pressures):

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.thermal import ThermalContact
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
-from fenwear.system import System
 
 MAX_ITERATIONS = 60  # of coefficients and the pressure they depend on
 CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
@@ -38,14 +38,14 @@ class PhaseStep:
         implicit: Whether the pressure is that on the shape at the end of the phase.
     """
 
-    def __init__(self, system: System, phase: int, *, implicit: bool) -> None:
+    def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
         self.system, self.phase, self.implicit = system, phase, implicit
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
         self._contact = system.phase_contact((phase,))
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
         conditions = system.conditions(phase)
-        self._slip = system.friction.slip(system.motion.phases[phase].direction, system.friction.values(conditions))
+        self._friction_ratio = system.phase_friction(phase, system.friction.values(conditions))
         self._wear = system.wear.phases([conditions], [phase])
 
     def solve(self, temperature: State | None, worn: Worn, before: ContactState | None) -> PhaseEnd:
@@ -69,12 +69,12 @@ class PhaseStep:
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
             except ConvergenceError as error:
-                largest = float(np.abs(self._slip).max())
+                largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
                 raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
             start, found = contact, contact.pressure[0]
             change = np.inf if pressure is None else np.abs(found - pressure).max()
             pressure = found if pressure is None else (pressure + found) / 2  # a coefficient of p would go to and fro
-            if change < CLOSE * self.system.statics.mean_pressure:
+            if change < CLOSE * self.system.rigid.mean_pressure:
                 return self._end(contact, after, heat, before, wear)
         raise ConvergenceError(
             f"the coefficients of friction and wear and the pressure they depend on did not come together in "
@@ -90,10 +90,10 @@ class PhaseStep:
         conditions = system.conditions(self.phase, pressure, surfaces)
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
             mu = system.friction.values(conditions)
-            self._slip = system.friction.slip(system.motion.phases[self.phase].direction, mu)
-            self._contact.slide([self._slip])
+            self._friction_ratio = system.phase_friction(self.phase, mu)
+            self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
-                self._thermal.slide(mu)
+                self._thermal.slide(heating_friction(system, mu))
         return system.wear.phases([conditions], [self.phase])
 
     def _solve(
@@ -114,5 +114,5 @@ class PhaseStep:
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
         areas = wear.worn_area(contact.pressure)
-        record = PhaseRecord(self.phase, contact, previous, areas, self._slip)
+        record = PhaseRecord(self.phase, contact, previous, areas, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, wear.worn(contact.pressure))

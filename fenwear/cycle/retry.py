@@ -10,6 +10,7 @@ from functools import reduce
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem, in_parts
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.moment import Moment
@@ -18,7 +19,6 @@ from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
 
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
 
@@ -31,9 +31,9 @@ class SmallerSteps:
         implicit: Whether the wear of a part is implicit.
     """
 
-    def __init__(self, system: System, *, implicit: bool) -> None:
+    def __init__(self, system: Tribosystem, *, implicit: bool) -> None:
         self.system, self.implicit = system, implicit
-        self._steps: dict[int, tuple[System, list[PhaseStep]]] = {}
+        self._steps: dict[int, tuple[Tribosystem, list[PhaseStep]]] = {}
 
     def half_cycle(self, moment: Moment, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle.
@@ -69,9 +69,9 @@ class SmallerSteps:
             ends.append(_joined(own, phase, before, _carried(temperature, system, self.system)))
         return ends
 
-    def _prepared(self, parts: int) -> tuple[System, list[PhaseStep]]:
+    def _prepared(self, parts: int) -> tuple[Tribosystem, list[PhaseStep]]:
         if parts not in self._steps:
-            system = self.system.in_parts(parts)
+            system = in_parts(self.system, parts)
             phases = range(len(system.motion.phases))
             self._steps[parts] = (system, [PhaseStep(system, phase, implicit=self.implicit) for phase in phases])
         return self._steps[parts]
@@ -84,14 +84,14 @@ def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, tempe
     previous = None if before is None else before.pressure[0]
     heats = [end.heat for end in ends if end.heat is not None]
     return PhaseEnd(
-        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.slip),
+        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.friction_ratio),
         temperature,
         reduce(HalfCycleHeat.then, heats) if heats else None,
         reduce(Worn.__add__, [end.worn for end in ends]),
     )
 
 
-def _carried(state: State | None, before: System, after: System) -> State | None:
+def _carried(state: State | None, before: Tribosystem, after: Tribosystem) -> State | None:
     """Return the state of the same temperatures on the other system's basis."""
     if state is None or before.exchange is None or after.exchange is None:
         return None

@@ -7,13 +7,13 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
+from fenwear.assembly import Tribosystem, steady_exchange
 from fenwear.cycle.jump import cycle_heat
-from fenwear.system import System
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 
 
-def stability_number(system: System) -> float:
+def stability_number(system: Tribosystem) -> float:
     """Return the wear step over its explicit limit: above 1 an explicit run oscillates and diverges; collective.
 
     On closed contact a worn depth lowers the pressure by P = (I - H-part) S^-1, the leading block of
@@ -21,19 +21,19 @@ def stability_number(system: System) -> float:
     I - K P with K = beta~ S b p^(b-1) of both bodies at the mean pressure, in the phase that wears most:
     stable while K times the largest eigenvalue of P is below 2.
     """
-    statics = system.statics
-    n, r = statics.rigid_normal.shape
-    uniform = np.full((len(system.motion.phases), n), statics.mean_pressure)
+    rigid = system.rigid
+    n, r = rigid.rigid_normal.shape
+    uniform = np.full((len(system.motion.phases), n), rigid.mean_pressure)
     wear = system.phases_wear
     slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
     scale = system.interface.elastic_length
     largest = 0.0
     for d in sorted(set(system.motion.directions)):
-        slip = system.slip(d)
+        friction_ratio = system.friction_ratio(d)
         matrix = np.zeros((n + r, n + r))
-        matrix[:n, :n] = system.interface.compliance(slip) / scale
-        matrix[:n, n:] = statics.rigid_normal
-        matrix[n:, :n] = statics.equilibrium(slip)
+        matrix[:n, :n] = system.interface.compliance(friction_ratio) / scale
+        matrix[:n, n:] = rigid.rigid_normal
+        matrix[n:, :n] = rigid.equilibrium(friction_ratio)
         factor = scipy.linalg.lu_factor(matrix)
 
         def respond(shape: Array, factor: tuple[Array, Array] = factor) -> Array:
@@ -46,7 +46,7 @@ def stability_number(system: System) -> float:
     return float(slopes.max()) * largest / 2
 
 
-def growth_rate(system: System, pressure: Array) -> float:
+def growth_rate(system: Tribosystem, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
@@ -64,11 +64,11 @@ def growth_rate(system: System, pressure: Array) -> float:
     dim = 0 if heat is None else heat.gap_rows.shape[1]
     maps = None if heat is None else heat.maps(heat.conductances(pressure))
     left, right = system.phases_wear.border(pressure)
-    slips = system.slips()
+    ratios = system.friction_ratios()
     cycle = np.eye(dim + n)
     for phase, interface in enumerate(system.interfaces):
         change = np.zeros((dim + n, dim + n))  # of temperature and depth over the phase
-        compliance = interface.compliance(slips[phase])
+        compliance = interface.compliance(ratios[phase])
         disturbance = np.zeros((n, dim + n))
         disturbance[:, dim:] = np.eye(n)
         if heat is not None and maps is not None:
@@ -78,7 +78,7 @@ def growth_rate(system: System, pressure: Array) -> float:
             change[:dim, :dim] = one.propagator
         wear = left[phase] @ right[phase]  # depth by pressure
         compliance = compliance + wear  # wear at the end of the phase: no step is too long
-        answer = -_restricted_stiffness(system, slips[phase], compliance, pressure[phase] > 0) @ disturbance
+        answer = -_restricted_stiffness(system, ratios[phase], compliance, pressure[phase] > 0) @ disturbance
         if maps is not None:
             change[:dim] += maps[phase].response @ answer
         change[dim:, dim:] = np.eye(n)
@@ -89,22 +89,22 @@ def growth_rate(system: System, pressure: Array) -> float:
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
 
 
-def _restricted_stiffness(system: System, slip: Array, compliance: Array, closed: Mask) -> Array:
+def _restricted_stiffness(system: Tribosystem, friction_ratio: Array, compliance: Array, closed: Mask) -> Array:
     """Return minus the pressure (n, n) that each unit of gap makes where `closed` nodes stay closed."""
-    statics = system.statics
+    rigid = system.rigid
     nodes = np.flatnonzero(closed)
-    k, r = len(nodes), statics.rigid_normal.shape[1]
+    k, r = len(nodes), rigid.rigid_normal.shape[1]
     scale = system.interface.elastic_length
     matrix = np.zeros((k + r, k + r))
     matrix[:k, :k] = compliance[np.ix_(nodes, nodes)] / scale
-    matrix[:k, k:] = statics.rigid_normal[nodes]
-    matrix[k:, :k] = statics.equilibrium(slip)[:, nodes]
+    matrix[:k, k:] = rigid.rigid_normal[nodes]
+    matrix[k:, :k] = rigid.equilibrium(friction_ratio)[:, nodes]
     stiffness = np.zeros((len(closed), len(closed)))
     stiffness[np.ix_(nodes, nodes)] = np.linalg.inv(matrix)[:k, :k] / scale
     return stiffness
 
 
-def critical_speed(system: System, direction: int) -> float:
+def critical_speed(system: Tribosystem, direction: int) -> float:
     """Return the sliding speed above which full contact is thermo-elastically unstable, mm/s; collective.
 
     Of disturbances that grow without moving along the contact, and without wear: there the steady
@@ -119,15 +119,15 @@ def critical_speed(system: System, direction: int) -> float:
     Raises:
         CaseError: the case has no heat, or a body no heat sink.
     """
-    n = len(system.facing.weights)
+    n = len(system.pair.weights)
     everywhere = np.ones(n, dtype=bool)
-    slip = system.slip(direction)
-    compliance = system.interface.compliance(slip)
-    stiffness = _restricted_stiffness(system, slip, compliance, everywhere)
+    friction_ratio = system.friction_ratio(direction)
+    compliance = system.interface.compliance(friction_ratio)
+    stiffness = _restricted_stiffness(system, friction_ratio, compliance, everywhere)
     speed = system.motion.mean_speed
     for _ in range(50):  # the strip's temperature depends on its speed
-        exchange = system.steady_exchange([direction * speed])
-        uniform = np.full(n, system.statics.mean_pressure)
+        exchange = steady_exchange(system, [direction * speed])
+        uniform = np.full(n, system.rigid.mean_pressure)
         states, _terms = exchange.response(0, exchange.conductance(uniform))
         thermal = exchange.gap_change(states) / speed
         values = np.linalg.eigvals(-stiffness @ thermal)

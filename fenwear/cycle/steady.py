@@ -24,13 +24,13 @@ import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
+from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
-from fenwear.system import System
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 MAX_ITERATIONS, CLOSE = 60, 1e-9  # of coefficients that depend on the state; change of pressure over the mean
@@ -87,18 +87,18 @@ class Steady:
 class _SteadyInequality:
     """Unknown: p of each phase, omega, the rigid modes a of all phases but the first, lambda."""
 
-    def __init__(self, system: System) -> None:
-        statics, interface = system.statics, system.interface
+    def __init__(self, system: Tribosystem) -> None:
+        rigid, interface = system.rigid, system.interface
         self.system = system
-        m, n, r = len(system.motion.phases), len(system.facing.weights), len(statics.resultant)
+        m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
         self.m, self.n, self.r = m, n, r
         self.wear = system.phases_wear
-        self.p_scale = statics.mean_pressure
+        self.p_scale = rigid.mean_pressure
         self.gap_scale = self.p_scale * interface.elastic_length
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
         self.lengths = system.mode_lengths
-        self.moment = self.lengths[:, None] * self.p_scale * statics.facing.weights.sum()
-        shape = statics.rigid_normal / self.lengths
+        self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
+        shape = rigid.rigid_normal / self.lengths
         size = m * n + n + m * r
         self.matrix = np.zeros((size, size))
         self.offset = np.zeros(size)
@@ -109,10 +109,10 @@ class _SteadyInequality:
             self.matrix[rows, omega] = np.eye(n)
             if k > 0:
                 self.matrix[rows, last + (k - 1) * r : last + k * r] = shape
-            moved = own.facing.initial_gap - system.facing.initial_gap
+            moved = own.pair.initial_gap - system.pair.initial_gap
             self.offset[rows] = (own.load_gap + moved) / self.gap_scale
-            self.offset[last + k * r : last + (k + 1) * r] = own.statics.resultant / self.moment[:, 0]
-        self._slide(system.slips())
+            self.offset[last + k * r : last + (k + 1) * r] = own.rigid.resultant / self.moment[:, 0]
+        self._slide(system.friction_ratios())
         # At its upper bound a variational inequality wants F <= 0: the wear balance with its sign turned.
         self.matrix[omega, size - r :] = shape
         self.omega = omega
@@ -126,20 +126,20 @@ class _SteadyInequality:
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
 
-    def _slide(self, slips: Sequence[Array]) -> None:
+    def _slide(self, ratios: Sequence[Array]) -> None:
         """Fill in what friction changes."""
         n, r, last = self.n, self.r, self.m * self.n + self.n
-        for k, (own, slip) in enumerate(zip(self.system.interfaces, slips, strict=True)):
+        for k, (own, friction_ratio) in enumerate(zip(self.system.interfaces, ratios, strict=True)):
             rows, balance = slice(k * n, (k + 1) * n), slice(last + k * r, last + (k + 1) * r)
-            self.matrix[rows, rows] = own.compliance(slip) * (self.p_scale / self.gap_scale)
-            self.matrix[balance, rows] = own.statics.equilibrium(slip) * self.p_scale / self.moment
-        self.slips = list(slips)
+            self.matrix[rows, rows] = own.compliance(friction_ratio) * (self.p_scale / self.gap_scale)
+            self.matrix[balance, rows] = own.rigid.equilibrium(friction_ratio) * self.p_scale / self.moment
+        self.ratios = list(ratios)
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""
         self.wear = self.system.wear.phases(conditions)
         self.matrix[:], self.offset[:] = self._without_heat
-        self._slide(self.system.slips(conditions))
+        self._slide(self.system.friction_ratios(conditions))
         self._without_heat = (self.matrix.copy(), self.offset.copy())
 
     def _residual(self, x: Array, f: Array) -> None:
@@ -186,12 +186,12 @@ class _SteadyInequality:
         if m == 1:
             optimum = self.system.optimum(self.system.motion.directions[0])
             x[:n] = optimum.pressure / self.p_scale
-            velocity = np.array([optimum.velocity[name] for name in self.system.statics.mode_names])
+            velocity = np.array([optimum.velocity[name] for name in self.system.rigid.mode_names])
             x[n + n :] = velocity * self.system.motion.period * self.lengths / self.wear_scale
         else:
             x[: m * n] = 1.0
             if r:
-                shape = self.system.statics.rigid_normal / self.lengths
+                shape = self.system.rigid.rigid_normal / self.lengths
                 x[-r:] = np.linalg.lstsq(shape, np.full(n, float(m)), rcond=None)[0]
         return x
 
@@ -205,7 +205,7 @@ class _SteadyInequality:
         return x
 
 
-def steady(system: System) -> Steady:
+def steady(system: Tribosystem) -> Steady:
     """Solve for the cyclic steady state; collective.
 
     With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is.
@@ -217,7 +217,7 @@ def steady(system: System) -> Steady:
     _check_exists(system)
     begin = time.perf_counter()
     problem = _SteadyInequality(system)
-    for body in system.heat_bodies or ():
+    for body in system.bodies.heat or ():
         body.check_heat_sink()
     contact, heat, temperature = _solve(problem, cycle_heat(system))
     pressure: Array | None = None
@@ -227,10 +227,10 @@ def steady(system: System) -> Steady:
         conditions = _conditions(system, pressure, heat, temperature)
         problem.take(conditions)
         if heat is not None and not system.friction.constant:
-            mu = np.array([system.friction.values(state) for state in conditions])
+            mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
             heat = CycleHeat(heat.exchange.with_friction(mu))
         contact, heat, temperature = _solve(problem, heat)
-        if np.abs(contact.pressure - pressure).max() < CLOSE * system.statics.mean_pressure:
+        if np.abs(contact.pressure - pressure).max() < CLOSE * system.rigid.mean_pressure:
             break
     else:
         if not system.constant_coefficients:
@@ -238,7 +238,7 @@ def steady(system: System) -> Steady:
     return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
 
 
-def _check_exists(system: System) -> None:
+def _check_exists(system: Tribosystem) -> None:
     """Raise where the strip's wear never comes to a shape that stays."""
     if system.track_deepens:
         raise ConvergenceError(
@@ -254,7 +254,7 @@ def _solve(problem: _SteadyInequality, heat: CycleHeat | None) -> tuple[ContactS
     try:
         contact = problem.solve()
     except ConvergenceError as error:
-        if system.case.wear.strip is not None or _uniform_wear_exists(system):
+        if system.strip_wears or _uniform_wear_exists(system):
             raise
         raise ConvergenceError(
             f"{error}; friction tips the punch so far that no pressures wear the whole contact by a rigid motion: "
@@ -268,13 +268,13 @@ def _solve(problem: _SteadyInequality, heat: CycleHeat | None) -> tuple[ContactS
         np.inf,
         contact,
         lambda thermal, coupling, _: problem.solve(thermal, coupling),
-        system.statics.mean_pressure,
+        system.rigid.mean_pressure,
     )
     return contact, heat, temperature
 
 
 def _conditions(
-    system: System, pressure: Array, heat: CycleHeat | None, temperature: Array | None
+    system: Tribosystem, pressure: Array, heat: CycleHeat | None, temperature: Array | None
 ) -> list[ContactConditions]:
     """Return what coefficients depend on in each phase: the temperatures at its start."""
     phases = range(len(pressure))
@@ -291,10 +291,10 @@ def _result(
     problem: _SteadyInequality, contact: ContactState, heat: CycleHeat | None, temperature: Array | None, seconds: float
 ) -> Steady:
     system = problem.system
-    weights, motion = system.facing.weights, system.motion
+    weights, motion = system.pair.weights, system.motion
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
-    shape = np.where(touched, omega - _rigid_part(system, omega - system.facing.initial_gap, touched), np.nan)
+    shape = np.where(touched, omega - _rigid_part(system, omega - system.pair.initial_gap, touched), np.nan)
     depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale
     depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
     velocity = depths / problem.lengths
@@ -304,10 +304,10 @@ def _result(
         contact.pressure[middle],
         contact.pressure,
         contact.gap[middle],
-        shape - system.facing.initial_gap,
+        shape - system.pair.initial_gap,
         (contact.pressure[middle] > 0) @ weights,
         problem.wear.opening(contact.pressure)[0],
-        {name: float(value) for name, value in zip(system.statics.mode_names, velocity, strict=True)},
+        {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
         contact.iterations,
         seconds,
         None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure, middle),
@@ -329,32 +329,32 @@ def _steady_heat(heat: CycleHeat, state: Array, pressure: Array, middle: slice) 
     return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends], (fields[0], fields[1]))
 
 
-def _uniform_wear_exists(system: System) -> bool:
+def _uniform_wear_exists(system: Tribosystem) -> bool:
     """Return whether any pressures of the phases wear the whole contact by a rigid motion (b = 1)."""
-    n, r = system.statics.rigid_normal.shape
+    n, r = system.rigid.rigid_normal.shape
     m = len(system.motion.phases)
     lengths = system.mode_lengths
     equality = np.zeros((n + m * r, m * n + r))
     target = np.zeros(n + m * r)
-    equality[:n, m * n :] = -system.statics.rigid_normal / lengths
-    for k, (own, slip) in enumerate(zip(system.interfaces, system.slips(), strict=True)):
+    equality[:n, m * n :] = -system.rigid.rigid_normal / lengths
+    for k, (own, friction_ratio) in enumerate(zip(system.interfaces, system.friction_ratios(), strict=True)):
         equality[:n, k * n : (k + 1) * n] = np.eye(n)
         rows = slice(n + k * r, n + (k + 1) * r)
-        equality[rows, k * n : (k + 1) * n] = own.statics.equilibrium(slip) / lengths[:, None]
-        target[rows] = -own.statics.resultant / lengths
+        equality[rows, k * n : (k + 1) * n] = own.rigid.equilibrium(friction_ratio) / lengths[:, None]
+        target[rows] = -own.rigid.resultant / lengths
     bounds = [(0, None)] * (m * n) + [(None, None)] * r
     return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=target, bounds=bounds).status != 2)
 
 
-def _rigid_part(system: System, values: Array, where: Mask) -> Array:
+def _rigid_part(system: Tribosystem, values: Array, where: Mask) -> Array:
     """Return the rigid motion that fits `values` best in the weighted least-squares sense."""
-    modes = system.statics.rigid_normal
-    root = np.sqrt(system.facing.weights * where)
+    modes = system.rigid.rigid_normal
+    root = np.sqrt(system.pair.weights * where)
     values = np.where(where, values, 0.0)
     return modes @ np.linalg.lstsq(modes * root[:, None], values * root, rcond=None)[0]
 
 
-def cycles_to_reach(system: System, state: Steady, fraction: float, limit: int = 10_000_000) -> int | None:
+def cycles_to_reach(system: Tribosystem, state: Steady, fraction: float, limit: int = 10_000_000) -> int | None:
     """Return after how many cycles from the initial shape the pressures come this near to the end.
 
     Found by a run of cycle jumps; within the jump that crosses the distance is taken to decay exponentially.
@@ -364,7 +364,7 @@ def cycles_to_reach(system: System, state: Steady, fraction: float, limit: int =
         fraction: Of the mean pressure.
         limit: Cycles tried; None is returned beyond.
     """
-    phases, goal = len(state.directions), fraction * system.statics.mean_pressure
+    phases, goal = len(state.directions), fraction * system.rigid.mean_pressure
     before: tuple[int, float] | None = None
     for block in jump(system, limit * phases, tolerance=fraction / 10, block=phases):
         cycles, distance = int(block.half_cycle[-1]) // phases, float(np.abs(block.pressure - state.pressure).max())

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactSolver, ContactState, Layer
 from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import HeatExchange, State
-from fenwear.system import System
 
 MAX_ITERATIONS = 200
 SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
@@ -46,14 +46,14 @@ class ThermalContact:
         contact: Its contact.
     """
 
-    def __init__(self, system: System, exchange: HeatExchange, phase: int, contact: ContactSolver) -> None:
+    def __init__(self, system: Tribosystem, exchange: HeatExchange, phase: int, contact: ContactSolver) -> None:
         self.system, self.exchange, self.phase = system, exchange, phase
         self._contact = contact
         self._response: _Response | None = None
         self._asked, self._repeats = b"", 0  # conductances asked for last, and how often in a row
 
     def slide(self, mu: Array) -> None:
-        """Set the friction coefficient (n,)."""
+        """Set the friction of the nodes times what they slide for a unit of the stroke (n,)."""
         friction = self.exchange.friction.copy()
         if not np.array_equal(friction[self.phase], mu):
             friction[self.phase] = mu
@@ -75,7 +75,7 @@ class ThermalContact:
         """
         if start is None:
             start = self._contact.solve(gap + self.exchange.gap(temperature), None, layer)
-        heat = self.system.case.heat
+        heat = self.system.heat
         if heat is not None and heat.coupling == "split":
             return self._split(temperature, gap, start, layer)
         return self._implicit(temperature, gap, start, layer)
@@ -84,7 +84,7 @@ class ThermalContact:
         self, temperature: State, gap: Array, start: ContactState, layer: Layer | None
     ) -> tuple[ContactState, State, HalfCycleHeat]:
         exchange, contact = self.exchange, start
-        mean = self.system.statics.mean_pressure
+        mean = self.system.rigid.mean_pressure
         relaxed = 1.0
         pressure = start.pressure[0]
         for iteration in range(1, MAX_ITERATIONS + 1):
@@ -114,7 +114,7 @@ class ThermalContact:
         known, key = self._response, conductance.tobytes()
         self._repeats = self._repeats + 1 if key == self._asked else 0
         self._asked = key
-        heat = self.system.case.heat
+        heat = self.system.heat
         costly = heat is not None and (heat.operator == "full" or heat.conductance_per_pressure is not None)
         if known is not None and (known.conductance.tobytes() == key or (costly and self._repeats < WORTH_IT)):
             return known
@@ -125,7 +125,7 @@ class ThermalContact:
     def _split(
         self, temperature: State, gap: Array, start: ContactState, layer: Layer | None
     ) -> tuple[ContactState, State, HalfCycleHeat]:
-        exchange, heat = self.exchange, self.system.case.heat
+        exchange, heat = self.exchange, self.system.heat
         relaxation, tolerance = (heat.relaxation, heat.split_tolerance) if heat else (1.0, 1e-4)
         contact, pressure, volume = start, start.pressure[0], np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
@@ -148,7 +148,7 @@ class ThermalContact:
 
     def _volume(self, gap: Array) -> float:
         """Return the cross-section between the unloaded surfaces where they touch first, mm²."""
-        modes, weights = self.system.statics.rigid_normal, self.system.facing.weights
+        modes, weights = self.system.rigid.rigid_normal, self.system.pair.weights
         root = np.sqrt(weights)
         fitted = modes @ np.linalg.lstsq(modes * root[:, None], gap * root, rcond=None)[0]
         return float(weights @ np.abs(gap - fitted))

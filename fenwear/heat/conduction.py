@@ -25,8 +25,8 @@ from scipy.sparse import csr_array
 from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
-from fenwear.bodies.elasticity import region_field
 from fenwear.bodies.factor import Factor
+from fenwear.bodies.material import region_field
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.errors import CaseError, Problem

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case import Heat
-from fenwear.heat.field import Field, Functional
+from fenwear.heat.field import Field, Functional, ReducedField
 
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 State = tuple[Array, Array]  # of the punch and of the strip
@@ -112,6 +112,11 @@ class HeatExchange:
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
         self._contact_responses = [[side.contact_change(r) for r in side.field.responses] for side in sides]
         self._flux_maps: dict[tuple[int, int, bytes], _FluxMap] = {}
+
+    @property
+    def reduced(self) -> bool:
+        """Whether both bodies' temperatures live on a small basis, equal on every rank."""
+        return all(isinstance(side.field, ReducedField) for side in self.sides)
 
     def with_friction(self, friction: Array) -> HeatExchange:
         """Return the exchange at another mu (phases, n) with all else the same."""

@@ -5,46 +5,45 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
-from fenwear.case import Case
+from fenwear.case import Heat
 from fenwear.errors import CaseError, Problem
 from fenwear.heat.conduction import HeatBody, HeatStep
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.reduction import reduced_basis
-from fenwear.interface import Facing
+from fenwear.interface import ContactPair
 from fenwear.parallel import total
 from fenwear.sliding.motion import Motion
 
 
 def prepare_exchange(
-    case: Case,
+    heat: Heat,
     bodies: tuple[HeatBody, HeatBody],
-    facing: Facing,
+    pair: ContactPair,
     gap_rows: tuple[Array, Array],
     motion: Motion,
     friction: Array,
+    thickness: float,
     *,
     reduced: bool,
 ) -> HeatExchange:
     """Return the exchange over the half-cycles of the motion; collective.
 
     Args:
-        case: The case, with heat.
+        heat: Settings of the heat.
         bodies: Conduction in the punch and in the strip.
-        facing: The interface.
+        pair: The contact.
         gap_rows: Gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K.
         motion: The sliding motion.
-        friction: mu of the interface nodes (n,), in all phases.
+        friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), in all phases.
+        thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
 
     Raises:
         CaseError: the half-cycles of the motion last unequally long.
     """
-    heat = case.heat
-    assert heat is not None
     if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
         raise CaseError(Problem("motion", "expected half-cycles of equal duration with heat"))
     count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
@@ -56,7 +55,7 @@ def prepare_exchange(
     of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
     plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]
     sides = []
-    for body, inflow, rows, own in zip(bodies, inflows(bodies, facing), gap_rows, ([0.0], velocities), strict=True):
+    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
         steps = [body.step(velocity, duration) for velocity in own]
         if reduced:
             moving = [0.0] if len(own) == 1 and own[0] == 0 else every
@@ -64,17 +63,18 @@ def prepare_exchange(
             field: FullField | ReducedField = ReducedField(body, steps, inflow, lift, basis)
         else:
             field = FullField(body, steps, inflow)
-        sides.append(_side(field, steps, facing, rows))
-    return _exchange(case, (sides[0], sides[1]), plans, duration, facing, friction)
+        sides.append(_side(field, steps, pair, rows))
+    return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 
 
 def prepare_steady(
-    case: Case,
+    heat: Heat,
     bodies: tuple[HeatBody, HeatBody],
-    facing: Facing,
+    pair: ContactPair,
     gap_rows: tuple[Array, Array],
     velocities: Sequence[float],
     friction: Array,
+    thickness: float,
 ) -> HeatExchange:
     """Return the exchange whose phase k is the steady state of the strip moving at velocity k; collective.
 
@@ -83,37 +83,35 @@ def prepare_steady(
     """
     plans = [[StepPlan(0, k, abs(v))] for k, v in enumerate(velocities)]
     sides = []
-    for body, inflow, rows, own in zip(bodies, inflows(bodies, facing), gap_rows, ([0.0], velocities), strict=True):
+    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
         steps = [body.step(velocity, np.inf) for velocity in own]
-        sides.append(_side(FullField(body, steps, inflow), steps, facing, rows))
-    return _exchange(case, (sides[0], sides[1]), plans, np.inf, facing, friction)
+        sides.append(_side(FullField(body, steps, inflow), steps, pair, rows))
+    return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
 
 
-def inflows(bodies: tuple[HeatBody, HeatBody], facing: Facing) -> tuple[Array, Array]:
+def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[Array, Array]:
     """Return the loads of unit fluxes at the interface nodes on each body (owned, n), mm."""
-    weights = np.diag(facing.weights)
-    return bodies[0].place(weights), bodies[1].place(facing.transfer.T @ weights)
+    weights = np.diag(pair.weights)
+    return bodies[0].place(weights), bodies[1].place(pair.transfer.T @ weights)
 
 
 def _exchange(
-    case: Case,
+    heat: Heat,
     sides: tuple[Side, Side],
     plans: list[list[StepPlan]],
     duration: float,
-    facing: Facing,
+    pair: ContactPair,
     friction: Array,
+    thickness: float,
 ) -> HeatExchange:
-    assert case.heat is not None
-    return HeatExchange(
-        case.heat, sides, plans, duration, np.tile(friction, (len(plans), 1)), facing.weights, case.model.thickness
-    )
+    return HeatExchange(heat, sides, plans, duration, np.tile(friction, (len(plans), 1)), pair.weights, thickness)
 
 
-def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], facing: Facing, gap_rows: Array) -> Side:
+def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], pair: ContactPair, gap_rows: Array) -> Side:
     body = field.body
     contact_rows = body.contact_rows
     if body.body.name == "strip":
-        contact_rows = csr_array(facing.transfer) @ contact_rows
+        contact_rows = pair.transfer @ contact_rows
     balance_rows = [body.storage, body.convected]
     for step in steps:
         balance_rows += [step.held_by_end, step.held_by_start, step.velocity * body.carried]

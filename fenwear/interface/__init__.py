@@ -1,7 +1,19 @@
 """Two surfaces in contact: opposite each other, in equilibrium, and elastic."""
 
 from fenwear.interface.compliance import Interface, join
-from fenwear.interface.equilibrium import Statics, statics
-from fenwear.interface.facing import Facing, check_distance, face, interpolation
+from fenwear.interface.equilibrium import RigidEquilibrium, rigid_equilibrium
+from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material
+from fenwear.interface.placement import Placement
 
-__all__ = ["Facing", "Interface", "Statics", "check_distance", "face", "interpolation", "join", "statics"]
+__all__ = [
+    "ContactPair",
+    "Interface",
+    "Placement",
+    "RigidEquilibrium",
+    "check_distance",
+    "interpolation",
+    "join",
+    "pair",
+    "pass_material",
+    "rigid_equilibrium",
+]

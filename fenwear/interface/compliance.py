@@ -8,52 +8,66 @@ from functools import cached_property
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.bodies.surface import Surface
-from fenwear.interface.equilibrium import Statics
-from fenwear.interface.facing import Facing
+from fenwear.bodies.condensation import CondensedBody
+from fenwear.interface.equilibrium import RigidEquilibrium
+from fenwear.interface.pair import ContactPair
 
 
 @dataclass(frozen=True)
 class Interface:
-    """Two condensed bodies in contact: gap = (S_n + S_t tau) p + H a + g_load + g_0 + w, tau = d mu.
+    """Two condensed bodies in contact: gap = S(tau) p + H a + g_load + g_0 + w.
 
     Attributes:
-        statics: H, H_t, F, the nodes and the transfer.
-        normal_compliance: S_n (n, n), mm/MPa.
-        tangential_compliance: S_t (n, n), mm/MPa.
+        rigid: H, F, the nodes and the transfer.
+        gap_by_force: Gap at node i from a unit force along each axis at node j, on the punch and its
+            reaction on the strip (n, n, d), mm per N/mm in the plane.
         load_gap: g_load (n,), mm.
     """
 
-    statics: Statics
-    normal_compliance: Array
-    tangential_compliance: Array
+    rigid: RigidEquilibrium
+    gap_by_force: Array
     load_gap: Array
 
-    def compliance(self, slip: float | Array) -> Array:
-        """Return S_n + S_t tau (n, n), mm/MPa.
+    def compliance(self, friction_ratio: Array | float) -> Array:
+        """Return S (n, n), mm/MPa: the gap from unit pressures with their friction.
 
         Args:
-            slip: tau = d mu, the same everywhere or (n,).
+            friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; 0.0 for none.
         """
-        return self.normal_compliance + self.tangential_compliance * slip
+        traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
+        return np.einsum("ijd,jd->ij", self.gap_by_force, traction)
 
     @cached_property
     def elastic_length(self) -> float:
-        """Gap that a uniform unit pressure opens on average, mm/MPa: the scale of gaps."""
-        return float(np.abs(self.normal_compliance.sum(axis=1)).mean())
+        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps."""
+        elastic = self.compliance(0.0)
+        modes = self.rigid.rigid_normal
+        elastic = elastic - modes @ np.linalg.lstsq(modes, elastic, rcond=None)[0]
+        return float(np.abs(elastic).sum(axis=1).mean())
 
     @property
-    def facing(self) -> Facing:
+    def pair(self) -> ContactPair:
         """The nodes and the transfer."""
-        return self.statics.facing
+        return self.rigid.pair
 
 
-def join(statics: Statics, punch: Surface, strip: Surface) -> Interface:
-    """Join two condensed bodies."""
-    to_punch, weights = statics.facing.transfer, statics.facing.weights
-    return Interface(
-        statics,
-        (punch.normal_by_normal + to_punch @ strip.normal_by_normal @ to_punch.T) * weights,
-        (punch.normal_by_tangential + to_punch @ strip.normal_by_tangential @ to_punch.T) * weights,
-        punch.normal_by_load - to_punch @ strip.normal_by_load,
-    )
+def join(rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, *, strip_moves: bool) -> Interface:
+    """Join two condensed bodies at the place of a pair.
+
+    Args:
+        rigid: The equilibrium there.
+        punch: Condensed onto its pressure nodes.
+        strip: Condensed onto its trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        strip_moves: Which of the two.
+    """
+    pair = rigid.pair
+    reading = pair.transfer if strip_moves else None
+    on_strip = strip.normal_response(pair.normal_on_strip, reading)
+    turned = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
+    by_load = strip.by_load if reading is None else reading @ strip.by_load
+    load_gap = _along(pair.normal, punch.by_load) - _along(pair.normal_on_strip, by_load)
+    return Interface(rigid, punch.normal_response(pair.normal) + turned, load_gap)
+
+
+def _along(normal: Array, vectors: Array) -> Array:
+    return np.einsum("id,id->i", normal, vectors)

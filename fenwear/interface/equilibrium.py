@@ -3,42 +3,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.surface import rigid_motion
-from fenwear.interface.facing import Facing
+from fenwear.interface.pair import ContactPair
 
 
 @dataclass(frozen=True)
-class Statics:
+class RigidEquilibrium:
     """What the equilibrium of the rigid modes needs of the interface; no elasticity in it.
 
-    (H + H_t tau)^T W p + F = 0, per thickness, tau the traction along e_t over the pressure: d mu.
+    sum of w_i p_i (e_n + tau)_i . m_i + F = 0 for each mode's relative motion m of the surfaces, per
+    thickness in the plane; tau is the traction of friction on the punch over the pressure.
 
     Attributes:
-        facing: The nodes and the transfer.
-        rigid_normal: H (n, modes), the gap opened by each rigid mode.
-        rigid_tangential: H_t (n, modes).
-        resultant: F = R^T f of the loads (modes,), N/mm and N.
+        pair: The nodes and the transfer.
+        motion: m (n, d, modes), the motion of the punch's surface against the strip's by each rigid mode.
+        resultant: F = R^T f of the loads (modes,), N/mm and N; in a solid N and N mm.
         mode_names: Names of the rigid modes, lambda_F and lambda_M for a tilting punch.
     """
 
-    facing: Facing
-    rigid_normal: Array
-    rigid_tangential: Array
+    pair: ContactPair
+    motion: Array
     resultant: Array
     mode_names: tuple[str, ...]
 
-    def equilibrium(self, slip: float | Array) -> Array:
-        """Return (H + tau H_t)^T W (modes, n): the load that pressure balances.
+    @cached_property
+    def rigid_normal(self) -> Array:
+        """H (n, modes), the gap opened by each rigid mode."""
+        return np.einsum("id,idm->im", self.pair.normal, self.motion)
+
+    def equilibrium(self, friction_ratio: Array | float) -> Array:
+        """Return the load on each mode (modes, n) that pressure at each node balances.
 
         Args:
-            slip: tau = d mu, the same everywhere or (n,).
+            friction_ratio: tau (n, d); 0.0 for none.
         """
-        return (self.rigid_normal.T + slip * self.rigid_tangential.T) * self.facing.weights
+        traction = self.pair.normal + friction_ratio
+        return np.einsum("id,idm->mi", traction, self.motion) * self.pair.weights
 
     @property
     def mean_pressure(self) -> float:
@@ -46,17 +51,23 @@ class Statics:
         if "lambda_F" not in self.mode_names:
             return 1.0
         force = abs(self.resultant[self.mode_names.index("lambda_F")])
-        return float(force / self.facing.weights.sum()) or 1.0
+        return float(force / self.pair.weights.sum()) or 1.0
 
 
-def statics(facing: Facing, punch: ElasticBody, strip: ElasticBody) -> Statics:
+def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:
     """Gather the rigid modes at the interface; collective."""
-    punch_normal, punch_tangential = rigid_motion(punch, facing.punch)
-    strip_normal, strip_tangential = rigid_motion(strip, facing.strip)
-    return Statics(
-        facing,
-        np.hstack([punch_normal, -facing.transfer @ strip_normal]),
-        np.hstack([punch_tangential, -facing.transfer @ strip_tangential]),
+    of_punch = np.einsum("Ni,Ndm->idm", pair.punch.spread.toarray(), punch.rigid_motion)
+    of_strip = (
+        np.stack(
+            [pair.transfer @ pair.placement.vectors(strip.rigid_motion[:, :, m]) for m in range(len(strip.mode_names))],
+            axis=2,
+        )
+        if strip.mode_names
+        else np.zeros((*of_punch.shape[:2], 0))
+    )
+    return RigidEquilibrium(
+        pair,
+        np.concatenate([of_punch, -of_strip], axis=2),
         np.concatenate([punch.rigid_resultant, strip.rigid_resultant]),
         (*punch.mode_names, *strip.mode_names),
     )

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import load_case
 from fenwear.cycle import Steady, growth_rate, jump, march, monotonic, steady
 from fenwear.paper.published import PEAK_HALF_CYCLE, TEMPERATURE_HALF_CYCLE, VELOCITIES
-from fenwear.system import System
 
 TRANSIENT = 100  # half-cycles in which the flat punch's edges carry the largest pressure
 
@@ -198,7 +198,7 @@ def middle(x: Array) -> int:
 def velocities(scope: Scope = FULL) -> tuple[dict[str, float], ...]:
     """Return the wear velocities of the paper's table, in its order; collective."""
     found: list[dict[str, float]] = []
-    systems = {row.case: System(load_case(row.case, scope.settings)) for row in VELOCITIES}
+    systems = {row.case: assemble(load_case(row.case, scope.settings)) for row in VELOCITIES}
     for row in VELOCITIES:
         found.append(systems[row.case].optimum(row.direction).velocity)
     return tuple(found)
@@ -207,14 +207,14 @@ def velocities(scope: Scope = FULL) -> tuple[dict[str, float], ...]:
 @cache
 def no_heat(name: str, scope: Scope = FULL) -> NoHeat:
     """Return an example without heat, directly and by a run of cycle jumps; collective."""
-    system = System(load_case(name, scope.settings))
+    system = assemble(load_case(name, scope.settings))
     *_, last = jump(system, 2 * scope.cycles, tolerance=system.case.run.jump_tolerance)
-    return NoHeat(system.facing.x, system.statics.mean_pressure, steady(system), last.pressure[-2:])
+    return NoHeat(system.pair.x, system.rigid.mean_pressure, steady(system), last.pressure[-2:])
 
 
-def steady_heat(system: System) -> SteadyHeat:
+def steady_heat(system: Tribosystem) -> SteadyHeat:
     """Return the states of a system that need no run; collective."""
-    state, centre = steady(system), middle(system.facing.x)
+    state, centre = steady(system), middle(system.pair.x)
     if state.heat is None:  # the built-in cases with heat have it
         raise ValueError("expected a case with heat")
     at_middle = float(state.heat.punch[:, centre].max())
@@ -243,18 +243,18 @@ def neutral_share(scope: Scope = FULL) -> float | None:
 
 
 @cache
-def _prepared(name: str, settings: tuple[str, ...]) -> System:
-    return System(load_case(name, settings))
+def _prepared(name: str, settings: tuple[str, ...]) -> Tribosystem:
+    return assemble(load_case(name, settings))
 
 
-def _run(system: System, half_cycles: int) -> HeatRun:
+def _run(system: Tribosystem, half_cycles: int) -> HeatRun:
     blocks = list(march(system, half_cycles))
     heats = [block.heat for block in blocks if block.heat is not None]
-    heat = system.case.heat
+    heat = system.heat
     return HeatRun(
         float("nan") if heat is None else heat.partition,
-        system.facing.x,
-        system.statics.mean_pressure,
+        system.pair.x,
+        system.rigid.mean_pressure,
         steady_heat(system),
         np.concatenate([block.pressure for block in blocks]),
         np.concatenate([block.wear for block in blocks]),
@@ -295,12 +295,12 @@ def open_choices(scope: Scope = FULL) -> tuple[Variant, ...]:
     ):
         variants += _variants(base.vary(key), scope, "example 1", name)
     for name, keys in {"plane strain": ("model.plane=strain",), **SUPPORTS, **MOVING}.items():
-        variants += _variants(System(load_case("example1-heat", (*scope.settings, *keys))), scope, "example 1", name)
+        variants += _variants(assemble(load_case("example1-heat", (*scope.settings, *keys))), scope, "example 1", name)
     built_in = _prepared("example2-heat", scope.settings)
     variants += _variants(built_in, scope, "example 2", f"Example 2, hinges at {HINGES[0][0]} and {HINGES[0][1]} mm")
     for low, high in HINGES[1:]:
         heights = (f"geometry.parameters.pin_height_1={low}", f"geometry.parameters.pin_height_2={high}")
-        system = System(load_case("example2-heat", (*scope.settings, *heights)))
+        system = assemble(load_case("example2-heat", (*scope.settings, *heights)))
         variants += _variants(system, scope, "example 2", f"hinges at {low} and {high} mm")
     return tuple(variants)
 
@@ -311,7 +311,7 @@ def convergence(scope: Scope = FULL) -> tuple[Variant, ...]:
     variants: list[Variant] = []
     for elements, degree in scope.meshes:
         mesh = (f"geometry.parameters.elements_along_contact={elements}", f"geometry.degree={degree}")
-        system = System(load_case("example1-heat", (*scope.settings, *mesh)))
+        system = assemble(load_case("example1-heat", (*scope.settings, *mesh)))
         variants += _variants(system, scope, "mesh", f"{elements} elements of degree {degree}")
     for steps in scope.steps:
         system = _prepared("example1-heat", scope.settings).vary(f"heat.steps={steps}")
@@ -319,7 +319,7 @@ def convergence(scope: Scope = FULL) -> tuple[Variant, ...]:
     return tuple(variants)
 
 
-def _variants(system: System, scope: Scope, group: str, name: str) -> list[Variant]:
+def _variants(system: Tribosystem, scope: Scope, group: str, name: str) -> list[Variant]:
     found = []
     for share in scope.variant_shares:
         run = _run(system.vary(f"heat.partition={share}"), scope.variants)

@@ -19,6 +19,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.moment import Moment
 from fenwear.errors import CaseError, OutputError, Problem
@@ -27,7 +28,6 @@ from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS = "case.toml", "moment.npz"
@@ -42,7 +42,7 @@ BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generousl
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "title")
 
 
-def save(directory: Path, system: System, exchange: HeatExchange | None, moment: Moment) -> None:
+def save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, moment: Moment) -> None:
     """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
 
     Raises:
@@ -55,12 +55,12 @@ def save(directory: Path, system: System, exchange: HeatExchange | None, moment:
         raise
 
 
-def _save(directory: Path, system: System, exchange: HeatExchange | None, moment: Moment) -> None:
+def _save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, moment: Moment) -> None:
     comm, new = system.comm, directory / NEW
     on_root(comm, lambda: _begin(new, system, moment))
-    if exchange is not None and moment.temperature is not None and system.heat_bodies is not None:
+    if exchange is not None and moment.temperature is not None and system.bodies.heat is not None:
         temperatures = exchange.temperatures(moment.temperature)
-        for body, values in zip(system.heat_bodies, temperatures, strict=True):
+        for body, values in zip(system.bodies.heat, temperatures, strict=True):
             path, function = new / f"temperature_{body.body.name}.bp", body.function(values)
             size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
             on_root(comm, partial(check_room, new, size))
@@ -70,16 +70,16 @@ def _save(directory: Path, system: System, exchange: HeatExchange | None, moment
     on_root(comm, lambda: _swap(directory))
 
 
-def _begin(new: Path, system: System, moment: Moment) -> None:
+def _begin(new: Path, system: Tribosystem, moment: Moment) -> None:
     with writing(new):
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir()
         _write(new, system, moment)
 
 
-def _write(new: Path, system: System, moment: Moment) -> None:
+def _write(new: Path, system: Tribosystem, moment: Moment) -> None:
     (new / CASE).write_text(system.case.to_toml(), "utf-8")
-    n, r = len(system.facing.weights), len(system.statics.resultant)
+    n, r = len(system.pair.weights), len(system.rigid.resultant)
     empty = ContactState(np.full((1, n), np.nan), np.full((1, n), np.nan), np.full((1, r), np.nan), 0)
     contacts = [contact or empty for contact in moment.contacts]
     with (new / ARRAYS).open("wb") as file:
@@ -87,7 +87,7 @@ def _write(new: Path, system: System, moment: Moment) -> None:
             file,
             **{name: getattr(moment, name) for name in NUMBERS},
             **_depths(WEAR, moment.worn),
-            **({} if system.followed is None else _depths(FOLLOWED, system.followed)),
+            **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
         )
         file.flush()
@@ -98,7 +98,7 @@ def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
     return dict(zip(names, (worn.punch, worn.strip), strict=True))
 
 
-def followed(directory: Path, system: System) -> Worn | None:
+def followed(directory: Path, system: Tribosystem) -> Worn | None:
     """Return the worn depths that the meshes of a checkpoint follow, None where they are as made; collective.
 
     Raises:
@@ -118,7 +118,7 @@ def _swap(directory: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def load(directory: Path, system: System, exchange: HeatExchange | None) -> Moment:
+def load(directory: Path, system: Tribosystem, exchange: HeatExchange | None) -> Moment:
     """Return the moment of a run's checkpoint; collective.
 
     Raises:
@@ -128,8 +128,8 @@ def load(directory: Path, system: System, exchange: HeatExchange | None) -> Mome
     folder = on_root(comm, lambda: _find(directory))
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
-    if exchange is not None and system.heat_bodies is not None:
-        punch, strip = (_read_temperature(folder, body) for body in system.heat_bodies)
+    if exchange is not None and system.bodies.heat is not None:
+        punch, strip = (_read_temperature(folder, body) for body in system.bodies.heat)
         temperature = exchange.state((punch, strip))
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
@@ -182,7 +182,7 @@ def _arrays(folder: Path) -> dict[str, Any]:
         raise _damaged(folder) from None
 
 
-def _read(folder: Path, system: System) -> dict[str, Any]:
+def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
     try:
         saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
     except (OSError, ValueError):

@@ -20,15 +20,15 @@ import xarray
 from dolfinx import fem
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.bodies.antiplane import shear_out_of_plane
-from fenwear.bodies.elasticity import ElasticBody, strain, stress
-from fenwear.bodies.surface import SurfaceNodes
+from fenwear.bodies.elasticity import ElasticBody
 from fenwear.compat import interpolation_points
 from fenwear.heat.conduction import HeatBody
+from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
-from fenwear.system import System
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
@@ -55,7 +55,7 @@ class BodyFields:
 
 
 def body_fields(
-    system: System, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
+    system: Tribosystem, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
 ) -> tuple[BodyFields, BodyFields]:
     """Return the fields of the punch and the strip; collective.
 
@@ -66,22 +66,21 @@ def body_fields(
         phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
     """
-    facing, (slip, cross) = system.facings[phase], _tractions(system, phase, pressure, temperatures)
-    normal = facing.weights * pressure
-    nodal = np.array([normal, normal * slip, normal * cross])
-    loads = (nodal, -nodal @ facing.transfer)
-    count = len(system.punch.rigid_modes)
+    pair, traction = system.pairs[phase], _traction(system, phase, pressure, temperatures)
+    force = in_space(pair.normal) + traction
+    force *= (pair.weights * pressure)[:, None]
+    on_punch, on_strip = pair.punch.spread @ force, -(pair.transfer.T @ force)
+    bodies = system.loaded[phase]
+    count = len(bodies.punch.rigid_modes)
     amplitudes = (rigid[:count], rigid[count:])
-    heat_bodies = system.heat_bodies or (None, None)
     punch, strip = (
-        _solve(system, elastic, nodes, load, modes, heat, None if temperatures is None else temperatures[k])
-        for k, (elastic, nodes, load, modes, heat) in enumerate(
+        _solve(elastic, load, modes, heat, None if temperatures is None else temperatures[k])
+        for k, (elastic, load, modes, heat) in enumerate(
             zip(
-                system.phase_bodies[phase],
-                (facing.punch, facing.strip),
-                loads,
+                (bodies.punch, bodies.strip),
+                (on_punch, on_strip),
                 amplitudes,
-                heat_bodies,
+                system.bodies.heat or (None, None),
                 strict=True,
             )
         )
@@ -89,74 +88,67 @@ def body_fields(
     return punch, strip
 
 
-def _tractions(
-    system: System, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None
-) -> tuple[Array, Array]:
-    """Return the tractions on the punch along e_t and y over this pressure (n,) each; collective."""
+def _traction(system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None) -> Array:
+    """Return the traction of friction on the punch over this pressure, in space (n, 3); collective."""
     friction, surfaces = system.friction, None
-    if not friction.constant and temperatures is not None and system.heat_bodies is not None:
+    if not friction.constant and temperatures is not None and system.bodies.heat is not None:
         punch, strip = (
             system.comm.allreduce(body.contact_rows @ values)
-            for body, values in zip(system.heat_bodies, temperatures, strict=True)
+            for body, values in zip(system.bodies.heat, temperatures, strict=True)
         )
-        surfaces = (punch, system.facing.transfer @ strip)
+        surfaces = (punch, system.pair.transfer @ strip)
     mu = friction.values(system.conditions(phase, pressure, surfaces))
-    direction = system.motion.phases[phase].direction
-    return friction.slip(direction, mu), friction.cross(direction, mu)
+    return friction.ratio(system.motion.phases[phase].direction, mu, system.pairs[phase])
 
 
 def _solve(
-    system: System,
     elastic: ElasticBody,
-    nodes: SurfaceNodes,
     load: Array,
     rigid: Array,
     heat: HeatBody | None,
     temperature: Array | None,
 ) -> BodyFields:
-    """Return one body's fields under nodal contact loads along e_n, e_t and y (3, n), N/mm; collective."""
-    force = elastic.load.copy()
-    vectors = load[0][:, None] * nodes.normal + load[1][:, None] * nodes.tangent
-    start, stop = elastic.space.dofmap.index_map.local_range
-    own = (nodes.block >= start) & (nodes.block < stop)
-    rows = 2 * (nodes.block[own, None] - start) + np.arange(2)
-    force.array[rows.ravel()] += vectors[own].ravel()
+    """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
+    force, dim = elastic.load.copy(), elastic.dim
+    force.array[:] += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
     force.array[elastic.supported] = 0.0
-    theta = None
+    theta = change = None
     if heat is not None and temperature is not None:
         theta = heat.function(temperature)
         change = heat.function(temperature - heat.heat.initial)
-        elastic.thermal_coupling(heat.space, system.case.materials).multAdd(change.x.petsc_vec, force, force)
+        elastic.thermal_coupling(heat.space).multAdd(change.x.petsc_vec, force, force)
     solution = force.duplicate()
     elastic.factor.solve(force, solution)
     displacement = fem.Function(elastic.space, name="displacement")
-    owned = 2 * elastic.space.dofmap.index_map.size_local
+    owned = dim * elastic.space.dofmap.index_map.size_local
     displacement.x.array[:owned] = solution.array_r
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
-    out_of_plane = shear_out_of_plane(elastic, nodes.block, load[2]) if load[2].any() else None
-    equivalent = _von_mises(system, elastic, displacement, out_of_plane, theta)
+    out_of_plane = None
+    if dim == 2 and load[:, 1].any():
+        out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, load[:, 1])
+    equivalent = _von_mises(elastic, displacement, out_of_plane, change)
     von_mises = _interpolated(equivalent, elastic, "von_mises", ())
     flux = None
     if heat is not None and theta is not None:
-        flux = _interpolated(-heat.conductivity * ufl.grad(theta), elastic, "heat_flux", (2,))
+        flux = _interpolated(-heat.conductivity * ufl.grad(theta), elastic, "heat_flux", (dim,))
     return BodyFields(displacement, out_of_plane, von_mises, theta, flux)
 
 
-def _von_mises(system: System, elastic: ElasticBody, displacement: Any, out_of_plane: Any, theta: Any) -> Any:
-    """Return sqrt(3/2 s : s) with the stress out of plane: zero in plane stress, in plane strain from eps_yy = 0."""
-    sigma = stress(displacement, *elastic.lame)
-    plane_stress = system.case.model.plane == "stress"
-    thermal: Any = 0.0
-    if theta is not None and system.case.heat is not None:
-        thermal = elastic.thermal_modulus(system.case.materials) * (theta - system.case.heat.initial)
-        sigma = sigma - thermal * ufl.Identity(2)
-    out = 0.0 if plane_stress else elastic.lame[0] * ufl.tr(strain(displacement)) - thermal
+def _von_mises(elastic: ElasticBody, displacement: Any, out_of_plane: Any, change: Any) -> Any:
+    """Return sqrt(3/2 s : s), s the deviator of the stress, that out of the plane included."""
+    sigma = elastic.law.stress(displacement)
+    if change is not None:
+        sigma = sigma - elastic.law.thermal_stress(change)
+    if sigma.ufl_shape[0] == 3:
+        deviator = ufl.dev(sigma)
+        return ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
+    out = elastic.law.stress_out_of_plane(displacement, change)
     xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
     shear = xz**2
     if out_of_plane is not None:
-        slope = elastic.lame[1] * ufl.grad(out_of_plane)
+        slope = elastic.law.shear_modulus * ufl.grad(out_of_plane)
         shear = shear + ufl.inner(slope, slope)
     return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * shear)
 
@@ -185,7 +177,7 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
 
 def write_fields(
     directory: Path,
-    system: System,
+    system: Tribosystem,
     half_cycle: int,
     fields: tuple[BodyFields, BodyFields],
     direction: int,
@@ -206,11 +198,11 @@ def write_fields(
     """
     comm = system.comm
     folder = directory / FOLDER
-    nodes = sum(body.space.dofmap.index_map.size_global for body in (system.punch, system.strip))
+    nodes = sum(body.space.dofmap.index_map.size_global for body in (system.bodies.punch, system.bodies.strip))
     on_root(comm, lambda: _make_folder(folder, BYTES_PER_NODE * nodes + BYTES_PER_RANK * comm.size))
     stem = f"half_cycle_{half_cycle:06d}"
     data: dict[str, Any] = {}
-    for elastic, body in zip((system.punch, system.strip), fields, strict=True):
+    for elastic, body in zip((system.bodies.punch, system.bodies.strip), fields, strict=True):
         name = elastic.body.name
         given = (body.displacement, body.out_of_plane, body.von_mises, body.temperature, body.heat_flux)
         functions = [f for f in given if f is not None]
@@ -222,12 +214,12 @@ def write_fields(
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
 
 
-def _contact_surfaces(system: System, worn: Worn) -> dict[str, Any]:
+def _contact_surfaces(system: Tribosystem, worn: Worn) -> dict[str, Any]:
     """Return where the contact nodes of both bodies are, and what is worn there that the meshes do not follow."""
-    rest = worn if system.moved is None else worn - system.moved
-    facing = system.facing
+    rest = worn if system.bodies.moved is None else worn - system.bodies.moved
+    pair = system.pair
     data: dict[str, Any] = {}
-    for name, nodes, depth in (("punch", facing.punch, rest.punch), ("strip", facing.strip, rest.strip)):
+    for name, nodes, depth in (("punch", pair.punch, rest.punch), ("strip", pair.strip, rest.strip)):
         at = f"{name}_contact"
         data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES)}
         data[f"{at}_wear"] = (at, depth, {"units": "mm"})

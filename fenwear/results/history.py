@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, Problem
 from fenwear.heat.exchange import TERMS
 from fenwear.results.disk import check_room, claim, write_text, writing
-from fenwear.system import System
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
@@ -85,21 +85,21 @@ def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
     return {**variables, **HEAT_VARIABLES, **terms}
 
 
-def _coordinates(system: System) -> dict[str, tuple[str, Array, str]]:
+def _coordinates(system: Tribosystem) -> dict[str, tuple[str, Array, str]]:
     """Return, by name, what does not change in a run: its dimension, values (mm) and long name."""
-    facing = system.facing
-    coordinates = {"x": ("x", facing.x, "position along the contact, from the centre of the geometry")}
-    if system.case.wear.strip is not None:
+    pair = system.pair
+    coordinates = {"x": ("x", pair.x, "position along the contact, from the centre of the geometry")}
+    if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
-        coordinates["x_strip"] = ("x_strip", facing.strip.x[:, 0], along)
+        coordinates["x_strip"] = ("x_strip", pair.strip.x[:, 0], along)
     return coordinates
 
 
 def _values(block: Block, name: str) -> NDArray[Any]:
     """Return the values of a variable over a block's half-cycles."""
     if name in ("weight", "weight_strip"):  # meshes that follow the wear change them
-        facing = block.system.facing
-        weights = facing.weights if name == "weight" else facing.strip.weights
+        pair = block.system.pair
+        weights = pair.weights if name == "weight" else pair.strip.weights
         return np.broadcast_to(weights, (len(block), len(weights)))
     if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
         return getattr(block, name)
@@ -143,7 +143,7 @@ class HistoryWriter:
     change places: history.nc is whole and readable at any moment, and no write costs more in a long run.
     """
 
-    def __init__(self, directory: Path, system: System, resumed_after: int | None = None) -> None:
+    def __init__(self, directory: Path, system: Tribosystem, resumed_after: int | None = None) -> None:
         """Begin a history, or go on with the one of a run that is resumed after a half-cycle.
 
         Raises:
@@ -169,7 +169,7 @@ class HistoryWriter:
             else:
                 self._cut(resumed_after)
 
-    def _create(self, system: System) -> None:
+    def _create(self, system: Tribosystem) -> None:
         coordinates = sum(values.nbytes for _, values, _ in self._coordinates.values())
         check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + coordinates)
         with h5netcdf.File(self._twin, "w") as file:
@@ -308,7 +308,7 @@ class HistoryWriter:
         self._spare.replace(self._twin)
 
 
-def summarise(system: System, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
+def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
     """Return the key numbers of a run, each with its unit in its name.
 
     Args:
@@ -316,9 +316,9 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
         extremes: Largest errors over all half-cycles.
         run: How the run went: stop, times, warnings.
     """
-    facing = system.facing
-    width = facing.x[-1] - facing.x[0]
-    centre = (facing.x[-1] + facing.x[0]) / 2
+    pair = system.pair
+    width = pair.x[-1] - pair.x[0]
+    centre = (pair.x[-1] + pair.x[0]) / 2
     places = centre + width * np.array([-0.25, 0.0, 0.25])
     phases = system.motion.half_cycles
     names = {1: "rightward", -1: "leftward"}
@@ -326,15 +326,15 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
         "title": system.case.title,
         "half_cycles": int(last.half_cycle[-1]),
         **run,
-        "mean_pressure_MPa": system.statics.mean_pressure,
+        "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
-        "wear_mm": facing.interpolate(last.wear[-1], places).tolist(),
+        "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
         **_strip_summary(system, last),
         **{
             names[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
                 "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
-                "pressure_MPa": facing.interpolate(last.pressure[-phases:][i], places).tolist(),
+                "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
                 "contact_width_mm": float(last.contact_width[-phases:][i]),
             }
             for i, d in enumerate(last.direction[-phases:])
@@ -342,28 +342,28 @@ def summarise(system: System, last: Block, extremes: dict[str, float], run: dict
         **({} if last.heat is None else _heat_summary(system, last, places)),
         "periodicity": float(last.periodicity[-1]),
         **extremes,
-        "contact_nodes": len(facing.x),
-        "degrees_of_freedom": system.punch.stiffness.size[0] + system.strip.stiffness.size[0],
+        "contact_nodes": len(pair.x),
+        "degrees_of_freedom": system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0],
         "ranks": system.comm.size,
         "versions": versions(),
     }
 
 
-def _strip_summary(system: System, last: Block) -> dict[str, Any]:
+def _strip_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
-    if system.case.wear.strip is None:
+    if not system.strip_wears:
         return {}
-    depth, nodes = last.wear_strip[-1], system.facing.strip
+    depth, nodes = last.wear_strip[-1], system.pair.strip
     return {
         "wear_strip_max_mm": float(depth.max()),
         "worn_area_strip_mm2": float(nodes.weights @ depth),
-        "worn_area_punch_mm2": float(system.facing.weights @ last.wear[-1]),
+        "worn_area_punch_mm2": float(system.pair.weights @ last.wear[-1]),
     }
 
 
-def _heat_summary(system: System, last: Block, places: NDArray[Any]) -> dict[str, Any]:
+def _heat_summary(system: Tribosystem, last: Block, places: NDArray[Any]) -> dict[str, Any]:
     assert last.heat is not None
-    interpolate = system.facing.interpolate
+    interpolate = system.pair.interpolate
     return {
         "max_temperature_K": float(last.heat.max_temperature[-1]),
         "temperature_punch_K": interpolate(last.heat.temperature_punch[-1], places).tolist(),

@@ -1,9 +1,9 @@
-"""Friction: the tractions of sliding over the pressure, in the plane and out of it.
+"""Friction: the traction of sliding over the pressure.
 
-The traction on the punch is p (e_n + d mu e_1 - mu_d e_2), equation (5). Sliding along the contact
-e_1 is e_x and e_2 points out of the plane; sliding out of the plane e_1 is e_y and e_2 is e_x.
-Displacements out of the plane are those of a generalised plane state: they do not change along e_y,
-carry the shear alone and leave the gap as it is, so that the contact sees the traction along e_x only.
+The traction on the punch is p (e_n + d mu e_v - mu_d e_n x e_v), equation (5), with e_v the direction
+of the sliding field. In a plane model its part out of the plane makes displacements of a generalised
+plane state: they do not change along e_y, carry the shear alone and leave the gap as it is, so that
+the contact sees the part in the plane only.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Contact, Dependence
+from fenwear.interface import ContactPair
+from fenwear.interface.placement import in_space
+from fenwear.sliding.field import ALONG_X, SlidingField
 
 
 @dataclass(frozen=True)
@@ -24,12 +27,12 @@ class ContactConditions:
 
     Attributes:
         pressure: p (n,), MPa.
-        speed: Mean sliding speed v, mm/s.
+        speed: Mean sliding speed v of each node (n,), or of all, mm/s.
         temperatures: Of the punch's and the strip's surface (n,) each, K; the initial ones without heat.
     """
 
     pressure: Array
-    speed: float
+    speed: float | Array
     temperatures: tuple[Array, Array]
 
     @property
@@ -46,15 +49,15 @@ class ContactConditions:
 
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb friction of known direction.
+    """Coulomb friction of known direction: gross sliding.
 
     Attributes:
         contact: mu and mu_d.
-        axis: Of the sliding: "x" along the contact, "y" out of the plane.
+        field: Of the sliding.
     """
 
     contact: Contact
-    axis: Literal["x", "y"] = "x"
+    field: SlidingField = ALONG_X
 
     @property
     def constant(self) -> bool:
@@ -72,14 +75,14 @@ class Friction:
             return mu.values(conditions.of("mean"), conditions.shape, 1.0, "contact.friction")
         return np.full(conditions.shape, float(mu))
 
-    def slip(self, direction: int, mu: Array) -> Array:
-        """Return the traction on the punch along +x over the pressure (n,)."""
-        if self.axis == "x":
-            return direction * mu
-        return np.full_like(mu, -self.contact.transverse_friction)
+    def ratio(self, direction: int, mu: Array, pair: ContactPair) -> Array:
+        """Return tau, the traction of friction on the punch over the pressure, in space (n, 3).
 
-    def cross(self, direction: int, mu: Array) -> Array:
-        """Return the traction on the punch along +y over the pressure (n,)."""
-        if self.axis == "y":
-            return direction * mu
-        return np.full_like(mu, -self.contact.transverse_friction)
+        Args:
+            direction: d, the sign of the sliding.
+            mu: (n,).
+            pair: The contact nodes.
+        """
+        along = self.field.direction(pair.punch.x, pair.normal)
+        across = np.cross(in_space(pair.normal), along)
+        return direction * mu[:, None] * along - self.contact.transverse_friction * across

@@ -16,7 +16,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
-from fenwear.interface import Facing
+from fenwear.interface import ContactPair
 from fenwear.sliding.friction import ContactConditions, Friction
 
 
@@ -70,13 +70,13 @@ class PhasesWear:
 
     Attributes:
         punch, strip: beta~ S p^b at the interface nodes; None where the body does not wear.
-        facings: The surfaces opposite each other in each phase.
+        pairs: The surfaces opposite each other in each phase.
         track: Length of the closed track that the strip runs on, mm; None for its own nodes.
     """
 
     punch: _BodyWear | None
     strip: _BodyWear | None
-    facings: Sequence[Facing]
+    pairs: Sequence[ContactPair]
     track: float | None
 
     def some(self, phases: Sequence[int]) -> PhasesWear:
@@ -85,7 +85,7 @@ class PhasesWear:
         punch, strip = (
             None if body is None else replace(body, rate=body.rate[chosen]) for body in (self.punch, self.strip)
         )
-        return PhasesWear(punch, strip, [self.facings[k] for k in chosen], self.track)
+        return PhasesWear(punch, strip, [self.pairs[k] for k in chosen], self.track)
 
     def depth(self, pressure: Array) -> Array:
         """Return the depth worn off the punch in each phase (m, n), mm."""
@@ -93,11 +93,11 @@ class PhasesWear:
 
     def worn(self, pressure: Array) -> Worn:
         """Return what all phases wear off both bodies at pressures (m, n)."""
-        first = self.facings[0]
+        first = self.pairs[0]
         strip = np.zeros(len(first.strip.weights))
         if self.strip is not None:
-            for facing, depth in zip(self.facings, self.strip.depth(pressure), strict=True):
-                strip += self._on_strip(facing) @ depth
+            for pair, depth in zip(self.pairs, self.strip.depth(pressure), strict=True):
+                strip += self._on_strip(pair) @ depth
         return Worn(self.depth(pressure).sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
@@ -105,7 +105,7 @@ class PhasesWear:
         worn = self.worn(pressure)
         if self.strip is None:
             return np.broadcast_to(worn.punch, pressure.shape)
-        return np.array([facing.opening(worn.punch, worn.strip) for facing in self.facings])
+        return np.array([pair.opening(worn.punch, worn.strip) for pair in self.pairs])
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n): gap opened in phase k by unit pressures of phase j is L_k R_j.
@@ -120,30 +120,30 @@ class PhasesWear:
             right[:, nodes, nodes] = self.punch.slope(pressure)
         if self.strip is not None:
             for k, slope in enumerate(self.strip.slope(pressure)):
-                right[k, strip:] = self._on_strip(self.facings[k]) * slope
+                right[k, strip:] = self._on_strip(self.pairs[k]) * slope
         return self._left, right
 
     @cached_property
     def _left(self) -> Array:
         parts = []
         if self.punch is not None:
-            n = len(self.facings[0].weights)
-            parts.append(np.broadcast_to(np.eye(n), (len(self.facings), n, n)))
+            n = len(self.pairs[0].weights)
+            parts.append(np.broadcast_to(np.eye(n), (len(self.pairs), n, n)))
         if self.strip is not None:
-            parts.append(np.array([facing.material for facing in self.facings]))
+            parts.append(np.array([pair.material.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
 
-    def _on_strip(self, facing: Facing) -> Array:
-        """Return what puts depths of the interface nodes on the strip's nodes (n_strip, n), areas kept."""
+    def _on_strip(self, pair: ContactPair) -> Array:
+        """Return what puts depths of the contact nodes on the strip's nodes (n_strip, n), areas kept."""
         if self.track is not None:
-            return np.broadcast_to(facing.weights / self.track, (len(facing.strip.weights), len(facing.weights)))
-        return facing.to_strip
+            return np.broadcast_to(pair.weights / self.track, (len(pair.strip.weights), len(pair.weights)))
+        return pair.deposit.toarray()
 
     def worn_area(self, pressure: Array) -> tuple[float, float]:
         """Return the cross-sections worn off punch and strip, mm²."""
+        weights = np.array([pair.weights for pair in self.pairs])
         areas = [
-            0.0 if body is None else float((body.depth(pressure) @ self.facings[0].weights).sum())
-            for body in (self.punch, self.strip)
+            0.0 if body is None else float((body.depth(pressure) * weights).sum()) for body in (self.punch, self.strip)
         ]
         return areas[0], areas[1]
 
@@ -175,8 +175,8 @@ class Wear:
 
     Attributes:
         punch, strip: The laws; None where the body does not wear.
-        sliding: Of each body S, the integral of v^a over each phase, (m,) each, mm^a s^(1-a).
-        facings: The surfaces opposite each other in each phase.
+        sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
+        pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
         track: Length of the closed track, mm.
     """
@@ -184,7 +184,7 @@ class Wear:
     punch: WearLaw | None
     strip: WearLaw | None
     sliding: tuple[Array, Array]
-    facings: Sequence[Facing]
+    pairs: Sequence[ContactPair]
     friction: Friction
     track: float | None
 
@@ -206,7 +206,7 @@ class Wear:
         Raises:
             CaseError: a coefficient is negative or not finite there.
         """
-        chosen = range(len(self.facings)) if which is None else which
+        chosen = range(len(self.pairs)) if which is None else which
         bodies: list[_BodyWear | None] = []
         for law, sliding, key in zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), strict=True):
             if law is None:
@@ -217,7 +217,7 @@ class Wear:
                 for k, state in zip(chosen, conditions, strict=True)
             ]
             bodies.append(_BodyWear(np.array(rates), law.pressure_exponent))
-        return PhasesWear(bodies[0], bodies[1], [self.facings[k] for k in chosen], self.track)
+        return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen], self.track)
 
 
 def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:

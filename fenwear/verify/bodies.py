@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import load_case, make_case
-from fenwear.system import System
 
 STEEL = {"young": 2e5, "poisson": 0.3}
 
@@ -22,7 +22,7 @@ def two_blocks(
     punch: Mapping[str, Any] | None = None,
     strip: Mapping[str, Any] | None = None,
     **tables: Any,
-) -> System:
+) -> Tribosystem:
     """Return two rectangles of the same width on each other; collective.
 
     The punch is pressed down with 1 MPa, its sides held in x; the strip stands on its held far side.
@@ -55,7 +55,7 @@ def two_blocks(
         "run": {"half_cycles": 1},
         **tables,
     }
-    return System(make_case(case))
+    return assemble(make_case(case))
 
 
 def clamped(body: str, groups: Sequence[str] = ("sides", "far", "contact")) -> dict[str, Any]:
@@ -64,13 +64,13 @@ def clamped(body: str, groups: Sequence[str] = ("sides", "far", "contact")) -> d
 
 
 @cache
-def builtin(name: str, *settings: str) -> System:
+def builtin(name: str, *settings: str) -> Tribosystem:
     """Return a built-in case's system, prepared once for all cases that ask for it; collective."""
-    return System(load_case(name, settings))
+    return assemble(load_case(name, settings))
 
 
 @cache
-def rigid_punch(depth: float, *settings: str) -> System:
+def rigid_punch(depth: float, *settings: str) -> Tribosystem:
     """Return a flat rigid punch of half-width 30 mm, which only translates, on a strip of this depth; collective.
 
     To (30 mm / depth)² the strip is an elastic half-plane. No friction but by the settings.

@@ -50,8 +50,8 @@ def conducting_square(elements: int, degree: int, *, free: bool = True) -> HeatB
         model={"thickness": THICKNESS},
         heat=heat,
     )
-    assert system.heat_bodies is not None
-    return system.heat_bodies[1]
+    assert system.bodies.heat is not None
+    return system.bodies.heat[1]
 
 
 def owned_nodes(body: HeatBody) -> tuple[Array, Array]:
@@ -199,16 +199,16 @@ def thermal_strain() -> Result:
                 system = two_blocks(
                     MATERIAL, MATERIAL, unit_square(count), degree=degree, plane=plane, strip=clamped("strip"), heat={}
                 )
-                assert system.heat_bodies is not None
-                heat = system.heat_bodies[1]
+                assert system.bodies.heat is not None
+                heat = system.bodies.heat[1]
                 x, z = owned_nodes(heat)
                 s, t = np.sin(pi * (x + 0.5)) ** 2, np.sin(pi * z) ** 2
                 c, d = np.cos(2 * pi * (x + 0.5)), np.cos(2 * pi * z)
                 theta = heat.function(2 * pi**2 * (c * t + s * d) / factor)
-                coupling = system.strip.thermal_coupling(heat.space, system.case.materials)
-                force = system.strip.load.duplicate()
+                coupling = system.bodies.strip.thermal_coupling(heat.space)
+                force = system.bodies.strip.load.duplicate()
                 coupling.mult(theta.x.petsc_vec, force)
-                pairs.append(errors(displacement(system.strip, force), exact))
+                pairs.append(errors(displacement(system.bodies.strip, force), exact))
             in_l2, in_h1 = np.array(pairs).T
             rows.append(order(f"plane {plane}, degree {degree}: order in L2", degree + 1, in_l2, 0.2))
             rows.append(order(f"plane {plane}, degree {degree}: order in H1", degree, in_h1, 0.2))
@@ -232,11 +232,11 @@ def free_expansion() -> Result:
     rows: list[Row] = []
     for plane in ("stress", "strain"):
         system = two_blocks(bar, bar, sizes, plane=plane, punch=pins, heat={})
-        assert system.heat_bodies is not None
-        x, z = owned_nodes(system.heat_bodies[0])
+        assert system.bodies.heat is not None
+        x, z = owned_nodes(system.bodies.heat[0])
         theta = t0 + tx * x + tz * z
-        strip = np.zeros(system.heat_bodies[1].owned)
-        nothing = np.zeros(len(system.facing.x))
+        strip = np.zeros(system.bodies.heat[1].owned)
+        nothing = np.zeros(len(system.pair.x))
         unloaded = system.vary("punch.loads=[{on='punch_far', traction=[0, -1e-12]}]")
         fields, _ = body_fields(unloaded, nothing, np.zeros(0), 0, (theta, strip))
         ours = fields.displacement.x.array[: 2 * len(x)].reshape(-1, 2)
@@ -293,10 +293,10 @@ def bimetal() -> Result:
             "heat={operator='full'}",
             "strip.temperatures=[]",
         )
-        assert system.heat_bodies is not None
+        assert system.bodies.heat is not None
         assert system.exchange is not None
-        warm = (np.full(system.heat_bodies[0].owned, warming), np.zeros(system.heat_bodies[1].owned))
-        x, deflection = system.facing.x, system.exchange.gap(system.exchange.state(warm))
+        warm = (np.full(system.bodies.heat[0].owned, warming), np.zeros(system.bodies.heat[1].owned))
+        x, deflection = system.pair.x, system.exchange.gap(system.exchange.state(warm))
         middle = np.abs(x) < 1
         curvature = 2 * np.polyfit(x[middle], deflection[middle], 2)[0]
         bending = 3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))
@@ -322,8 +322,8 @@ def periodic_flux() -> Result:
     depth = 10 * math.sqrt(2 * K / (RHO_C * omega))
     sizes = {"width": 0.5, "strip_height": depth, "across": 2, "strip_layers": 20, "punch_layers": 1}
     system = two_blocks(MATERIAL, MATERIAL, sizes, degree=4, heat={})
-    assert system.heat_bodies is not None
-    body = system.heat_bodies[1]
+    assert system.bodies.heat is not None
+    body = system.bodies.heat[1]
     rows: list[Row] = []
     lines: list[Line] = []
     amplitudes, lags = [], []
@@ -397,10 +397,10 @@ def moving_source() -> Result:
         "geometry.parameters.strip_height=2000",
         "geometry.parameters.strip_length=20000",
     )
-    assert system.heat_bodies is not None
-    body, half_width, conductivity = system.heat_bodies[1], 30.0, 55.0
+    assert system.bodies.heat is not None
+    body, half_width, conductivity = system.bodies.heat[1], 30.0, 55.0
     diffusivity = conductivity / (7.8e-9 * 4.6e8)
-    x = system.facing.x
+    x = system.pair.x
     inner = np.abs(x) < 29.9
     rows: list[Row] = []
     lines: list[Line] = []

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.system import System
+from fenwear.assembly import Tribosystem
 from fenwear.verify.bodies import builtin, rigid_punch, two_blocks
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -20,7 +20,7 @@ FINE = ("geometry.parameters.elements_along_contact=32", "geometry.parameters.ed
 
 
 @cache
-def half_planes(friction: float, elements: int = 40) -> System:
+def half_planes(friction: float, elements: int = 40) -> Tribosystem:
     """Return two elastic blocks of 300 m in plane strain, evenly divided where |x| < 24 mm; collective.
 
     So large because the friction force tilts the surfaces of any finite block, which shifts the contact.
@@ -43,7 +43,7 @@ def half_planes(friction: float, elements: int = 40) -> System:
     return two_blocks(UPPER, LOWER, sizes, degree=3, contact={"friction": friction})
 
 
-def pressed(load: float, friction: float = 0.0, elements: int = 40) -> System:
+def pressed(load: float, friction: float = 0.0, elements: int = 40) -> Tribosystem:
     """Return the half-planes under a load, N/mm; collective."""
     return half_planes(friction, elements).vary(f"punch.loads=[{{on='punch_far', force=[0, {-load!r}]}}]")
 
@@ -126,7 +126,7 @@ def parabola(x: Array) -> Array:
 def pressed_cylinder(load: float, elements: int = 40) -> tuple[Array, Array, Array]:
     """Return x, the pressure and the gap of the cylinder under a load, N/mm."""
     system = pressed(load, elements=elements)
-    x = system.facing.x
+    x = system.pair.x
     state = system.contact((1,)).solve(parabola(x))
     return x, state.pressure[0], state.gap[0]
 
@@ -137,7 +137,7 @@ def rms_error(elements: int) -> float:
     for load in LOADS:
         a = 2 * np.sqrt(load * RADIUS / (np.pi * contact_modulus()))
         x, p, _ = pressed_cylinder(load, elements)
-        weights, exact = half_planes(0.0, elements).facing.weights, semi_ellipse(x, a, 2 * load / (np.pi * a))
+        weights, exact = half_planes(0.0, elements).pair.weights, semi_ellipse(x, a, 2 * load / (np.pi * a))
         found.append(np.sqrt(weights @ (p - exact) ** 2 / (weights @ exact**2)))
     return float(np.mean(found))
 
@@ -156,7 +156,7 @@ def sliding_cylinder() -> Result:
     """
     load, friction = 4e4, 0.8
     system = pressed(load, friction)
-    x = system.facing.x
+    x = system.pair.x
     rows: list[Row] = []
     lines: list[Line] = []
     for d in (1, -1):
@@ -175,7 +175,7 @@ def sliding_cylinder() -> Result:
         rows.append(
             profile(f"{name}: pressure for |x - e| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3, scale=exact.max())
         )
-        force = system.facing.weights * p
+        force = system.pair.weights * p
         rows.append(number(f"{name}: centre of pressure, 8 g a / 3 (mm)", 8 * g * a / 3, force @ x / force.sum(), 5e-3))
         dense = np.linspace(-1.3, 1.3, 400) * a
         shown = np.abs(x) < 1.3 * a
@@ -186,9 +186,9 @@ def sliding_cylinder() -> Result:
     return Result(rows, [Plot("Sliding cylinder: pressure", "x (mm)", "pressure (MPa)", lines)])
 
 
-def standing(system: System, direction: int = 1) -> tuple[Array, Array]:
+def standing(system: Tribosystem, direction: int = 1) -> tuple[Array, Array]:
     """Return x and the pressure under the flat punch away from its edges, |x| < 0.8 a."""
-    x, p = system.facing.x, system.contact((direction,)).solve(system.facing.initial_gap).pressure[0]
+    x, p = system.pair.x, system.contact((direction,)).solve(system.pair.initial_gap).pressure[0]
     inside = np.abs(x) < 0.8 * HALF_WIDTH
     return x[inside], p[inside]
 
@@ -276,9 +276,9 @@ def equilibrium_of_contact() -> Result:
     rows: list[Row] = []
     for name in ("example1", "example2"):
         system = builtin(name, "contact.friction=0.4", "geometry.parameters.pin_height_1=40")
-        x, weights = system.facing.x, system.facing.weights
+        x, weights = system.pair.x, system.pair.weights
         for d in (1, -1):
-            p = system.contact((d,)).solve(system.facing.initial_gap).pressure[0]
+            p = system.contact((d,)).solve(system.pair.initial_gap).pressure[0]
             case = f"{name}, {'rightward' if d > 0 else 'leftward'}"
             rows.append(number(f"{case}: force on the contact (N/mm)", LOAD, weights @ p, 1e-11))
             if name == "example1":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.system import System
+from fenwear.assembly import Tribosystem
 from fenwear.verify.bodies import STEEL, builtin
 from fenwear.verify.contact import measured_half_width, semi_ellipse
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
@@ -15,7 +15,7 @@ RADIUS, LOADS, SCAR = 6.0, (18.5, 50.0, 150.0), 0.6  # mm; N/mm; width of the ev
 FLAT, EDGE = 25.0, 200.0  # half-width of the flat and radius of the edges of the rounded punch, mm
 
 
-def cylinder(elements: int) -> System:
+def cylinder(elements: int) -> Tribosystem:
     """Return a light cylinder on a steel flat, without friction, with `elements` elements on 0.6 mm; collective."""
     return builtin(
         "fretting",
@@ -26,11 +26,11 @@ def cylinder(elements: int) -> System:
     )
 
 
-def pressed(system: System, load: float) -> tuple[Array, Array]:
+def pressed(system: Tribosystem, load: float) -> tuple[Array, Array]:
     """Return x and the pressure under a load on the punch's top, N/mm."""
     thickness = system.case.model.thickness
     loaded = system.vary(f"punch.loads=[{{on='punch_top', force=[0, {-float(load) * thickness!r}]}}]")
-    return system.facing.x, loaded.contact((1,)).solve(loaded.facing.initial_gap).pressure[0]
+    return system.pair.x, loaded.contact((1,)).solve(loaded.pair.initial_gap).pressure[0]
 
 
 @verification(
@@ -56,7 +56,7 @@ def cylinder_on_flat() -> Result:
         rows += [
             number(f"{case}: half-width a (mm)", a, measured_half_width(x, p), 1e-3),
             number(f"{case}: largest pressure p0 (MPa)", peak, p.max(), 1e-3),
-            number(f"{case}: force (N/mm)", load, system.facing.weights @ p, 1e-11),
+            number(f"{case}: force (N/mm)", load, system.pair.weights @ p, 1e-11),
             profile(f"{case}: pressure for |x| < 0.9 a (MPa)", exact[inside], p[inside], 5e-3, scale=peak),
         ]
         shown, dense = np.abs(x) < 1.3 * a, np.linspace(-1.3, 1.3, 400) * a
@@ -67,7 +67,7 @@ def cylinder_on_flat() -> Result:
         for load in LOADS:
             a = 2 * np.sqrt(load * RADIUS / (np.pi * modulus))
             x, p = pressed(system, load)
-            exact, weights = semi_ellipse(x, a, 2 * load / (np.pi * a)), system.facing.weights
+            exact, weights = semi_ellipse(x, a, 2 * load / (np.pi * a)), system.pair.weights
             found.append(np.sqrt(weights @ (p - exact) ** 2 / (weights @ exact**2)))
         errors.append(float(np.mean(found)))
     # The pressure's slope is infinite at the edge: the order is 1 whatever the elements' degree.

@@ -63,8 +63,8 @@ def elasticity() -> Result:
             for count in counts:
                 square = unit_square(count)
                 system = two_blocks(material, material, square, degree=degree, plane=plane, strip=clamped("strip"))
-                force = body_force(system.strip, partial(force_of_waves, plane=plane))
-                pairs.append(errors(displacement(system.strip, force), waves))
+                force = body_force(system.bodies.strip, partial(force_of_waves, plane=plane))
+                pairs.append(errors(displacement(system.bodies.strip, force), waves))
             in_l2, in_h1 = np.array(pairs).T
             rows.append(order(f"plane {plane}, degree {degree}: order in L2", degree + 1, in_l2, 0.15))
             rows.append(order(f"plane {plane}, degree {degree}: order in H1", degree, in_h1, 0.15))
@@ -103,13 +103,13 @@ def patch() -> Result:
                 "strip_layers": 3,
             }
             system = two_blocks(upper, lower, sizes, degree=degree, strip=CONFINED)
-            state = system.contact((1,)).solve(system.facing.initial_gap)
+            state = system.contact((1,)).solve(system.pair.initial_gap)
             case = f"degree {degree}, 4 elements on {strip_across}"
             pressure = state.pressure[0]
             rows.append(profile(f"{case}: pressure (MPa)", np.ones_like(pressure), pressure, 1e-9))
             fields = body_fields(system, pressure, state.rigid[0], 0, None)
             ours, exact = [], []
-            for body, field, strain in zip((system.punch, system.strip), fields, strains, strict=True):
+            for body, field, strain in zip((system.bodies.punch, system.bodies.strip), fields, strains, strict=True):
                 owned = body.space.dofmap.index_map.size_local
                 z = body.space.tabulate_dof_coordinates()[:owned, 1]
                 ours.append(field.displacement.x.array[: 2 * owned].reshape(-1, 2))

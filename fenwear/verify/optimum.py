@@ -50,7 +50,7 @@ def optimum_linear() -> Result:
         for direction, d in DIRECTIONS.items():
             system = builtin(f"monotonic-lz{height}")
             found = system.optimum(d)
-            exact = MEAN * (1 - d * c * system.facing.x / HALF_WIDTH)
+            exact = MEAN * (1 - d * c * system.pair.x / HALF_WIDTH)
             case = f"pin {height} mm, {direction}"
             rows.append(profile(f"{case}: pressure (MPa)", exact, found.pressure, 1e-10, scale=MEAN))
             rows.append(
@@ -98,7 +98,7 @@ def optimum_power() -> Result:
         settings = (f"wear.punch.pressure_exponent={b}", "wear.punch.coefficient=1e-8")
         for name in ("example1", "example2"):
             system = builtin(name, *settings)
-            x, weights = system.facing.x, system.facing.weights
+            x, weights = system.pair.x, system.pair.weights
             exact = by_quadrature(b, x) if name == "example1" else np.full_like(x, MEAN)
             found = system.optimum(1)
             case = f"{name}, b = {b:g}"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.assembly import assemble
 from fenwear.case import load_case
 from fenwear.cycle import jump, march, steady
-from fenwear.system import System
 from fenwear.verify.suite import Result, Row, profile, verification
 
 
@@ -18,9 +18,9 @@ def ranks() -> Result:
         return Result(note="one rank only: start it as mpirun -n 2 python3 -m fenwear verify --only ranks")
     rows: list[Row] = []
     for name in ("example1", "example2"):
-        alone, together = (System(load_case(name), comm) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
+        alone, together = (assemble(load_case(name), comm) for comm in (MPI.COMM_SELF, MPI.COMM_WORLD))
         for what, solve in (
-            ("pressure of contact (MPa)", lambda s: s.contact((1,)).solve(s.facing.initial_gap).pressure[0]),
+            ("pressure of contact (MPa)", lambda s: s.contact((1,)).solve(s.pair.initial_gap).pressure[0]),
             ("wear after 30 half-cycles (mm)", lambda s: next(march(s, 30)).wear[-1]),
             (
                 "pressure after 2,000 half-cycles by jumps (MPa)",

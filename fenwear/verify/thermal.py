@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from fenwear.assembly import Tribosystem, steady_exchange
 from fenwear.cycle import critical_speed, growth_rate, jump, march
-from fenwear.system import System
 from fenwear.verify.bodies import builtin, two_blocks
 from fenwear.verify.suite import Line, Plot, Result, Row, number, profile, verification
 
@@ -55,8 +55,8 @@ def conductance() -> Result:
     ):
         for velocity in (0.0, -SPEED):
             varied = system.vary(*heat)
-            exchange = varied.steady_exchange([velocity])
-            pressure = np.ones(len(varied.facing.x))
+            exchange = steady_exchange(varied, [velocity])
+            pressure = np.ones(len(varied.pair.x))
             state, _ = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
             exact = series(value, (1 - DEBRIS) * FRICTION * abs(velocity))
             case = f"conductance {text}, {'sliding' if velocity else 'at rest'}"
@@ -93,7 +93,7 @@ def half_plane_rate(speed: float, m: float = WAVE) -> float:
 
 
 @cache
-def conductor(speed: float, duration: float = 0.05, partition: float = 1.0) -> System:
+def conductor(speed: float, duration: float = 0.05, partition: float = 1.0) -> Tribosystem:
     """Return a good conductor, held in x and insulated at its sides, that slides on a rigid insulator; collective."""
     rigid = {
         "young": 1e14,
@@ -164,7 +164,7 @@ def instability() -> Result:
         exact.append(max(waves, cooling))
         duration = 0.1 / exact[-1] if ratio > 1 else 0.05
         system = conductor(ratio * burton(), duration)
-        growth = growth_rate(system, np.ones((1, len(system.facing.x))))
+        growth = growth_rate(system, np.ones((1, len(system.pair.x))))
         rates.append(rate_of_steps(growth, duration))
         word = "grows" if exact[-1] > 0 else "decays"
         rows.append(number(f"V = {ratio:g} of the critical speed: {word} at (1/s)", exact[-1], rates[-1], 2e-3))

@@ -9,8 +9,8 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
 from fenwear.cycle import growth_rate, jump, march, stability_number, steady
-from fenwear.system import System
 from fenwear.verify.bodies import builtin, rigid_punch
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -44,9 +44,7 @@ def wear_volume() -> Result:
                 profile(f"{contact}, {name}: per half-cycle (mm²)", np.full_like(area, exact), area, 1e-9, scale=exact)
             )
             total = exact * run[-1].half_cycle[-1]
-            rows.append(
-                number(f"{contact}, {name}: in all (mm²)", total, run[-1].wear[-1] @ system.facing.weights, 1e-9)
-            )
+            rows.append(number(f"{contact}, {name}: in all (mm²)", total, run[-1].wear[-1] @ system.pair.weights, 1e-9))
     return Result([*rows, *_areas_of_both()])
 
 
@@ -56,7 +54,7 @@ def _areas_of_both() -> list[Row]:
     strip = 2e-8
     system = builtin("example1", *moving, f"wear.strip.coefficient={strip}")
     exact = {"punch": COEFFICIENT * 1e4 * STROKE / 10, "strip": strip * 1e4 * STROKE / 10}
-    weights = {"punch": system.facing.weights, "strip": system.facing.strip.weights}
+    weights = {"punch": system.pair.weights, "strip": system.pair.strip.weights}
     rows: list[Row] = []
     for name, run in (
         ("implicit", list(march(system, 20, implicit=True))),
@@ -83,7 +81,7 @@ def equilibrium() -> Result:
     rows: list[Row] = []
     for contact, settings in (("full contact", ()), ("partial contact", OPENING)):
         system = builtin("example1", *settings, "wear.punch.coefficient=4e-7")
-        x, weights = system.facing.x, system.facing.weights
+        x, weights = system.pair.x, system.pair.weights
         friction, height = system.case.contact.friction, 40.0 if settings else 20.0
         block = next(march(system, 200, block=200))
         force = block.pressure * weights
@@ -121,14 +119,14 @@ def half_plane_rates(terms: int = 24) -> Array:
     return np.sort(values)
 
 
-def stiffness_rates(system: System, effective: float) -> Array:
+def stiffness_rates(system: Tribosystem, effective: float) -> Array:
     """Return the same rates of fenwear's interface: eigenvalues of the pressure that a worn depth takes away."""
-    statics = system.statics
-    n, r = statics.rigid_normal.shape
+    rigid = system.rigid
+    n, r = rigid.rigid_normal.shape
     matrix = np.zeros((n + r, n + r))
     matrix[:n, :n] = system.interface.compliance(0.0) * effective
-    matrix[:n, n:] = statics.rigid_normal
-    matrix[n:, :n] = statics.equilibrium(0.0)
+    matrix[:n, n:] = rigid.rigid_normal
+    matrix[n:, :n] = rigid.equilibrium(0.0)
     values = np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n]).real * HALF_WIDTH
     return np.sort(values[values > 1e-6])
 
@@ -169,12 +167,12 @@ def galin() -> Result:
         for k, rate in enumerate(stiffness_rates(system, effective)[:4]):
             kind = ("odd", "even")[k % 2]
             rows.append(number(f"plane {plane}, eigenvalue, {kind} mode {k // 2 + 1} (E* k V/a)", exact[k], rate, 2e-3))
-        growth = growth_rate(system, np.full((2, len(system.facing.x)), MEAN))
+        growth = growth_rate(system, np.full((2, len(system.pair.x)), MEAN))
         slowest = np.expm1(-growth * system.motion.period / 2) / step
         rows.append(number(f"plane {plane}, growth rate of the slowest mode (E* k V/a)", exact[0], slowest, 2e-3))
         block = next(march(system, 100, block=100, implicit=True))
         deviation = block.pressure - MEAN
-        late = deviation[[50, 60, 70, 80]] * np.sqrt(system.facing.weights)
+        late = deviation[[50, 60, 70, 80]] * np.sqrt(system.pair.weights)
         recurrence, *_ = np.linalg.lstsq(late[2::-1].T, late[3], rcond=None)
         factors = np.sort(np.roots([1, *-recurrence]).real)[::-1] ** (1 / 10)
         rates = (1 / factors - 1) / step
@@ -187,7 +185,7 @@ def galin() -> Result:
         )
         if plane == "stress":
             time = step * block.half_cycle
-            size = np.sqrt((deviation**2) @ system.facing.weights) / (MEAN * np.sqrt(2 * HALF_WIDTH))
+            size = np.sqrt((deviation**2) @ system.pair.weights) / (MEAN * np.sqrt(2 * HALF_WIDTH))
             slope = size[-1] * (1 + exact[1] * step) ** (100.0 - block.half_cycle)
             plots.append(
                 Plot(
@@ -222,7 +220,7 @@ def one_way_sliding() -> Result:
             system = builtin("example1", "geometry.degree=2", one_way(direction), coefficient, exponent)
             block = next(march(system, 1500, implicit=True, block=1500))
             optimum = system.optimum(system.motion.directions[0])
-            x, case = system.facing.x, f"b = {b}, {direction}"
+            x, case = system.pair.x, f"b = {b}, {direction}"
             rows.append(profile(f"{case}: pressure (MPa)", optimum.pressure, block.pressure[-1], 1e-6, scale=MEAN))
             rigid = optimum.velocity["lambda_F"] - optimum.velocity["lambda_M"] * (x - HALF_WIDTH)
             worn = block.wear[-1] - block.wear[-2]
@@ -257,7 +255,7 @@ def cyclic() -> Result:
             rows.append(
                 profile(f"{name}: end of a run of jumps (MPa)", state.pressure, last.pressure[-2:], 1e-3, scale=MEAN)
             )
-            x = system.facing.x
+            x = system.pair.x
             for k, d in enumerate("+-"):
                 lines += [
                     Line(f"p{d} direct", x, state.pressure[k], reference=True),
@@ -266,7 +264,7 @@ def cyclic() -> Result:
     # 100 N/mm to the right, 30 mm above the pin, act as the load 3 mm off the centre.
     pushed = "[{on='punch_load', force=[0, -10000]}, {on='punch_free', force=[1000, 0]}]"
     system = builtin("example1").vary(f"punch.loads={pushed}")
-    x, both = system.facing.x, steady(system).pressure.sum(axis=0)
+    x, both = system.pair.x, steady(system).pressure.sum(axis=0)
     linear = 2 * MEAN * (1 + 3 * 3.0 * x / HALF_WIDTH**2)
     rows.append(profile("example1, load 3 mm off the centre: p+ + p- (MPa)", linear, both, 1e-8, scale=2 * MEAN))
     differences = []
@@ -282,7 +280,7 @@ def cyclic() -> Result:
 EVEN = ("geometry.degree=1", "geometry.parameters.edge_grading=1", "geometry.parameters.elements_along_contact=32")
 
 
-def at_number(ratio: float) -> System:
+def at_number(ratio: float) -> Tribosystem:
     """Return one-way sliding of Example 1, even linear elements, whose wear step is `ratio` of the explicit limit."""
     base = builtin("example1", *EVEN, one_way("leftward"), "wear.punch.coefficient=1e-7")
     return base.vary(f"wear.punch.coefficient={1e-7 * ratio / stability_number(base)!r}")
@@ -309,7 +307,7 @@ def explicit_limit() -> Result:
     for ratio in (1.03, 100.0, 1e4):
         system = at_number(ratio)
         block = next(march(system, 200, implicit=True, block=200))
-        deviation = np.sqrt((block.pressure - system.optimum(-1).pressure) ** 2 @ system.facing.weights)
+        deviation = np.sqrt((block.pressure - system.optimum(-1).pressure) ** 2 @ system.pair.weights)
         steps = np.diff(deviation[deviation > 1e-9 * deviation[0]])
         rows.append(
             number(

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-from fenwear import System, jump, load_case
+from fenwear import assemble, jump, load_case
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 
@@ -43,25 +43,24 @@ def half_width(x: Array, depth: Array) -> float:
 
 def middle(block: Block) -> tuple[Array, float]:
     """Return the last pressure in the middle of the stroke, MPa, and half the width it acts on, mm."""
-    pressure, weights = block.pressure[-1], block.system.facing.weights
+    pressure, weights = block.pressure[-1], block.system.pair.weights
     return pressure, float(weights @ (pressure > 0)) / 2
 
 
 def run(elements: int, tolerance: float, positions: int) -> None:
     """Print the rows of one run."""
     settings = (f"geometry.parameters.elements_along_contact={elements}", f"motion.positions={positions}")
-    system = System(load_case("fretting", settings))
+    system = assemble(load_case("fretting", settings))
     begin = time.perf_counter()
-    system.prepare()
     setup = time.perf_counter() - begin
     first = system.contact((1,)).solve(system.gap(0, system.unworn())).pressure[0]
-    width = float(system.facing.weights @ (first > 0)) / 2
+    width = float(system.pair.weights @ (first > 0)) / 2
     head = f"| {600 / (2 * elements):4.1f} | {tolerance:4.2f} | {positions:2}"
     print(
         f"{head} |      0 |        |        |       | {1e3 * width:5.1f} | {first.max():6.1f} | {setup:5.1f} s set-up |"
     )
     stops = frozenset(2 * cycles for cycles in CYCLES)
-    x, centre = system.facing.strip.x[:, 0], None
+    x, centre = system.pair.strip.x[:, 0], None
     begin = time.perf_counter()
     for block in jump(system, 2 * CYCLES[-1], tolerance=tolerance, stops=stops):
         if block.half_cycle[-1] not in stops:

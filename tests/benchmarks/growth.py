@@ -20,25 +20,23 @@ def row(elements: str, growth: str) -> None:
     """Set up once and print the row of the table."""
     from mpi4py import MPI
 
-    from fenwear import System, load_case, steady
+    from fenwear import assemble, load_case, steady
 
     comm = MPI.COMM_WORLD
     parameters = [f"geometry.parameters.elements_along_contact={elements}", f"geometry.parameters.growth={growth}"]
-    small = System(load_case("example1"))
-    small.prepare()  # compiles the forms
+    assemble(load_case("example1"))
     comm.Barrier()
     begin = time.perf_counter()
-    system = System(load_case("example1", parameters))
+    system = assemble(load_case("example1", parameters))
     assembled = time.perf_counter()
-    system.prepare()
     comm.Barrier()
     done = time.perf_counter()
     state = steady(system)
     memory = comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 1024**2
-    unknowns = system.punch.stiffness.size[0] + system.strip.stiffness.size[0]
+    unknowns = system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0]
     if comm.rank == 0:
         print(
-            f"| {unknowns:9,} | {len(system.facing.x):5,} | {comm.size} | {assembled - begin:6.1f} s "
+            f"| {unknowns:9,} | {len(system.pair.x):5,} | {comm.size} | {assembled - begin:6.1f} s "
             f"| {done - assembled:6.1f} s | {done - begin:6.1f} s | {memory:5.1f} GiB | {state.seconds:.2f} s |",
             flush=True,
         )

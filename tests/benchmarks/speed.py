@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fenwear import System, load_case, march, steady
+from fenwear import Tribosystem, assemble, load_case, march, steady
 from fenwear.contact.full import FullContact
 from fenwear.cycle import jump
 
@@ -25,16 +25,16 @@ def timed(function: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - begin, result
 
 
-def full_against_condensed(system: System, half_cycles: int = 100) -> None:
+def full_against_condensed(system: Tribosystem, half_cycles: int = 100) -> None:
     """Both inequalities on the same gaps, half-cycle by half-cycle."""
     solvers = [
         (
             system.contact((d,)),
-            FullContact(system.punch, system.strip, system.interface, system.slip(d)),
+            FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(d)),
         )
         for d in (1, -1)
     ]
-    wear = system.facing.initial_gap.copy()
+    wear = system.pair.initial_gap.copy()
     states: list[list[Any]] = [[None, None], [None, None]]
     times: list[list[float]] = [[], []]
     difference = 0.0
@@ -57,10 +57,10 @@ def full_against_condensed(system: System, half_cycles: int = 100) -> None:
 
 def without_heat() -> None:
     """Marches, jumps and the steady state of Example 1."""
-    timed(lambda: System(load_case("example1")).prepare())  # compiles the forms
+    timed(lambda: assemble(load_case("example1")).prepare())  # compiles the forms
     seconds, system = timed(lambda: _prepared("example1"))
-    mean = system.statics.mean_pressure
-    print(f"set-up, {len(system.facing.x)} contact nodes | {seconds:.2f} s")
+    mean = system.rigid.mean_pressure
+    print(f"set-up, {len(system.pair.x)} contact nodes | {seconds:.2f} s")
     full_against_condensed(system)
     seconds, blocks = timed(lambda: list(march(system, 20_000)))
     marched = blocks[-1].pressure[-2:]
@@ -92,10 +92,8 @@ def with_heat() -> None:
         print(f"largest difference of temperature up to half-cycle {until} | {difference:.3f} K")
 
 
-def _prepared(case: str, *settings: str) -> System:
-    system = System(load_case(case, settings))
-    system.prepare()
-    return system
+def _prepared(case: str, *settings: str) -> Tribosystem:
+    return assemble(load_case(case, settings))
 
 
 if __name__ == "__main__":

@@ -25,8 +25,8 @@ def strip_fields(friction: float, transverse: float, axis: str, degree: int) -> 
         contact={"friction": friction, "transverse_friction": transverse},
         motion={"kind": "reciprocating", "amplitude": 0.01, "period": 1.0, "axis": axis},
     )
-    uniform = np.full(len(system.facing.x), 2.0)
-    _, strip = body_fields(system, uniform, np.zeros(len(system.statics.resultant)), 0, None)
+    uniform = np.full(len(system.pair.x), 2.0)
+    _, strip = body_fields(system, uniform, np.zeros(len(system.rigid.resultant)), 0, None)
     assert strip.out_of_plane is not None
     return strip, strip.out_of_plane.function_space.tabulate_dof_coordinates()[:, 1]
 

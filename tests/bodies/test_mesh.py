@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, System, load_case, steady
+from fenwear import CaseError, Tribosystem, assemble, load_case, steady
 from fenwear.bodies.mesh import BodyMesh, build_meshes, meshes_folder, write_msh
 from fenwear.case import Geometry
 from fenwear.parallel import on_root
@@ -58,14 +58,14 @@ def integral(body: BodyMesh, region: str | None = None, curve: str | None = None
 @pytest.mark.mpi
 def test_facing_nodes_coincide(degree: int) -> None:
     """The two contact surfaces have the same nodes, to the last digits, whatever the partition."""
-    system = System(
+    system = assemble(
         load_case("example1", [f"geometry.degree={degree}", "geometry.parameters.elements_along_contact=6"])
     )
-    facing = system.facing
-    assert len(facing.x) == 6 * degree + 1
-    np.testing.assert_allclose(facing.punch.x, facing.strip.x, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(facing.x, -facing.x[::-1], rtol=0, atol=1e-12)
-    np.testing.assert_allclose(facing.initial_gap, 0, atol=1e-12)
+    pair = system.pair
+    assert len(pair.x) == 6 * degree + 1
+    np.testing.assert_allclose(pair.punch.x, pair.strip.x, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pair.x, -pair.x[::-1], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pair.initial_gap, 0, atol=1e-12)
 
 
 def test_meshes_are_mirror_images() -> None:
@@ -77,8 +77,8 @@ def test_meshes_are_mirror_images() -> None:
 
 def test_finest_at_the_edges() -> None:
     """edge_grading is the ratio of the element sizes in the middle of the contact and at its edges."""
-    system = System(load_case("example1", ["geometry.degree=1", "geometry.parameters.edge_grading=7"]))
-    sizes = np.diff(system.facing.x)
+    system = assemble(load_case("example1", ["geometry.degree=1", "geometry.parameters.edge_grading=7"]))
+    sizes = np.diff(system.pair.x)
     assert sizes.max() / sizes.min() == pytest.approx(7, rel=1e-6)
     assert sizes.argmin() in (0, len(sizes) - 1)
 
@@ -179,7 +179,7 @@ def test_bad_files(tmp_path: Path) -> None:
 def test_case_that_does_not_fit_the_geometry(settings: list[str], expected: str) -> None:
     """Missing groups, pins off the body, bodies that slide away: the key is named, on all ranks alike."""
     with pytest.raises(CaseError, match=expected):
-        System(load_case("example1", ["geometry.parameters.elements_along_contact=4", *settings]))
+        assemble(load_case("example1", ["geometry.parameters.elements_along_contact=4", *settings]))
 
 
 def test_surfaces_that_do_not_face(tmp_path: Path) -> None:
@@ -201,19 +201,19 @@ def test_surfaces_that_do_not_face(tmp_path: Path) -> None:
         file.write_text(text.replace(tail, new).replace("{strip[]};", "{strip[]};"), "utf-8")
         case = load_case("example1").model_copy(update={"geometry": Geometry(file=file.name)}).at(tmp_path)
         with pytest.raises(CaseError, match=expected):
-            System(case)
+            assemble(case)
 
 
 @pytest.mark.mpi
-def test_own_msh_gives_the_same_answer(assemble: Callable[..., System], tmp_path: Path) -> None:
+def test_own_msh_gives_the_same_answer(assembled: Callable[..., Tribosystem], tmp_path: Path) -> None:
     """A mesh written by fenwear and read back as the case's own geometry changes nothing."""
     comm = MPI.COMM_WORLD
     folder = comm.bcast(tmp_path)
-    geo = assemble("example1", "geometry.degree=2")
+    geo = assembled("example1", "geometry.degree=2")
     on_root(comm, lambda: write_msh(geo.case.geometry, None, folder / "own.msh"))
     case = geo.case.model_copy(update={"geometry": Geometry(file="own.msh", degree=2)}).at(folder)
-    msh = System(case)
-    np.testing.assert_allclose(msh.facing.x, geo.facing.x, rtol=1e-12, atol=1e-12)
+    msh = assemble(case)
+    np.testing.assert_allclose(msh.pair.x, geo.pair.x, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(steady(msh).pressure, steady(geo).pressure, rtol=0, atol=1e-7)
 
 

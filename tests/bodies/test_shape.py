@@ -10,7 +10,7 @@ import pytest
 import ufl
 from mpi4py import MPI
 
-from fenwear import System
+from fenwear import Tribosystem, assemble
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.errors import MeshQualityError
 from fenwear.sliding.wear import Worn
@@ -24,58 +24,56 @@ def area(body: BodyMesh) -> float:
 
 
 @pytest.mark.mpi
-def test_the_bodies_lose_what_is_worn(assemble: Callable[..., System]) -> None:
+def test_the_bodies_lose_what_is_worn(assembled: Callable[..., Tribosystem]) -> None:
     """The cross-sections shrink by the integral of the depth; contact nodes move by it, pins and the rest stay."""
-    system = assemble("example1", *COARSE)
-    x, strip_x = system.facing.x, system.facing.strip.x[:, 0]
+    system = assembled("example1", *COARSE)
+    x, strip_x = system.pair.x, system.pair.strip.x[:, 0]
     worn = Worn(1 + 0.5 * (x / 30) ** 2, 0.2 * (1 - (strip_x / 30) ** 2))
-    moved = System(system.case, system.comm, worn)
+    moved = assemble(system.case, system.comm, worn)
     assert moved.moved is not None
     vertices = slice(None, None, 2)  # straight elements: the middle nodes go with their ends
     np.testing.assert_allclose(moved.moved.punch[vertices], worn.punch[vertices], atol=1e-10)
     np.testing.assert_allclose(moved.moved.strip[vertices], worn.strip[vertices], atol=1e-10)
     for new, old, loss in (
-        (moved.punch.body, system.punch.body, system.facing.weights @ moved.moved.punch),
-        (moved.strip.body, system.strip.body, system.facing.strip.weights @ moved.moved.strip),
+        (moved.punch.body, system.bodies.punch.body, system.pair.weights @ moved.moved.punch),
+        (moved.strip.body, system.bodies.strip.body, system.pair.strip.weights @ moved.moved.strip),
     ):
         assert area(old) - area(new) == pytest.approx(loss, rel=1e-9)
-    gap = moved.facing.initial_gap - moved.moved.punch - moved.moved.strip
+    gap = moved.pair.initial_gap - moved.moved.punch - moved.moved.strip
     np.testing.assert_allclose(gap, 0, atol=2e-3)  # along the strip's new normal: to the square of its slope
-    assert moved.punch.pivot == system.punch.pivot
-    np.testing.assert_allclose(moved.facing.x, x, atol=1e-12)
+    assert moved.punch.pivot == system.bodies.punch.pivot
+    np.testing.assert_allclose(moved.pair.x, x, atol=1e-12)
 
 
 @pytest.mark.mpi
-def test_an_even_depth_moves_the_punch_only_where_it_must(assemble: Callable[..., System]) -> None:
+def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..., Tribosystem]) -> None:
     """An even depth shrinks the punch between contact and pins; gap and stiffness change as little as it is."""
-    system = assemble("example1", *COARSE)
+    system = assembled("example1", *COARSE)
     depth = 1e-6
-    moved = System(
-        system.case, system.comm, Worn(np.full_like(system.facing.x, depth), 0 * system.facing.strip.weights)
-    )
+    moved = assemble(system.case, system.comm, Worn(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights))
     scale = np.abs(system.interface.normal_compliance).max()
     difference = np.abs(moved.interface.normal_compliance - system.interface.normal_compliance).max()
     assert 0 < difference < 1e-5 * scale
-    worn = Worn(np.full_like(system.facing.x, depth), system.unworn().strip)
+    worn = Worn(np.full_like(system.pair.x, depth), system.unworn().strip)
     np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-13)
 
 
 @pytest.mark.mpi
-def test_used_up_elements_are_refused(assemble: Callable[..., System]) -> None:
+def test_used_up_elements_are_refused(assembled: Callable[..., Tribosystem]) -> None:
     """A punch that is worn through is an error that says which body and how deep, not a wrong number."""
-    system = assemble("example1", *COARSE)
-    worn = Worn(np.full_like(system.facing.x, 19.0), system.unworn().strip)
+    system = assembled("example1", *COARSE)
+    worn = Worn(np.full_like(system.pair.x, 19.0), system.unworn().strip)
     with pytest.raises(MeshQualityError, match=r"wear of the punch has used up .* the depth is 19 mm"):
-        System(system.case, MPI.COMM_WORLD, worn)
+        assemble(system.case, MPI.COMM_WORLD, worn)
 
 
-def test_limit_of_the_offset(assemble: Callable[..., System]) -> None:
+def test_limit_of_the_offset(assembled: Callable[..., Tribosystem]) -> None:
     """The meshes follow where the depth exceeds the given share of the elements' height: 2 mm of its first row."""
-    system = assemble("example1", *COARSE, "geometry.follow_wear=0.5")
+    system = assembled("example1", *COARSE, "geometry.follow_wear=0.5")
     heights = system.element_heights.punch
     low, high = (Worn(share * heights, system.unworn().strip) for share in (0.49, 0.51))
     assert not system.outworn(low)
     assert system.outworn(high)
-    assert not assemble("example1", *COARSE, "geometry.follow_wear=never").outworn(high)
-    z = np.unique(system.punch.body.mesh.geometry.x[:, 1].round(9))
+    assert not assembled("example1", *COARSE, "geometry.follow_wear=never").outworn(high)
+    z = np.unique(system.bodies.punch.body.mesh.geometry.x[:, 1].round(9))
     np.testing.assert_allclose(heights, z[1] - z[0], rtol=1e-9)

@@ -9,7 +9,7 @@ import pytest
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from fenwear import ConvergenceError, System
+from fenwear import ConvergenceError, Tribosystem, assemble
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.contact.full import FullContact
@@ -18,35 +18,35 @@ P = 1000.0  # load per thickness, N/mm
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # c = 1.6: the rear edge lifts off
 
 
-def solve(system: System, direction: int = 1) -> ContactState:
-    return system.contact((direction,)).solve(system.facing.initial_gap)
+def solve(system: Tribosystem, direction: int = 1) -> ContactState:
+    return system.contact((direction,)).solve(system.pair.initial_gap)
 
 
 @pytest.fixture(params=["full contact", "opening", "unmatched", "no pin"])
-def system(request: pytest.FixtureRequest, assemble: Callable[..., System]) -> System:
+def system(request: pytest.FixtureRequest, assembled: Callable[..., Tribosystem]) -> Tribosystem:
     match request.param:
         case "full contact":
-            return assemble("example1")
+            return assembled("example1")
         case "opening":
-            return assemble("example1", *OPENING)
+            return assembled("example1", *OPENING)
         case "unmatched":
-            found: System = request.getfixturevalue("unmatched")
+            found: Tribosystem = request.getfixturevalue("unmatched")
             return found
-    return assemble("example2", "contact.friction=0.5")
+    return assembled("example2", "contact.friction=0.5")
 
 
-def worn(system: System) -> Array:
+def worn(system: Tribosystem) -> Array:
     """A worn shape that opens part of any contact."""
-    return system.facing.initial_gap + 2e-2 * np.cos(system.facing.x / 7) ** 2
+    return system.pair.initial_gap + 2e-2 * np.cos(system.pair.x / 7) ** 2
 
 
 @pytest.mark.parametrize("direction", [1, -1])
-def test_balance_and_complementarity(system: System, direction: int) -> None:
+def test_balance_and_complementarity(system: Tribosystem, direction: int) -> None:
     """Verification 5 and 7: force and moment to round-off; p >= 0, gap >= 0, p gap = 0 exactly."""
-    x, weights = system.facing.x, system.facing.weights
-    mu, tilts = system.case.contact.friction, "lambda_M" in system.statics.mode_names
-    height = system.punch.pivot[1] - 100
-    for gap in (system.facing.initial_gap, worn(system)):
+    x, weights = system.pair.x, system.pair.weights
+    mu, tilts = system.case.contact.friction, "lambda_M" in system.rigid.mode_names
+    height = system.bodies.punch.pivot[1] - 100
+    for gap in (system.pair.initial_gap, worn(system)):
         state = system.contact((direction,)).solve(gap)
         p, g = state.pressure[0], state.gap[0]
         assert weights @ p * 10 == pytest.approx(1e4, rel=1e-12)
@@ -58,26 +58,29 @@ def test_balance_and_complementarity(system: System, direction: int) -> None:
     assert (p == 0).any()
 
 
-def test_gap_is_the_distance_of_the_displaced_surfaces(system: System) -> None:
+def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> None:
     """gap = g0 + w + (S_n + d mu S_t) p + H a + g_load, from the state alone."""
     state = system.contact((-1,)).solve(gap := worn(system))
     interface = system.interface
     expected = interface.compliance(-system.case.contact.friction) @ state.pressure[0]
-    expected += system.statics.rigid_normal @ state.rigid[0] + interface.load_gap + gap
+    expected += system.rigid.rigid_normal @ state.rigid[0] + interface.load_gap + gap
     np.testing.assert_allclose(state.gap[0], expected, atol=1e-12)
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", ["example1", "example2"])
-def test_condensed_equals_full(assemble: Callable[..., System], name: str) -> None:
+def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Two discretisations of the algebra, (p, a) and (u, p, a), give the same pressure to 1e-8 in worn half-cycles."""
-    system = assemble(name, *OPENING, "geometry.parameters.elements_along_contact=8")
-    full = [FullContact(system.punch, system.strip, system.interface, system.slip(d)) for d in (1, -1)]
+    system = assembled(name, *OPENING, "geometry.parameters.elements_along_contact=8")
+    full = [
+        FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(d))
+        for d in (1, -1)
+    ]
     condensed = [system.contact((d,)) for d in (1, -1)]
-    wear, opened = np.zeros_like(system.facing.x), False
+    wear, opened = np.zeros_like(system.pair.x), False
     for half_cycle in range(4):
         phase = half_cycle % 2
-        gap = system.facing.initial_gap + wear
+        gap = system.pair.initial_gap + wear
         one, other = condensed[phase].solve(gap), full[phase].solve(gap)
         scale = one.pressure.max()
         np.testing.assert_allclose(other.pressure, one.pressure, rtol=0, atol=1e-8 * scale)
@@ -87,34 +90,34 @@ def test_condensed_equals_full(assemble: Callable[..., System], name: str) -> No
     assert opened or name == "example2"
 
 
-def test_condensed_equals_full_on_unmatched_nodes(unmatched: System) -> None:
+def test_condensed_equals_full_on_unmatched_nodes(unmatched: Tribosystem) -> None:
     """The same where the nodes of the two surfaces do not coincide."""
     full = FullContact(unmatched.punch, unmatched.strip, unmatched.interface, unmatched.slip(-1)).solve(worn(unmatched))
     condensed = unmatched.contact((-1,)).solve(worn(unmatched))
     np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * condensed.pressure.max())
 
 
-def test_unmatched_nodes_change_little(unmatched: System, assemble: Callable[..., System]) -> None:
+def test_unmatched_nodes_change_little(unmatched: Tribosystem, assembled: Callable[..., Tribosystem]) -> None:
     """Another mesh of the strip is the same problem: 1 % of the mean in the force on each element, 1e-4 inside."""
-    matched = assemble("example1")
-    x, ends = matched.facing.x, matched.facing.x[::4]
+    matched = assembled("example1")
+    x, ends = matched.pair.x, matched.pair.x[::4]
     element = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, 15)
     pressures = [solve(s).pressure[0] for s in (matched, unmatched)]
-    one, other = (np.bincount(element, matched.facing.weights * p) for p in pressures)
+    one, other = (np.bincount(element, matched.pair.weights * p) for p in pressures)
     np.testing.assert_allclose(other / np.diff(ends), one / np.diff(ends), rtol=0, atol=0.01 * P / 60)
     inside = np.abs(x) < 20  # away from the edges, where the pressure has no bound
     np.testing.assert_allclose(pressures[1][inside], pressures[0][inside], rtol=0, atol=1e-4 * P / 60)
 
 
-def test_several_phases_are_independent_without_a_layer(assemble: Callable[..., System]) -> None:
+def test_several_phases_are_independent_without_a_layer(assembled: Callable[..., Tribosystem]) -> None:
     """Both phases in one inequality are the two phases each for itself."""
-    system = assemble("example1", *OPENING)
+    system = assembled("example1", *OPENING)
     both = system.contact((1, -1)).solve(worn(system)).pressure
     for p, d in zip(both, (1, -1), strict=True):
         np.testing.assert_allclose(p, system.contact((d,)).solve(worn(system)).pressure[0], atol=1e-9 * p.max())
 
 
-def test_warm_start_changes_nothing_but_the_work(system: System) -> None:
+def test_warm_start_changes_nothing_but_the_work(system: Tribosystem) -> None:
     """Newton ends at the same contact from its own solution, from another one, and from full contact."""
     contact = system.contact((1,))
     cold = contact.solve(worn(system))
@@ -138,19 +141,19 @@ def one_iteration() -> Iterator[None]:
 
 @pytest.mark.parametrize("solver", ["condensed", "full"])
 @pytest.mark.mpi
-def test_no_convergence_is_said(assemble: Callable[..., System], one_iteration: None, solver: str) -> None:
+def test_no_convergence_is_said(assembled: Callable[..., Tribosystem], one_iteration: None, solver: str) -> None:
     """Stopped by PETSc's options after one iteration: a typed error with the reason and the options' prefix."""
-    system = assemble("example1", *OPENING)
+    system = assembled("example1", *OPENING)
     contact = (
         system.contact((1,))
         if solver == "condensed"
-        else FullContact(system.punch, system.strip, system.interface, system.slip(1))
+        else FullContact(system.bodies.punch, system.bodies.strip, system.interface, system.friction_ratio(1))
     )
     with pytest.raises(ConvergenceError, match=r"DIVERGED_MAX_IT after 1 .*-fenwear_.*contact_snes"):
         contact.solve(worn(system))
 
 
-def rounded(assemble: Callable[..., System], force: float, *settings: str) -> System:
+def rounded(assembled: Callable[..., Tribosystem], force: float, *settings: str) -> Tribosystem:
     """Return a punch that is all but rigid, on a strip that is all but a half-plane, under N/mm."""
     return assemble(
         "rounded-punch",
@@ -161,21 +164,21 @@ def rounded(assemble: Callable[..., System], force: float, *settings: str) -> Sy
     )
 
 
-def test_punch_with_rounded_edges(assemble: Callable[..., System]) -> None:
+def test_punch_with_rounded_edges(assembled: Callable[..., Tribosystem]) -> None:
     """Ciavarella, Hills & Monno (1998): flat to b, edges of radius R, on a half-plane.
 
     P = E* a^2 / (2 R) (pi/2 - phi - sin phi cos phi), sin phi = b/a, and p from the integral of the slope over
     a singular kernel. Found: 0.3 % in the middle, 0.3 % at 23 of 25 mm.
     """
     force, b, radius, modulus = 20_000.0, 25.0, 20.0, 200e3 / (1 - 0.3**2)
-    system = rounded(assemble, force)
+    system = rounded(assembled, force)
 
     def excess(a: float) -> float:
         phi = np.arcsin(b / a)
         return float(modulus * a**2 / (2 * radius) * (np.pi / 2 - phi - np.sin(phi) * np.cos(phi)) - force)
 
     a = brentq(excess, 1.0001 * b, 30)
-    pressure, x = system.contact((1,)).solve(system.facing.initial_gap).pressure[0], system.facing.x
+    pressure, x = system.contact((1,)).solve(system.pair.initial_gap).pressure[0], system.pair.x
     closed = np.flatnonzero(pressure > 0)
     assert x[closed[-1]] <= a <= x[closed[-1] + 1]
     assert x[closed[0]] >= -a >= x[closed[0] - 1]
@@ -191,18 +194,18 @@ def test_punch_with_rounded_edges(assemble: Callable[..., System]) -> None:
         assert np.interp(place, x, pressure) == pytest.approx(exact(place), rel=tolerance)
 
 
-def test_crowned_punch(assemble: Callable[..., System]) -> None:
+def test_crowned_punch(assembled: Callable[..., Tribosystem]) -> None:
     """Hertz under a crown whose edges do not touch: half-width and pressure along the contact."""
     force, radius, modulus = 1000.0, 4000.0, 200e3 / (1 - 0.3**2)
     system = rounded(
-        assemble,
+        assembled,
         force,
         f"geometry.parameters.crown_radius={radius}",
         "geometry.parameters.flat_grading=1",
         "geometry.parameters.elements_along_flat=60",
     )
     a = np.sqrt(4 * force * radius / (np.pi * modulus))
-    pressure, x = system.contact((1,)).solve(system.facing.initial_gap).pressure[0], system.facing.x
+    pressure, x = system.contact((1,)).solve(system.pair.initial_gap).pressure[0], system.pair.x
     exact = 2 * force / (np.pi * a) * np.sqrt(np.maximum(1 - (x / a) ** 2, 0))
     inner = np.abs(x) < 0.8 * a
     assert inner.sum() > 15

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from fenwear import System, jump, march
+from fenwear import Tribosystem, assemble, jump, march
 from fenwear.cycle import Block, follow
 from fenwear.cycle.follow import _in_place
 from fenwear.cycle.moment import Moment
@@ -17,17 +17,17 @@ from fenwear.sliding.wear import Worn
 SMALL = ("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=0.4")
 
 
-def run(system: System, half_cycles: int) -> list[Block]:
-    def integrate(now: System, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+def run(system: Tribosystem, half_cycles: int) -> list[Block]:
+    def integrate(now: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         return jump(now, half_cycles, tolerance=0.1, start=start, leave=leave)
 
     return list(follow(system, integrate, lambda now: now.reduced_exchange))
 
 
-def test_moved_meshes_agree_with_the_offset(assemble: Callable[..., System]) -> None:
+def test_moved_meshes_agree_with_the_offset(assembled: Callable[..., Tribosystem]) -> None:
     """Both descriptions give the same wear to the square of the scar's slope (1e-2) where there is no friction."""
     offset, moved = (
-        run(assemble("fretting", *SMALL, "contact.friction=0", f"geometry.follow_wear={limit}"), 4000)
+        run(assembled("fretting", *SMALL, "contact.friction=0", f"geometry.follow_wear={limit}"), 4000)
         for limit in ("never", 0.01)
     )
     assert all(block.system is offset[0].system for block in offset)
@@ -39,29 +39,29 @@ def test_moved_meshes_agree_with_the_offset(assemble: Callable[..., System]) -> 
 
 
 @pytest.mark.mpi
-def test_temperature_keeps_its_place(assemble: Callable[..., System]) -> None:
+def test_temperature_keeps_its_place(assembled: Callable[..., Tribosystem]) -> None:
     """A linear temperature on the moved mesh is the same function of the place."""
     settings = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
-    system = assemble("example1-heat", *settings)
-    worn = Worn(0.3 + 0.1 * (system.facing.x / 30) ** 2, 0.1 + 0 * system.facing.strip.weights)
-    moved = System(system.case, system.comm, worn)
-    assert system.heat_bodies is not None
+    system = assembled("example1-heat", *settings)
+    worn = Worn(0.3 + 0.1 * (system.pair.x / 30) ** 2, 0.1 + 0 * system.pair.strip.weights)
+    moved = assemble(system.case, system.comm, worn)
+    assert system.bodies.heat is not None
     assert moved.heat_bodies is not None
-    for old, new in zip(system.heat_bodies, moved.heat_bodies, strict=True):
+    for old, new in zip(system.bodies.heat, moved.heat_bodies, strict=True):
         x, there = (body.space.tabulate_dof_coordinates()[: body.owned] for body in (old, new))
         linear = partial(np.dot, b=np.array([0.3, 2.0, 0.0]))
         carried = _in_place(old.function(linear(x)), new.function(linear(x)))
         np.testing.assert_allclose(carried, linear(there), atol=1e-9)
 
 
-def test_a_run_with_heat_goes_on(assemble: Callable[..., System]) -> None:
+def test_a_run_with_heat_goes_on(assembled: Callable[..., Tribosystem]) -> None:
     """Moved at nearly no wear, the march with heat goes on as if nothing had happened."""
     settings = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2", "heat.operator=full")
-    plain = assemble("example1-heat", *settings, "geometry.follow_wear=never")
-    moving = assemble("example1-heat", *settings, "geometry.follow_wear=1e-7")
+    plain = assembled("example1-heat", *settings, "geometry.follow_wear=never")
+    moving = assembled("example1-heat", *settings, "geometry.follow_wear=1e-7")
     *_, expected = march(plain, 6)
 
-    def integrate(now: System, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+    def integrate(now: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         return march(now, 6, start=start, leave=leave)
 
     blocks = list(follow(moving, integrate, lambda now: now.exchange))

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import System, jump, march
+from fenwear import Tribosystem, jump, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.sliding.wear import WornLayer
@@ -17,7 +17,7 @@ OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")
 TEN_TIMES = ("geometry.degree=2", "wear.punch.coefficient=4e-7")  # a tenth of the cycles of the paper's coefficient
 
 
-def end(system: System, half_cycles: int, tolerance: float) -> tuple[Array, Array]:
+def end(system: Tribosystem, half_cycles: int, tolerance: float) -> tuple[Array, Array]:
     *_, last = jump(system, half_cycles, tolerance=tolerance)
     assert last.half_cycle[-1] == half_cycles
     return last.pressure[-2:], last.wear[-1]
@@ -25,24 +25,24 @@ def end(system: System, half_cycles: int, tolerance: float) -> tuple[Array, Arra
 
 @pytest.mark.parametrize("half_cycles", [200, 2000])
 @pytest.mark.parametrize("settings", [(), OPENING, ("wear.punch.pressure_exponent=2", "wear.punch.coefficient=2e-8")])
-def test_jump_equals_march(assemble: Callable[..., System], settings: tuple[str, ...], half_cycles: int) -> None:
+def test_jump_equals_march(assembled: Callable[..., Tribosystem], settings: tuple[str, ...], half_cycles: int) -> None:
     """The same cycles one by one: pressures within 2 % of p_m, wear within 1 %."""
-    system = assemble("example1", *TEN_TIMES, *settings)
+    system = assembled("example1", *TEN_TIMES, *settings)
     *_, last = march(system, half_cycles, implicit=True)
     pressure, wear = end(system, half_cycles, 1e-3)
-    inner = np.abs(system.facing.x) < 29
+    inner = np.abs(system.pair.x) < 29
     np.testing.assert_allclose(pressure[:, inner], last.pressure[-2:][:, inner], rtol=0, atol=0.02 * MEAN)
     np.testing.assert_allclose(wear, last.wear[-1], rtol=0, atol=0.01 * last.wear[-1].max())
 
 
-def test_error_follows_the_tolerance(assemble: Callable[..., System]) -> None:
+def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> None:
     """Against the same cycles one at a time in the same inequality, the error falls with the tolerance."""
-    system, cycles = assemble("example1", *TEN_TIMES), 400
+    system, cycles = assembled("example1", *TEN_TIMES), 400
     contact = system.contact((1, -1))
-    wear, state = np.zeros_like(system.facing.x), None
+    wear, state = np.zeros_like(system.pair.x), None
     for _ in range(2 * cycles):  # steps of half a cycle, as accurate as the shortest jump
         layer = WornLayer(system.phases_wear, 0.5)
-        state = contact.solve(system.facing.initial_gap + wear, state, layer)
+        state = contact.solve(system.pair.initial_gap + wear, state, layer)
         wear = wear + layer.opening(state.pressure)[0]
     assert isinstance(state, ContactState)
     errors = [np.abs(end(system, 2 * cycles, t)[0] - state.pressure).max() / MEAN for t in (1e-2, 1e-3, 1e-4)]
@@ -51,35 +51,35 @@ def test_error_follows_the_tolerance(assemble: Callable[..., System]) -> None:
 
 
 @pytest.mark.mpi
-def test_worn_area_of_a_jump_is_exact(assemble: Callable[..., System]) -> None:
+def test_worn_area_of_a_jump_is_exact(assembled: Callable[..., Tribosystem]) -> None:
     """Verification 8 holds over any jump: N cycles wear 2 N beta~ F0 2 u0 / t."""
-    system = assemble("example1", *OPENING)
+    system = assembled("example1", *OPENING)
     area = 1.25e-8 * np.pi * 1e4 * 3 / 10
     for block in jump(system, 20_000, tolerance=3e-3):
         np.testing.assert_allclose(block.worn_area, area, rtol=1e-10)
-        np.testing.assert_allclose(block.wear @ system.facing.weights, area * block.half_cycle, rtol=1e-9)
+        np.testing.assert_allclose(block.wear @ system.pair.weights, area * block.half_cycle, rtol=1e-9)
         assert block.equilibrium_error.max() < 1e-8
     assert block.half_cycle[-1] == 20_000
 
 
-def test_few_steps(assemble: Callable[..., System]) -> None:
+def test_few_steps(assembled: Callable[..., Tribosystem]) -> None:
     """20,000 half-cycles take a hundred jumps at most, growing towards the end."""
-    numbers = np.concatenate([b.half_cycle for b in jump(assemble("example1"), 20_000, tolerance=3e-3)])
+    numbers = np.concatenate([b.half_cycle for b in jump(assembled("example1"), 20_000, tolerance=3e-3)])
     ends = numbers[1::2]
     assert (numbers[::2] + 1 == ends).all()
     assert len(ends) <= 100
     assert np.diff(ends)[-5:].max() > 100 * np.diff(ends)[0]
 
 
-def test_example_2_stays_symmetric(assemble: Callable[..., System]) -> None:
+def test_example_2_stays_symmetric(assembled: Callable[..., Tribosystem]) -> None:
     """Both phases stand in one inequality: p+(x) = p-(-x) to round-off all the way."""
-    for block in jump(assemble("example2"), 20_000, tolerance=3e-3):
+    for block in jump(assembled("example2"), 20_000, tolerance=3e-3):
         for plus, minus in zip(block.pressure[::2], block.pressure[1::2], strict=True):
             np.testing.assert_allclose(plus, minus[::-1], rtol=0, atol=1e-7 * plus.max())
 
 
-def test_stops_when_periodic(assemble: Callable[..., System]) -> None:
+def test_stops_when_periodic(assembled: Callable[..., Tribosystem]) -> None:
     """A jump run ends where the change per cycle falls below the tolerance."""
-    *_, last = jump(assemble("example1"), 10_000_000, tolerance=3e-3, periodic_within=1e-6)
+    *_, last = jump(assembled("example1"), 10_000_000, tolerance=3e-3, periodic_within=1e-6)
     assert last.half_cycle[-1] < 1_000_000
     assert last.periodicity[-2:].max() < 1e-6

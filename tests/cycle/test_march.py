@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, System, march
+from fenwear import Case, Tribosystem, assemble, march
 from fenwear.cycle import Block
 
 A, MEAN = 30.0, 1e4 / 600
@@ -17,7 +17,7 @@ OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")
 FAST = ("geometry.degree=2", "wear.punch.coefficient=4e-6")  # 100 times the paper's
 
 
-def run(system: System, half_cycles: int, **options: Any) -> Block:
+def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
     """Return all half-cycles in one block."""
     (block,) = march(system, half_cycles, block=half_cycles, **options)
     return block
@@ -31,15 +31,15 @@ def one_way(direction: str, distance: float) -> str:
 @pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.mpi
 def test_equilibrium_in_every_half_cycle(
-    assemble: Callable[..., System], settings: tuple[str, ...], implicit: bool
+    assembled: Callable[..., Tribosystem], settings: tuple[str, ...], implicit: bool
 ) -> None:
     """Verification 7: force F0 and no moment about O, recomputed from p alone, to 1e-8; complementarity."""
-    system = assemble("example1", *settings, "wear.punch.coefficient=4e-7")
-    mu, height = system.case.contact.friction, system.punch.pivot[1] - 100
+    system = assembled("example1", *settings, "wear.punch.coefficient=4e-7")
+    mu, height = system.case.contact.friction, system.bodies.punch.pivot[1] - 100
     block = run(system, 40, implicit=implicit)
-    force = block.pressure * system.facing.weights
+    force = block.pressure * system.pair.weights
     np.testing.assert_allclose(force.sum(axis=1) * 10, 1e4, rtol=1e-8)
-    moment = force @ (system.facing.x - A) + block.direction * mu * height * force.sum(axis=1) + 1000 * A
+    moment = force @ (system.pair.x - A) + block.direction * mu * height * force.sum(axis=1) + 1000 * A
     np.testing.assert_allclose(moment, 0, atol=1e-8 * 1000 * A)
     assert block.equilibrium_error.max() < 1e-8
     assert (block.pressure >= 0).all()
@@ -47,17 +47,17 @@ def test_equilibrium_in_every_half_cycle(
     np.testing.assert_array_equal(block.direction, np.where(block.half_cycle % 2, 1, -1))
 
 
-def test_wear_is_what_the_pressure_wears(assemble: Callable[..., System]) -> None:
+def test_wear_is_what_the_pressure_wears(assembled: Callable[..., Tribosystem]) -> None:
     """w grows by beta~ 2 u0 p in each half-cycle, and never shrinks; equation (26)."""
-    block = run(assemble("example1"), 30)
+    block = run(assembled("example1"), 30)
     growth = np.diff(block.wear, axis=0, prepend=0)
     np.testing.assert_allclose(growth, COEFFICIENT * 3 * block.pressure, rtol=1e-9, atol=1e-16)
 
 
-def test_example_2_is_symmetric(assemble: Callable[..., System]) -> None:
+def test_example_2_is_symmetric(assembled: Callable[..., Tribosystem]) -> None:
     """p+(x) = p-(-x): exactly on the flat punch; after wear up to the one half-cycle between the two."""
-    system = assemble("example2")
-    first, back = (system.contact((d,)).solve(system.facing.initial_gap).pressure[0] for d in (1, -1))
+    system = assembled("example2")
+    first, back = (system.contact((d,)).solve(system.pair.initial_gap).pressure[0] for d in (1, -1))
     np.testing.assert_allclose(first, back[::-1], rtol=1e-8)
     block = run(system, 400)
     step = np.abs(block.pressure[-2] - block.pressure[-4]).max()  # what a cycle changes
@@ -65,11 +65,11 @@ def test_example_2_is_symmetric(assemble: Callable[..., System]) -> None:
     np.testing.assert_allclose(block.wear[-1], block.wear[-1][::-1], atol=2 * COEFFICIENT * 3 * MEAN)
 
 
-def test_mirror_image_of_example_1(assemble: Callable[..., System]) -> None:
+def test_mirror_image_of_example_1(assembled: Callable[..., Tribosystem]) -> None:
     """The pin on the left side and the other sliding direction: the mirrored pressure in every half-cycle."""
     mirrored = "punch.supports.0={at=[-30, 120], fix=['x']}"
-    right = run(assemble("example1", *FAST, one_way("rightward", 3)), 20)
-    left = run(assemble("example1", *FAST, one_way("leftward", 3), mirrored), 20)
+    right = run(assembled("example1", *FAST, one_way("rightward", 3)), 20)
+    left = run(assembled("example1", *FAST, one_way("leftward", 3), mirrored), 20)
     np.testing.assert_allclose(left.pressure[:, ::-1], right.pressure, rtol=1e-8, atol=1e-9 * MEAN)
     np.testing.assert_allclose(left.wear[:, ::-1], right.wear, rtol=1e-8)
 
@@ -98,36 +98,36 @@ def scaled(length: float, force: float) -> Callable[[dict[str, Any]], None]:
 
 @pytest.mark.parametrize(("length", "force"), [(1.0, 1000.0), (1e-3, 1.0), (25.4, 4.4)])
 def test_the_choice_of_units_changes_nothing(
-    assemble: Callable[..., System], edited: Callable[..., Case], length: float, force: float
+    assembled: Callable[..., Tribosystem], edited: Callable[..., Case], length: float, force: float
 ) -> None:
     """The same problem in other units of length and force: p scales with force / length², wear with length."""
-    system = assemble("example1", *FAST)
-    other = System(edited("example1", scaled(length, force), *FAST))
+    system = assembled("example1", *FAST)
+    other = assemble(edited("example1", scaled(length, force), *FAST))
     one, two = run(system, 10), run(other, 10)
-    np.testing.assert_allclose(other.facing.x, system.facing.x * length, atol=1e-10 * length)
+    np.testing.assert_allclose(other.pair.x, system.pair.x * length, atol=1e-10 * length)
     np.testing.assert_allclose(two.pressure * length**2 / force, one.pressure, rtol=0, atol=1e-7 * one.pressure.max())
     np.testing.assert_allclose(two.wear / length, one.wear, rtol=0, atol=1e-7 * one.wear.max())
 
 
 @pytest.mark.parametrize("a", [1.0, 2.0])
-def test_only_the_product_of_coefficient_and_sliding_matters(assemble: Callable[..., System], a: float) -> None:
+def test_only_the_product_of_coefficient_and_sliding_matters(assembled: Callable[..., Tribosystem], a: float) -> None:
     """beta~ (u0 omega)^a / omega is all that a half-cycle knows of beta~, u0 and omega."""
     exponent = f"wear.punch.speed_exponent={a}"
-    one = run(assemble("example1", "geometry.degree=2", exponent, "wear.punch.coefficient=1e-8"), 10)
+    one = run(assembled("example1", "geometry.degree=2", exponent, "wear.punch.coefficient=1e-8"), 10)
     other_motion = ("motion.amplitude=3", "motion.angular_frequency=20")
     coefficient = f"wear.punch.coefficient={1e-8 / (2**a * 2 ** (a - 1))!r}"
-    two = run(assemble("example1", "geometry.degree=2", exponent, coefficient, *other_motion), 10)
+    two = run(assembled("example1", "geometry.degree=2", exponent, coefficient, *other_motion), 10)
     np.testing.assert_allclose(two.pressure, one.pressure, rtol=1e-10)
 
 
-def test_stops_when_periodic(assemble: Callable[..., System]) -> None:
+def test_stops_when_periodic(assembled: Callable[..., Tribosystem]) -> None:
     """The run ends after the first whole cycle in which nothing changes by more than the tolerance."""
-    system = assemble("example1", *FAST)
+    system = assembled("example1", *FAST)
     tolerance = 1e-3
     block = run(system, 5000, implicit=True, periodic_within=tolerance)
     n = len(block)
     assert n < 5000
-    change = np.abs(block.pressure[2:] - block.pressure[:-2]).max(axis=1) / system.statics.mean_pressure
+    change = np.abs(block.pressure[2:] - block.pressure[:-2]).max(axis=1) / system.rigid.mean_pressure
     np.testing.assert_allclose(block.periodicity[2:], change, rtol=1e-12)
     assert np.isnan(block.periodicity[:2]).all()
     within = change < tolerance
@@ -135,9 +135,9 @@ def test_stops_when_periodic(assemble: Callable[..., System]) -> None:
     assert not (within[:-2] & within[1:-1]).any()
 
 
-def test_blocks_are_one_sequence(assemble: Callable[..., System]) -> None:
+def test_blocks_are_one_sequence(assembled: Callable[..., Tribosystem]) -> None:
     """Cutting the run into blocks cuts nothing else."""
-    system = assemble("example1", *FAST)
+    system = assembled("example1", *FAST)
     whole = run(system, 10)
     parts = list(march(system, 10, block=3))
     assert [len(p) for p in parts] == [3, 3, 3, 1]
@@ -145,15 +145,15 @@ def test_blocks_are_one_sequence(assemble: Callable[..., System]) -> None:
         np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(whole, name))
 
 
-def test_full_solver_marches_the_same(assemble: Callable[..., System]) -> None:
+def test_full_solver_marches_the_same(assembled: Callable[..., Tribosystem]) -> None:
     """contact.solver = "full" gives the history of the condensed one to 1e-8."""
     small = (*FAST, "geometry.parameters.elements_along_contact=8")
-    one, two = (run(assemble("example1", *small, f"contact.solver='{s}'"), 6) for s in ("condensed", "full"))
+    one, two = (run(assembled("example1", *small, f"contact.solver='{s}'"), 6) for s in ("condensed", "full"))
     np.testing.assert_allclose(two.pressure, one.pressure, rtol=0, atol=1e-8 * one.pressure.max())
     np.testing.assert_allclose(two.wear, one.wear, rtol=1e-7)
 
 
-def test_implicit_tends_to_explicit(assemble: Callable[..., System]) -> None:
+def test_implicit_tends_to_explicit(assembled: Callable[..., Tribosystem]) -> None:
     """At the same worn depth the two differ by first order in the step: half the step, half the difference."""
     differences = []
     for steps in (40, 80, 160):

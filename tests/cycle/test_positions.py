@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import CaseError, ConvergenceError, System, jump, march, steady
+from fenwear import CaseError, ConvergenceError, Tribosystem, jump, march, steady
 from fenwear.cycle import growth_rate
 from fenwear.run import position_warnings
 
@@ -21,34 +21,34 @@ MEAN = 1e4 / 600
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("implicit", [False, True])
-def test_worn_areas_of_both_bodies(assemble: Callable[..., System], implicit: bool) -> None:
+def test_worn_areas_of_both_bodies(assembled: Callable[..., Tribosystem], implicit: bool) -> None:
     """Verification 8 for both bodies, whatever the pressure and the offsets."""
-    for block in march(assemble("example1", *BOTH), 40, implicit=implicit):
+    for block in march(assembled("example1", *BOTH), 40, implicit=implicit):
         system = block.system
         np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
         np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
-        strip = block.wear_strip @ system.facing.strip.weights
+        strip = block.wear_strip @ system.pair.strip.weights
         np.testing.assert_allclose(strip, AREAS[1] * block.half_cycle, rtol=1e-11)
         assert block.equilibrium_error.max() < 1e-12
 
 
-def test_jumps_follow_the_march(assemble: Callable[..., System]) -> None:
+def test_jumps_follow_the_march(assembled: Callable[..., Tribosystem]) -> None:
     """Cycle jumps with both bodies worn end near the implicit march, and wear exactly as much."""
     fast = (*MOVING, "wear.punch.coefficient=4e-7", "wear.strip.coefficient=2e-7")
-    system = assemble("example1", *fast)
+    system = assembled("example1", *fast)
     *_, slow = march(system, 400, implicit=True)
     *_, last = jump(system, 400, tolerance=1e-3)
-    inner = np.abs(system.facing.x) < 29
+    inner = np.abs(system.pair.x) < 29
     np.testing.assert_allclose(last.pressure[-2:, inner], slow.pressure[-2:, inner], atol=0.02 * MEAN)
     np.testing.assert_allclose(last.wear_strip[-1], slow.wear_strip[-1], atol=0.01 * slow.wear_strip[-1].max())
-    assert system.facing.strip.weights @ last.wear_strip[-1] == pytest.approx(200 / 3 * 3 * 2 * 2e-7 * 1e4 * 3 / 10)
+    assert system.pair.strip.weights @ last.wear_strip[-1] == pytest.approx(200 / 3 * 3 * 2 * 2e-7 * 1e4 * 3 / 10)
 
 
 def test_many_small_eliminations_equal_a_large_one(
-    assemble: Callable[..., System], monkeypatch: pytest.MonkeyPatch
+    assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The bordered inequality solves the same as the dense one."""
-    system = assemble("example1", *BOTH)
+    system = assembled("example1", *BOTH)
     results = []
     for limit in (0, 10**6):
         monkeypatch.setattr("fenwear.contact.condensed.DENSE", limit)
@@ -59,33 +59,33 @@ def test_many_small_eliminations_equal_a_large_one(
 
 
 @pytest.mark.mpi
-def test_mirrored_strokes_of_a_symmetric_punch(assemble: Callable[..., System]) -> None:
+def test_mirrored_strokes_of_a_symmetric_punch(assembled: Callable[..., Tribosystem]) -> None:
     """Example 2, moved positions: p of position k rightward is the mirror image of p of position k leftward."""
-    system = assemble("example2", *BOTH)
+    system = assembled("example2", *BOTH)
     *_, block = jump(system, 2000, tolerance=1e-2)
     contacts = [contact.pressure[0] for contact in block.end.contacts if contact is not None]
     for k in range(5):
         np.testing.assert_allclose(contacts[k], contacts[5 + k][::-1], atol=1e-7 * MEAN)
 
 
-def test_without_strip_wear_positions_change_little(assemble: Callable[..., System]) -> None:
+def test_without_strip_wear_positions_change_little(assembled: Callable[..., Tribosystem]) -> None:
     """A uniform strip is the same anywhere below the punch: a moved one gives the pressures of the one that stays."""
-    one = steady(assemble("example1", *COARSE, "geometry.parameters.overlap=3"))
-    other = steady(assemble("example1", *MOVING))
+    one = steady(assembled("example1", *COARSE, "geometry.parameters.overlap=3"))
+    other = steady(assembled("example1", *MOVING))
     inner = slice(1, -1)
     np.testing.assert_allclose(other.pressure[:, inner], one.pressure[:, inner], atol=0.02 * MEAN)
 
 
-def test_growth_rate_of_several_positions(assemble: Callable[..., System]) -> None:
+def test_growth_rate_of_several_positions(assembled: Callable[..., Tribosystem]) -> None:
     """Disturbances of a strip that moves by 20 um grow as fast as of one that stays; the stroke enters linearly."""
     motion = ("motion.amplitude=0.01", "motion.angular_frequency=1500")
     base = (*COARSE, *motion, "geometry.parameters.overlap=3")
     for share in (0.1, 0.5):
         rates = []
         for positions in (1, 5):
-            system = assemble("example1-heat", *base, f"heat.partition={share}", f"motion.positions={positions}")
+            system = assembled("example1-heat", *base, f"heat.partition={share}", f"motion.positions={positions}")
             state = steady(system)
-            assert state.phase_pressure.shape == (2 * positions, len(system.facing.x))
+            assert state.phase_pressure.shape == (2 * positions, len(system.pair.x))
             np.testing.assert_array_equal(state.phase_pressure[positions // 2 :: positions], state.pressure)
             rates.append(growth_rate(system, state.phase_pressure))
         assert rates[1] == pytest.approx(rates[0], rel=1e-3)
@@ -99,51 +99,51 @@ def test_steady_command_with_positions(fenwear: Callable[..., Any]) -> None:
     assert "within 1 % of the mean pressure after" in done.stdout
 
 
-def test_no_steady_state_where_the_track_deepens(assemble: Callable[..., System]) -> None:
+def test_no_steady_state_where_the_track_deepens(assembled: Callable[..., Tribosystem]) -> None:
     """To and fro over a strip that wears: said in so many words."""
     with pytest.raises(ConvergenceError, match="no cyclic steady state exists: the strip wears"):
-        steady(assemble("example1", *BOTH))
+        steady(assembled("example1", *BOTH))
 
 
-def test_steady_on_a_closed_track(assemble: Callable[..., System]) -> None:
+def test_steady_on_a_closed_track(assembled: Callable[..., Tribosystem]) -> None:
     """The strip of a closed track wears evenly: the punch's pressure is the optimum, the punch sinks by both."""
     track = "motion={kind='one-way', direction='leftward', speed=200, duration=0.1, track=600}"
-    plain = steady(assemble("monotonic-lz20", *COARSE))
-    both = steady(assemble("monotonic-lz20", *COARSE, track, "wear.strip.coefficient=5e-6"))
+    plain = steady(assembled("monotonic-lz20", *COARSE))
+    both = steady(assembled("monotonic-lz20", *COARSE, track, "wear.strip.coefficient=5e-6"))
     np.testing.assert_allclose(both.pressure, plain.pressure, atol=1e-7 * MEAN)
     recession = 5e-6 * 20 * 1000 / 600  # beta~ S F0 / t over the track's length
     assert both.velocity["lambda_F"] - plain.velocity["lambda_F"] == pytest.approx(recession, rel=1e-7)
-    *_, block = march(assemble("monotonic-lz20", *COARSE, track, "wear.strip.coefficient=5e-6"), 3, implicit=True)
+    *_, block = march(assembled("monotonic-lz20", *COARSE, track, "wear.strip.coefficient=5e-6"), 3, implicit=True)
     np.testing.assert_allclose(block.wear_strip[-1], 3 * recession, rtol=1e-10)
 
 
-def test_sliding_out_of_the_plane(assemble: Callable[..., System]) -> None:
+def test_sliding_out_of_the_plane(assembled: Callable[..., Tribosystem]) -> None:
     """Friction across the plane leaves the plane's contact without friction; mu_d pulls along it, both ways alike."""
-    plain = assemble("example1", *COARSE, "contact.friction=0")
-    across = assemble("example1", *COARSE, "motion.axis=y")
+    plain = assembled("example1", *COARSE, "contact.friction=0")
+    across = assembled("example1", *COARSE, "motion.axis=y")
     np.testing.assert_allclose(steady(across).pressure, steady(plain).pressure, atol=1e-9 * MEAN)
     np.testing.assert_allclose(across.friction.cross(-1, np.array([0.25])), -0.25)
-    pulled = assemble("example1", *COARSE, "motion.axis=y", "contact.transverse_friction=0.1")
-    leftward = assemble("example1", *COARSE, "contact.friction=0.1")
+    pulled = assembled("example1", *COARSE, "motion.axis=y", "contact.transverse_friction=0.1")
+    leftward = assembled("example1", *COARSE, "contact.friction=0.1")
     for direction in (1, -1):
         np.testing.assert_allclose(pulled.optimum(direction).pressure, leftward.optimum(-1).pressure, rtol=1e-12)
-    both = assemble("example1", *COARSE, "motion.axis=y", "wear.strip.coefficient=3.926990816987242e-8")
+    both = assembled("example1", *COARSE, "motion.axis=y", "wear.strip.coefficient=3.926990816987242e-8")
     assert steady(both).velocity["lambda_F"] == pytest.approx(2 * steady(across).velocity["lambda_F"], rel=1e-9)
 
 
-def test_angle_of_the_wear_velocity(assemble: Callable[..., System]) -> None:
+def test_angle_of_the_wear_velocity(assembled: Callable[..., Tribosystem]) -> None:
     """tan chi = w_t / w_n (4): the pin at height 20 mm turns the punch by lambda_M, so that w_t = -20 lambda_M."""
-    system = assemble("monotonic-lz20", *COARSE)
+    system = assembled("monotonic-lz20", *COARSE)
     found = system.optimum(-1)
-    normal = found.velocity["lambda_F"] - found.velocity["lambda_M"] * (system.facing.x - 30)
+    normal = found.velocity["lambda_F"] - found.velocity["lambda_M"] * (system.pair.x - 30)
     np.testing.assert_allclose(np.tan(found.tilt), -20 * found.velocity["lambda_M"] / normal, rtol=1e-9)
 
 
-def test_load_over_the_cycle(assemble: Callable[..., System]) -> None:
+def test_load_over_the_cycle(assembled: Callable[..., Tribosystem]) -> None:
     """A load twice as high in the first half of the cycle: the wear and the balance of each half-cycle follow it."""
     table = "punch.loads.0.over_cycle=[[0, 1.5], [0.499, 1.5], [0.501, 0.5], [1, 0.5]]"
-    system = assemble("example1", *COARSE, table)
-    assert system.statics.mean_pressure == pytest.approx(MEAN, rel=1e-6)
+    system = assembled("example1", *COARSE, table)
+    assert system.rigid.mean_pressure == pytest.approx(MEAN, rel=1e-6)
     *_, block = march(system, 10)
     np.testing.assert_allclose(block.worn_area[::2], 1.5 * AREAS[0], rtol=1e-9)
     np.testing.assert_allclose(block.worn_area[1::2], 0.5 * AREAS[0], rtol=1e-9)
@@ -151,14 +151,14 @@ def test_load_over_the_cycle(assemble: Callable[..., System]) -> None:
 
 
 @pytest.mark.parametrize("integration", ["march", "jump", "steady"])
-def test_coefficients_that_do_not_vary_are_constants(assemble: Callable[..., System], integration: str) -> None:
+def test_coefficients_that_do_not_vary_are_constants(assembled: Callable[..., Tribosystem], integration: str) -> None:
     """Expressions and tables with one value give what the constants give."""
     dependent = (
         "contact.friction={expression='0.25 + 0 * p'}",
         "wear.punch={coefficient={table=[[0, 3.926990816987242e-8], [1, 3.926990816987242e-8]], of='v'}}",
     )
     found = []
-    for system in (assemble("example1", *COARSE), assemble("example1", *COARSE, *dependent)):
+    for system in (assembled("example1", *COARSE), assembled("example1", *COARSE, *dependent)):
         if integration == "steady":
             found.append(steady(system).pressure)
         else:
@@ -167,52 +167,52 @@ def test_coefficients_that_do_not_vary_are_constants(assemble: Callable[..., Sys
     np.testing.assert_allclose(found[1], found[0], rtol=1e-8, atol=1e-8)
 
 
-def test_wear_coefficient_of_pressure_is_an_exponent(assemble: Callable[..., System]) -> None:
+def test_wear_coefficient_of_pressure_is_an_exponent(assembled: Callable[..., Tribosystem]) -> None:
     """beta~ proportional to p is b = 2: the same steady state, and the same wear of a half-cycle."""
     law = "wear.punch={coefficient={expression='2e-9 * p'}}"
     power = "wear.punch={coefficient=2e-9, pressure_exponent=2.0}"
-    varying, square = (assemble("example1", *COARSE, setting) for setting in (law, power))
+    varying, square = (assembled("example1", *COARSE, setting) for setting in (law, power))
     one, other = (list(march(system, 6))[-1] for system in (varying, square))
     np.testing.assert_allclose(one.wear, other.wear, rtol=1e-9)
     np.testing.assert_allclose(steady(varying).pressure, steady(square).pressure, atol=1e-5 * MEAN)
 
 
-def test_friction_of_pressure_balances(assemble: Callable[..., System]) -> None:
+def test_friction_of_pressure_balances(assembled: Callable[..., Tribosystem]) -> None:
     """With mu = 0.1 + 0.002 p the moments balance at the friction of the pressure found, node by node."""
-    system = assemble("example1", *COARSE, "contact.friction={expression='0.1 + 0.002 * p'}")
+    system = assembled("example1", *COARSE, "contact.friction={expression='0.1 + 0.002 * p'}")
     *_, block = march(system, 4)
     p = block.pressure[-1]
-    balance = system.statics.equilibrium(-(0.1 + 0.002 * p)) @ p + system.statics.resultant
+    balance = system.rigid.equilibrium(-(0.1 + 0.002 * p)) @ p + system.rigid.resultant
     assert np.abs(balance).max() < 1e-6 * 1000 * 30
 
 
-def test_temperature_dependent_wear(assemble: Callable[..., System]) -> None:
+def test_temperature_dependent_wear(assembled: Callable[..., Tribosystem]) -> None:
     """Wear that grows by 10 % per kelvin: the first half-cycle wears as at the start, later ones more."""
     law = "wear.punch={coefficient={expression='3.926990816987242e-8 * (1 + 0.1 * T)'}}"
-    system = assemble("example1-heat", *COARSE, law)
+    system = assembled("example1-heat", *COARSE, law)
     *_, block = march(system, 20)
     assert block.worn_area[0] == pytest.approx(AREAS[0], rel=1e-12)
     assert (np.diff(block.worn_area) > 0).all()
 
 
-def test_growth_rate_with_the_strip_worn(assemble: Callable[..., System]) -> None:
+def test_growth_rate_with_the_strip_worn(assembled: Callable[..., Tribosystem]) -> None:
     """Out of the plane both bodies wear at the same places: a disturbance dies as if the punch took both rates."""
     both = ("wear.punch.coefficient=3e-8", "wear.strip.coefficient=2e-8")
     alone = ("wear.punch.coefficient=5e-8",)
     rates = []
     for wear in (both, alone):
-        system = assemble("example2", *COARSE, "motion.axis=y", *wear)
+        system = assembled("example2", *COARSE, "motion.axis=y", *wear)
         rates.append(growth_rate(system, steady(system).phase_pressure))
     assert rates[0] == pytest.approx(rates[1], rel=1e-9)
     assert rates[0] < 0
 
 
 @pytest.mark.mpi
-def test_heat_under_a_strip_that_moves(assemble: Callable[..., System]) -> None:
+def test_heat_under_a_strip_that_moves(assembled: Callable[..., Tribosystem]) -> None:
     """With heat and both bodies worn: areas and friction heat exact, the balance closed; nearly as in one position."""
     hot = ("heat.partition=0.2", "heat.steps=5")
-    one = assemble("example1-heat", *COARSE, *hot)
-    several = assemble("example1-heat", *BOTH, *hot)
+    one = assembled("example1-heat", *COARSE, *hot)
+    several = assembled("example1-heat", *BOTH, *hot)
     (single,), (block,) = (list(march(system, 40)) for system in (one, several))
     np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
     np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
@@ -224,11 +224,11 @@ def test_heat_under_a_strip_that_moves(assemble: Callable[..., System]) -> None:
     np.testing.assert_allclose(block.heat.temperature_punch, single.heat.temperature_punch, atol=0.1 * largest)
 
 
-def test_surfaces_that_never_meet(assemble: Callable[..., System]) -> None:
+def test_surfaces_that_never_meet(assembled: Callable[..., Tribosystem]) -> None:
     """A punch that is held, and drawn away from the strip by its load: not a run without wear but an error."""
     held = "punch.supports=[{on='punch_load', fix=['x', 'z']}]"
     for force in (-1000, 1000):
-        system = assemble("example1", *COARSE, held, f"punch.loads=[{{on='punch_free', force=[0, {force}]}}]")
+        system = assembled("example1", *COARSE, held, f"punch.loads=[{{on='punch_free', force=[0, {force}]}}]")
         if force < 0:
             system.check_touching()
             continue
@@ -246,19 +246,19 @@ def test_surfaces_that_never_meet(assemble: Callable[..., System]) -> None:
         ("contact.friction={table=[[0, 0.1], [1, 0.2]]}", "contact.friction: depends on the temperature T, which"),
     ],
 )
-def test_bad_input(assemble: Callable[..., System], setting: str, message: str) -> None:
+def test_bad_input(assembled: Callable[..., Tribosystem], setting: str, message: str) -> None:
     """A stroke off the mesh and coefficients without a meaning are named by their keys."""
     with pytest.raises(CaseError, match=message):
-        list(march(assemble("example1", *MOVING, setting), 1))
+        list(march(assembled("example1", *MOVING, setting), 1))
 
 
-def test_positions_far_apart_are_warned_about(assemble: Callable[..., System]) -> None:
+def test_positions_far_apart_are_warned_about(assembled: Callable[..., Tribosystem]) -> None:
     """Neighbouring positions more than two contact nodes apart leave steps in the strip's scar; the number is named."""
     settings = (*COARSE, "geometry.parameters.overlap=12", "wear.strip.coefficient=2e-8", "motion.amplitude=10")
-    few, many = (assemble("example1", *settings, f"motion.positions={n}") for n in (3, 25))
+    few, many = (assembled("example1", *settings, f"motion.positions={n}") for n in (3, 25))
     (warning,) = position_warnings(few)
     assert "motion.positions = " in warning
     named = int(warning.partition("motion.positions = ")[2].split(",")[0])
-    assert not position_warnings(assemble("example1", *settings, f"motion.positions={named}"))
+    assert not position_warnings(assembled("example1", *settings, f"motion.positions={named}"))
     assert not position_warnings(many)
-    assert not position_warnings(assemble("example1", *COARSE))
+    assert not position_warnings(assembled("example1", *COARSE))

@@ -9,30 +9,30 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import ConvergenceError, System, jump, march
+from fenwear import ConvergenceError, Tribosystem, jump, march
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.inequality import DenseInequality
 from fenwear.cycle import Block
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.remedies import FULL_START, LINE_SEARCH, SHORTER_JUMPS, SMALLER_STEPS
 
-Assemble = Callable[..., System]
+Assemble = Callable[..., Tribosystem]
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 # So much heat in a half-cycle that contact and heat taken together have no solution.
 HOT = (*COARSE, "motion.amplitude=20", "heat.partition=0.5")
 MEAN = 1e4 / 600
 
 
-def run(system: System, half_cycles: int, **options: Any) -> Block:
+def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
     (block,) = march(system, half_cycles, block=half_cycles, **options)
     return block
 
 
 @pytest.fixture
-def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[System], list[int]]:
+def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Tribosystem], list[int]]:
     """Return fails(system): phases of a system do not converge at their second cycle; lists the failures."""
 
-    def fails(system: System) -> list[int]:
+    def fails(system: Tribosystem) -> list[int]:
         original, failed = PhaseStep.solve, []
 
         def solve(self: PhaseStep, temperature: Any, worn: Any, before: ContactState | None) -> PhaseEnd:
@@ -59,10 +59,14 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[System], list[int]]:
 )
 @pytest.mark.mpi
 def test_half_cycles_in_parts(
-    assemble: Assemble, failing: Callable[[System], list[int]], case: str, settings: tuple[str, ...], implicit: bool
+    assembled: Assemble,
+    failing: Callable[[Tribosystem], list[int]],
+    case: str,
+    settings: tuple[str, ...],
+    implicit: bool,
 ) -> None:
     """A half-cycle in five parts wears and heats what it does as a whole, but for the size of the steps."""
-    system = assemble(case, *settings)
+    system = assembled(case, *settings)
     usual = run(system, 8, implicit=implicit)
     assert usual.retries.max() == 0
     strokes = failing(system)
@@ -86,9 +90,9 @@ def test_half_cycles_in_parts(
     )
 
 
-def test_heat_too_strong_for_a_half_cycle(assemble: Assemble) -> None:
+def test_heat_too_strong_for_a_half_cycle(assembled: Assemble) -> None:
     """A run that ended here goes on in smaller steps: nothing of wear, force and heat is lost."""
-    system = assemble("example1-heat", *HOT)
+    system = assembled("example1-heat", *HOT)
     block = run(system, 20)
     assert 0 < np.count_nonzero(block.retries) < 20
     assert any(name.startswith("solved in") for name in block.remedies)
@@ -98,9 +102,9 @@ def test_heat_too_strong_for_a_half_cycle(assemble: Assemble) -> None:
     assert block.equilibrium_error.max() < 1e-10
 
 
-def test_no_parts_converge(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_parts_converge(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
     """The error is that of the whole half-cycle, and names it."""
-    system = assemble("example1", *COARSE)
+    system = assembled("example1", *COARSE)
 
     def solve(self: PhaseStep, *_: Any) -> PhaseEnd:
         raise ConvergenceError("the whole" if self.system is system else "a part")
@@ -111,9 +115,9 @@ def test_no_parts_converge(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("ways", [1, 2])
-def test_contact_by_another_way(assemble: Assemble, monkeypatch: pytest.MonkeyPatch, ways: int) -> None:
+def test_contact_by_another_way(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, ways: int) -> None:
     """With the first ways closed the next ones find the same contact; which one is noted."""
-    system = assemble("example1", *COARSE)
+    system = assembled("example1", *COARSE)
     usual = run(system, 6)
     original, closed = DenseInequality.solve, [0]
 
@@ -133,9 +137,9 @@ def test_contact_by_another_way(assemble: Assemble, monkeypatch: pytest.MonkeyPa
 
 
 @pytest.mark.parametrize("shortest", [16, 1])
-def test_jumps_that_fail(assemble: Assemble, monkeypatch: pytest.MonkeyPatch, shortest: int) -> None:
+def test_jumps_that_fail(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, shortest: int) -> None:
     """A jump that does not converge is shortened; a single cycle is cut into smaller steps. All is told."""
-    system = assemble("example1", *COARSE)
+    system = assembled("example1", *COARSE)
     *_, usual = jump(system, 400, tolerance=1e-3)
     stepper = sys.modules["fenwear.cycle.jump"]._Stepper
     original = stepper.step

@@ -7,26 +7,26 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import System, march
+from fenwear import Tribosystem, march
 from fenwear.cycle import stability_number
 
 MEAN = 1e4 / 600
 EVEN = ("geometry.degree=1", "geometry.parameters.edge_grading=1", "geometry.parameters.elements_along_contact=32")
 
 
-def at_number(assemble: Callable[..., System], number: float, *settings: str) -> System:
+def at_number(assembled: Callable[..., Tribosystem], number: float, *settings: str) -> Tribosystem:
     """Return one-way sliding of Example 1 whose wear step is `number` times the explicit limit."""
     one_way = "motion={kind='one-way', direction='leftward', speed=3, duration=1}"
-    start = stability_number(assemble("example1", one_way, "wear.punch.coefficient=1e-7", *settings))
-    return assemble("example1", one_way, f"wear.punch.coefficient={1e-7 * number / start!r}", *settings)
+    start = stability_number(assembled("example1", one_way, "wear.punch.coefficient=1e-7", *settings))
+    return assembled("example1", one_way, f"wear.punch.coefficient={1e-7 * number / start!r}", *settings)
 
 
 @pytest.mark.parametrize("settings", [EVEN, ("geometry.degree=2",), ("geometry.degree=4",)])
-def test_limit_is_where_explicit_steps_fail(assemble: Callable[..., System], settings: tuple[str, ...]) -> None:
+def test_limit_is_where_explicit_steps_fail(assembled: Callable[..., Tribosystem], settings: tuple[str, ...]) -> None:
     """Verification 17: at 0.97 of the limit the pressure tends to the optimum, at 1.03 it oscillates for ever."""
     distances = []
     for number in (0.97, 1.03):
-        system = at_number(assemble, number, *settings)
+        system = at_number(assembled, number, *settings)
         assert stability_number(system) == pytest.approx(number, rel=1e-3)
         *_, last = march(system, 1000)
         distances.append(last.optimum_distance[-1])
@@ -38,9 +38,9 @@ def test_limit_is_where_explicit_steps_fail(assemble: Callable[..., System], set
     assert (change < -0.01 * MEAN).any()
 
 
-def test_proportional_to_the_step(assemble: Callable[..., System]) -> None:
+def test_proportional_to_the_step(assembled: Callable[..., Tribosystem]) -> None:
     """The number is linear in beta~ and u0; with b, it grows as b p_m^(b - 1)."""
-    one = stability_number(assemble("example1"))
-    assert stability_number(assemble("example1", "motion.amplitude=4.5")) == pytest.approx(3 * one, rel=1e-3)
-    squared = assemble("example1", "wear.punch.pressure_exponent=2", "wear.punch.coefficient=3.926990816987242e-8")
+    one = stability_number(assembled("example1"))
+    assert stability_number(assembled("example1", "motion.amplitude=4.5")) == pytest.approx(3 * one, rel=1e-3)
+    squared = assembled("example1", "wear.punch.pressure_exponent=2", "wear.punch.coefficient=3.926990816987242e-8")
     assert stability_number(squared) == pytest.approx(2 * MEAN * one, rel=1e-3)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, ConvergenceError, System, jump, march, steady
+from fenwear import Case, ConvergenceError, Tribosystem, assemble, jump, march, steady
 from fenwear.cycle import cycles_to_reach
 
 A, MEAN = 30.0, 1e4 / 600
@@ -18,9 +18,9 @@ COEFFICIENT = 1.25e-8 * np.pi
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 @pytest.mark.parametrize("name", ["example1", "example1-lz40", "example2"])
 @pytest.mark.mpi
-def test_sum_of_the_two_pressures_is_uniform(assemble: Callable[..., System], name: str, plane: str) -> None:
+def test_sum_of_the_two_pressures_is_uniform(assembled: Callable[..., Tribosystem], name: str, plane: str) -> None:
     """Verification 11 and the paper: p+ + p- = 2 p_m; where one vanishes the other is 33.33 MPa."""
-    system = assemble(name, f"model.plane='{plane}'")
+    system = assembled(name, f"model.plane='{plane}'")
     state = steady(system)
     np.testing.assert_allclose(state.pressure.sum(axis=0), 2 * MEAN, rtol=1e-9)
     assert state.pressure.max() == pytest.approx(2 * MEAN, rel=1e-9)
@@ -31,17 +31,17 @@ def test_sum_of_the_two_pressures_is_uniform(assemble: Callable[..., System], na
     np.testing.assert_allclose(state.wear_per_cycle, COEFFICIENT * 3 * 2 * MEAN, rtol=1e-9)
     assert state.velocity["lambda_F"] == pytest.approx(COEFFICIENT * 3 * 2 * MEAN, rel=1e-9)
     assert state.velocity.get("lambda_M", 0) == pytest.approx(0, abs=1e-16)
-    force = state.pressure * system.facing.weights
+    force = state.pressure * system.pair.weights
     np.testing.assert_allclose(force.sum(axis=1), 1000, rtol=1e-10)
     if "lambda_M" in state.velocity:
-        height = system.punch.pivot[1] - 100
-        np.testing.assert_allclose(force @ system.facing.x, [-250 * height, 250 * height], rtol=1e-9)
+        height = system.bodies.punch.pivot[1] - 100
+        np.testing.assert_allclose(force @ system.pair.x, [-250 * height, 250 * height], rtol=1e-9)
 
 
 @pytest.mark.mpi
-def test_example_2_is_symmetric(assemble: Callable[..., System]) -> None:
+def test_example_2_is_symmetric(assembled: Callable[..., Tribosystem]) -> None:
     """p+(x) = p-(-x), and the shape is even."""
-    state = steady(assemble("example2"))
+    state = steady(assembled("example2"))
     np.testing.assert_allclose(state.pressure[0], state.pressure[1, ::-1], atol=1e-8 * MEAN)
     np.testing.assert_allclose(state.shape, state.shape[::-1], atol=1e-7 * np.ptp(state.shape))
 
@@ -55,23 +55,23 @@ def test_off_centre_load(edited: Callable[..., Case]) -> None:
     def push(case: dict[str, Any]) -> None:
         case["punch"]["loads"].append({"on": "punch_free", "force": [1000, 0]})
 
-    system = System(edited("example1", push))
+    system = assemble(edited("example1", push))
     state = steady(system)
     slope = 3 * 3 / A**2
-    x = system.facing.x
+    x = system.pair.x
     np.testing.assert_allclose(state.pressure.sum(axis=0), 2 * MEAN * (1 + slope * x), rtol=1e-8)
     assert state.velocity["lambda_M"] == pytest.approx(-COEFFICIENT * 3 * 2 * MEAN * slope, rel=1e-8)
 
 
 @pytest.mark.parametrize("name", ["example1", "example2"])
 @pytest.mark.parametrize("b", [0.5, 1.5, 2.0])
-def test_power_law(assemble: Callable[..., System], name: str, b: float) -> None:
+def test_power_law(assembled: Callable[..., Tribosystem], name: str, b: float) -> None:
     """b != 1: p+^b + p-^b is a rigid motion over beta~ S; where one vanishes the other is its b-th root."""
     coefficient = f"wear.punch.coefficient={COEFFICIENT * MEAN ** (1 - b)!r}"
-    system = assemble(name, f"wear.punch.pressure_exponent={b}", coefficient)
+    system = assembled(name, f"wear.punch.pressure_exponent={b}", coefficient)
     state = steady(system)
     power = (state.pressure**b).sum(axis=0)
-    x = system.facing.x
+    x = system.pair.x
     if name == "example2":
         np.testing.assert_allclose(power, power.mean(), rtol=1e-8)
     line = np.polyval(np.polyfit(x, power, 1), x)
@@ -79,7 +79,7 @@ def test_power_law(assemble: Callable[..., System], name: str, b: float) -> None
     worn = COEFFICIENT * MEAN ** (1 - b) * 3 * power
     rigid = state.velocity["lambda_F"] - state.velocity.get("lambda_M", 0) * (x - A)
     np.testing.assert_allclose(worn, rigid, rtol=1e-7)
-    np.testing.assert_allclose(state.pressure @ system.facing.weights, 1000, rtol=1e-9)
+    np.testing.assert_allclose(state.pressure @ system.pair.weights, 1000, rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -90,13 +90,13 @@ def test_power_law(assemble: Callable[..., System], name: str, b: float) -> None
         ("wear.punch.pressure_exponent=0.5", "wear.punch.coefficient=2e-7"),
     ],
 )
-def test_jumps_end_there(assemble: Callable[..., System], settings: tuple[str, ...]) -> None:
+def test_jumps_end_there(assembled: Callable[..., Tribosystem], settings: tuple[str, ...]) -> None:
     """Verification 11: a run of cycle jumps and the direct solve agree to 1e-3 p_m, in pressure and in shape."""
-    system = assemble("example1", *settings)
+    system = assembled("example1", *settings)
     state = steady(system)
     *_, last = jump(system, 2_000_000, tolerance=1e-2)
     np.testing.assert_allclose(last.pressure[-2:], state.pressure, rtol=0, atol=1e-3 * MEAN)
-    rigid = np.stack([np.ones_like(system.facing.x), system.facing.x], axis=1)
+    rigid = np.stack([np.ones_like(system.pair.x), system.pair.x], axis=1)
     difference = last.wear[-1] - state.shape
     difference -= rigid @ np.linalg.lstsq(rigid, difference, rcond=None)[0]
     np.testing.assert_allclose(difference, 0, atol=5e-3 * np.ptp(state.shape))
@@ -104,12 +104,12 @@ def test_jumps_end_there(assemble: Callable[..., System], settings: tuple[str, .
 
 @pytest.mark.parametrize(("friction", "exists"), [(0.37, True), (0.38, False)])
 def test_friction_can_tip_the_punch_out_of_any_steady_state(
-    assemble: Callable[..., System], friction: float, exists: bool
+    assembled: Callable[..., Tribosystem], friction: float, exists: bool
 ) -> None:
     """With p+ + p- = 2 p_m the resultant of p+ can be no farther from the middle than L/4 = 15 mm = mu l_z."""
-    system = assemble("example1-lz40", f"contact.friction={friction}")
+    system = assembled("example1-lz40", f"contact.friction={friction}")
     if exists:
-        centre = (steady(system).pressure * system.facing.weights) @ system.facing.x / 1000
+        centre = (steady(system).pressure * system.pair.weights) @ system.pair.x / 1000
         np.testing.assert_allclose(centre, [-friction * 40, friction * 40], rtol=1e-9)
     else:
         with pytest.raises(ConvergenceError, match="goes on changing its shape"):
@@ -117,17 +117,17 @@ def test_friction_can_tip_the_punch_out_of_any_steady_state(
 
 
 @pytest.mark.slow
-def test_forty_thousand_marched_half_cycles_end_there(assemble: Callable[..., System]) -> None:
+def test_forty_thousand_marched_half_cycles_end_there(assembled: Callable[..., Tribosystem]) -> None:
     """Verification 11 and issue 3: marched and directly solved pressures within 0.1 MPa."""
-    system = assemble("example1", "geometry.degree=2")
+    system = assembled("example1", "geometry.degree=2")
     *_, last = march(system, 40_000)
     order = [1, 0] if last.direction[-1] == 1 else [0, 1]
     np.testing.assert_allclose(last.pressure[-2:][order], steady(system).pressure, rtol=0, atol=0.1)
 
 
-def test_neither_speed_nor_coefficient_changes_it(assemble: Callable[..., System]) -> None:
+def test_neither_speed_nor_coefficient_changes_it(assembled: Callable[..., Tribosystem]) -> None:
     """For any a, beta~, u0 and omega the pressures and the shape are the same; only the wear per cycle scales."""
-    one = steady(assemble("example1"))
+    one = steady(assembled("example1"))
     system = assemble(
         "example1", "wear.punch.speed_exponent=2", "wear.punch.coefficient=1e-6", "motion.angular_frequency=3"
     )
@@ -143,9 +143,9 @@ ONE_WAY = [(f"monotonic-lz{h}", b, d) for h in (20, 40) for b in (0.5, 1.0, 2.0)
 
 @pytest.mark.parametrize(("name", "b", "direction"), ONE_WAY)
 @pytest.mark.mpi
-def test_one_way_is_the_optimum(assemble: Callable[..., System], name: str, b: float, direction: str) -> None:
+def test_one_way_is_the_optimum(assembled: Callable[..., Tribosystem], name: str, b: float, direction: str) -> None:
     """The steady state of one-way sliding is the optimum, with its wear velocity (duration 0.1 s)."""
-    system = assemble(name, f"motion.direction='{direction}'", f"wear.punch.pressure_exponent={b}",
+    system = assembled(name, f"motion.direction='{direction}'", f"wear.punch.pressure_exponent={b}",
                       "wear.punch.coefficient=1e-6")  # fmt: skip
     state, optimum = steady(system), system.optimum(system.motion.directions[0])
     np.testing.assert_allclose(state.pressure[0], optimum.pressure, atol=1e-6 * MEAN)
@@ -153,9 +153,9 @@ def test_one_way_is_the_optimum(assemble: Callable[..., System], name: str, b: f
         assert state.velocity[mode] == pytest.approx(velocity * 0.1, rel=1e-6, abs=1e-9)
 
 
-def test_surfaces_that_never_meet_again(assemble: Callable[..., System]) -> None:
+def test_surfaces_that_never_meet_again(assembled: Callable[..., Tribosystem]) -> None:
     """One-way with c > 1: the worn contact is the optimum's triangle, and the rest of the punch stays open."""
-    system = assemble("monotonic-lz40", "contact.friction=0.4", "motion.direction='rightward'")
+    system = assembled("monotonic-lz40", "contact.friction=0.4", "motion.direction='rightward'")
     state = steady(system)
     np.testing.assert_allclose(state.pressure[0], system.optimum(1).pressure, atol=1e-6 * MEAN)
     opened = state.pressure[0] == 0
@@ -164,9 +164,9 @@ def test_surfaces_that_never_meet_again(assemble: Callable[..., System]) -> None
     assert state.contact_width[0] == pytest.approx(3 * (30 - 0.4 * 40), abs=4)
 
 
-def test_cycles_to_reach(assemble: Callable[..., System]) -> None:
+def test_cycles_to_reach(assembled: Callable[..., Tribosystem]) -> None:
     """A march that long is as near as asked for, one half as long is not; None beyond the limit."""
-    system = assemble("example1", "geometry.degree=2", "wear.punch.coefficient=4e-7")
+    system = assembled("example1", "geometry.degree=2", "wear.punch.coefficient=4e-7")
     state = steady(system)
     cycles = cycles_to_reach(system, state, 0.05)
     assert cycles is not None

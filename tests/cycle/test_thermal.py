@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import ConvergenceError, System, jump, load_case, march, steady
+from fenwear import ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block, growth_rate
@@ -18,12 +18,12 @@ from fenwear.cycle.jump import cycle_heat
 from fenwear.cycle.moment import Moment
 from fenwear.sliding.wear import Worn
 
-Assemble = Callable[..., System]
+Assemble = Callable[..., Tribosystem]
 MEAN = 1e4 / 600
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 
 
-def run(system: System, half_cycles: int, **options: Any) -> Block:
+def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:
     (block,) = march(system, half_cycles, block=half_cycles, **options)
     return block
 
@@ -43,31 +43,31 @@ def temperatures(block: Block) -> Array:
         ("heat.conductance=perfect", "heat.debris=0.2"),
     ],
 )
-def test_split_and_implicit_agree(assemble: Assemble, settings: tuple[str, ...], relaxation: float) -> None:
+def test_split_and_implicit_agree(assembled: Assemble, settings: tuple[str, ...], relaxation: float) -> None:
     """Both solve the same half-cycle: converged, (29)-(30) and the coupled inequality give the same to 1e-6."""
-    implicit = run(assemble("example1-heat", *COARSE, *settings), 30)
+    implicit = run(assembled("example1-heat", *COARSE, *settings), 30)
     tight = ("heat.coupling=split", "heat.split_tolerance=1e-12", f"heat.relaxation={relaxation}")
-    split = run(assemble("example1-heat", *COARSE, *settings, *tight), 30)
+    split = run(assembled("example1-heat", *COARSE, *settings, *tight), 30)
     assert (implicit.contact_width < 59.5).any()  # nodes open, so that the conductance changes
     np.testing.assert_allclose(split.pressure, implicit.pressure, rtol=0, atol=1e-6 * MEAN)
     np.testing.assert_allclose(temperatures(split), temperatures(implicit), rtol=0, atol=1e-5)
     np.testing.assert_array_equal(split.contact_width, implicit.contact_width)
 
 
-def test_split_tolerance(assemble: Assemble) -> None:
+def test_split_tolerance(assembled: Assemble) -> None:
     """The error of the split falls with its tolerance; the published one (0.01 %) is near 1 % of the pressure."""
-    implicit = run(assemble("example1-heat", *COARSE), 30)
+    implicit = run(assembled("example1-heat", *COARSE), 30)
     errors = []
     for tolerance in (1e-4, 1e-6, 1e-8):
-        system = assemble("example1-heat", *COARSE, "heat.coupling=split", f"heat.split_tolerance={tolerance}")
+        system = assembled("example1-heat", *COARSE, "heat.coupling=split", f"heat.split_tolerance={tolerance}")
         errors.append(np.abs(run(system, 30).pressure - implicit.pressure).max() / MEAN)
     assert 0.03 > errors[0] > 5 * errors[1] > 25 * errors[2]
 
 
-def test_too_much_heat_names_the_half_cycle(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_much_heat_names_the_half_cycle(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
     """Too much heat in a half-cycle, without smaller steps, ends with its number and all that came before."""
     monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
-    system = assemble("example1-heat", *COARSE, "motion.amplitude=20")
+    system = assembled("example1-heat", *COARSE, "motion.amplitude=20")
     done: list[int] = []
     blocks = march(system, 40)
     with pytest.raises(ConvergenceError, match=r"half-cycle \d+: .*did not converge") as failure:
@@ -77,20 +77,22 @@ def test_too_much_heat_names_the_half_cycle(assemble: Assemble, monkeypatch: pyt
     assert done == list(range(1, number))
 
 
-def test_slow_split_gives_advice(assemble: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_slow_split_gives_advice(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
     """A relaxation too small to come to an end in the iterations there are: the error names the key."""
     monkeypatch.setattr("fenwear.cycle.retry.PARTS", ())
     slow = ("heat.relaxation=0.01", "heat.split_tolerance=1e-12")
-    system = assemble("example1-heat", *COARSE, "heat.coupling=split", *slow)
+    system = assembled("example1-heat", *COARSE, "heat.coupling=split", *slow)
     with pytest.raises(ConvergenceError, match=r"half-cycle 1: the operator split.*heat\.relaxation"):
         run(system, 2)
 
 
 @pytest.mark.parametrize("partition", [0.2, 0.5])
-def test_order_in_time_steps(assemble: Assemble, partition: float) -> None:
+def test_order_in_time_steps(assembled: Assemble, partition: float) -> None:
     """1, 5 and 20 steps in a half-cycle: of first order toward 80."""
     ends = [
-        temperatures(run(assemble("example1-heat", *COARSE, f"heat.steps={n}", f"heat.partition={partition}"), 40))[-2:]
+        temperatures(run(assembled("example1-heat", *COARSE, f"heat.steps={n}", f"heat.partition={partition}"), 40))[
+            -2:
+        ]
         for n in (5, 10, 20, 80, 1)
     ]
     errors = np.array([np.abs(end - ends[3]).max() for end in ends])
@@ -101,9 +103,9 @@ def test_order_in_time_steps(assemble: Assemble, partition: float) -> None:
 
 @pytest.mark.parametrize("half_cycles", [400, 2000])
 @pytest.mark.parametrize("settings", [("heat.partition=0.1",), ("heat.partition=0.2", "heat.conducting=nominal")])
-def test_jump_equals_march(assemble: Assemble, settings: tuple[str, ...], half_cycles: int) -> None:
+def test_jump_equals_march(assembled: Assemble, settings: tuple[str, ...], half_cycles: int) -> None:
     """Where the feedback is stable, jumps end where the march ends, and nearer with a smaller tolerance."""
-    system = assemble("example1-heat", *COARSE, "wear.punch.coefficient=4e-8", *settings)
+    system = assembled("example1-heat", *COARSE, "wear.punch.coefficient=4e-8", *settings)
     *_, last = march(system, half_cycles, implicit=True)
     errors = []
     for tolerance in (2e-2, 1e-3):
@@ -117,13 +119,13 @@ def test_jump_equals_march(assemble: Assemble, settings: tuple[str, ...], half_c
 
 
 @pytest.mark.parametrize("coefficient", [4e-7, 4e-6])
-def test_march_tends_to_the_steady_state(assemble: Assemble, coefficient: float) -> None:
+def test_march_tends_to_the_steady_state(assembled: Assemble, coefficient: float) -> None:
     """Where the feedback is stable a march and the direct solve agree, up to the wear between two half-cycles.
 
     Then the run repeats: even and odd half-cycles each keep their pressures and temperatures (Fig. 8d), and
     the mean flux is the same in both directions (31).
     """
-    system = assemble("example1-heat", *COARSE, "heat.partition=0.2", f"wear.punch.coefficient={coefficient}")
+    system = assembled("example1-heat", *COARSE, "heat.partition=0.2", f"wear.punch.coefficient={coefficient}")
     state = steady(system)
     assert growth_rate(system, state.phase_pressure) < 0
     *_, last = march(system, 3000, implicit=True)
@@ -136,14 +138,14 @@ def test_march_tends_to_the_steady_state(assemble: Assemble, coefficient: float)
     assert np.abs(expected[0] - expected[1]).max() > 1
     np.testing.assert_allclose(temperatures(last)[-4:-2], temperatures(last)[-2:], rtol=0, atol=1e-4)
     np.testing.assert_allclose(last.pressure[-4:-2], last.pressure[-2:], rtol=0, atol=2e-6 * MEAN)
-    fluxes = last.pressure[-2:] @ system.facing.weights
+    fluxes = last.pressure[-2:] @ system.pair.weights
     assert fluxes[0] == pytest.approx(fluxes[1], rel=1e-9)
     # Nothing is stored any more, and what is stored in one half-cycle the other one gives back.
     stored = last.heat.terms[-2:, 2].sum()
     assert abs(stored) < 2e-3 * last.heat.terms[-1, 0]
 
 
-def from_steady(system: System, bulge: float = 0.0) -> tuple[Moment, Any]:
+def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[Moment, Any]:
     """Return a moment in the cyclic steady state, its shape disturbed by a parabola (mm at the edges)."""
     state, heat = steady(system), cycle_heat(system)
     assert heat is not None
@@ -151,17 +153,17 @@ def from_steady(system: System, bulge: float = 0.0) -> tuple[Moment, Any]:
     periodic = heat.jump(heat.initial(), np.inf, conductances).state(state.pressure)
     modes = np.zeros((1, 2))
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
-    shape = state.shape + bulge * (system.facing.x / 30) ** 2
-    return Moment(0, Worn(shape, 0 * system.facing.strip.weights), contacts, heat.parts(periodic)), state
+    shape = state.shape + bulge * (system.pair.x / 30) ** 2
+    return Moment(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.parts(periodic)), state
 
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])
 @pytest.mark.parametrize("settings", [(), ("heat.ambient=35", "heat.conductance=perfect")])
 @pytest.mark.mpi
-def test_a_cycle_reproduces_the_steady_state(assemble: Assemble, partition: float, settings: tuple[str, ...]) -> None:
+def test_a_cycle_reproduces_the_steady_state(assembled: Assemble, partition: float, settings: tuple[str, ...]) -> None:
     """Stable or not, the steady state is a fixed point of the march where the wear of a half-cycle is negligible."""
     quiet = ("wear.punch.coefficient=1e-11", f"heat.partition={partition}")
-    system = assemble("example1-heat", *COARSE, *quiet, *settings)
+    system = assembled("example1-heat", *COARSE, *quiet, *settings)
     moment, state = from_steady(system)
     block = run(system, 2, implicit=True, start=moment)
     np.testing.assert_allclose(block.pressure, state.pressure, rtol=0, atol=1e-6 * MEAN)
@@ -171,16 +173,16 @@ def test_a_cycle_reproduces_the_steady_state(assemble: Assemble, partition: floa
 
 
 @pytest.mark.parametrize(("partition", "sign"), [(0.1, -1), (0.5, 1)])
-def test_sign_of_growth(assemble: Assemble, partition: float, sign: int) -> None:
+def test_sign_of_growth(assembled: Assemble, partition: float, sign: int) -> None:
     """Issue 4: Example 1's steady state loses its stability between kappa = 0.1 and 0.5."""
-    system = assemble("example1-heat", *COARSE, f"heat.partition={partition}")
+    system = assembled("example1-heat", *COARSE, f"heat.partition={partition}")
     assert np.sign(growth_rate(system, steady(system).phase_pressure)) == sign
 
 
 @pytest.mark.parametrize("coefficient", [1e-10, 4e-8])
-def test_growth_of_a_disturbance(assemble: Assemble, coefficient: float) -> None:
+def test_growth_of_a_disturbance(assembled: Assemble, coefficient: float) -> None:
     """Two marches beside the unstable steady state part at the rate of the eigenvalue."""
-    system = assemble("example1-heat", *COARSE, f"wear.punch.coefficient={coefficient}")
+    system = assembled("example1-heat", *COARSE, f"wear.punch.coefficient={coefficient}")
     moment, state = from_steady(system)
     rate = growth_rate(system, state.phase_pressure)
     disturbed, _ = from_steady(system, 1e-9)
@@ -194,10 +196,13 @@ def test_growth_of_a_disturbance(assemble: Assemble, coefficient: float) -> None
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="needs several ranks")
 @pytest.mark.parametrize("operator", ["full", "reduced"])
 @pytest.mark.mpi
-def test_ranks_agree(assemble: Assemble, operator: str) -> None:
+def test_ranks_agree(assembled: Assemble, operator: str) -> None:
     """Issue 4: march, jump, steady state and growth rate on these ranks and on one alone, to 1e-8."""
     settings = [*COARSE, f"heat.operator={operator}", "heat.partition=0.2", "heat.initial=-10"]
-    together, alone = assemble("example1-heat", *settings), System(load_case("example1-heat", settings), MPI.COMM_SELF)
+    together, alone = (
+        assembled("example1-heat", *settings),
+        assemble(load_case("example1-heat", settings), MPI.COMM_SELF),
+    )
     for solve in (
         lambda s: run(s, 30).pressure,
         lambda s: temperatures(run(s, 30)),

@@ -33,7 +33,8 @@ import tomli_w
 from bases import base
 from pool import Verdict, verdicts
 
-from fenwear import Case, System, jump, load_case, make_case, march
+from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
+from fenwear.assembly import with_reduced_heat
 from fenwear.bodies.mesh import write_msh
 from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError, MeshQualityError
@@ -260,7 +261,7 @@ def compute(case: Case) -> None:
     last = min(case.run.half_cycles, 2)
     jumps, implicit = case.run.integration == "jump", case.run.integration == "implicit"
 
-    def integrate(system: System, start: Any, leave: Any) -> Iterator[Block]:
+    def integrate(system: Tribosystem, start: Any, leave: Any) -> Iterator[Block]:
         shared: dict[str, Any] = {"start": start, "leave": leave}
         if jumps:
             return jump(
@@ -271,10 +272,10 @@ def compute(case: Case) -> None:
             )
         return march(system, last, implicit=implicit, block=1, **shared)
 
-    def exchange(system: System) -> HeatExchange | None:
-        return system.reduced_exchange if jumps else system.exchange
+    def exchange(system: Tribosystem) -> HeatExchange | None:
+        return with_reduced_heat(system).exchange if jumps else system.exchange
 
-    for block in follow(System(case), integrate, exchange):
+    for block in follow(assemble(case), integrate, exchange):
         for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
                 raise NoResultError("not finite")

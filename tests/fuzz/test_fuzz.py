@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import bases
 import cases
 
-from fenwear import CaseError, System, make_case
+from fenwear import CaseError, assemble, make_case
 from fenwear.case.dependence import evaluate, parse_expression
 from fenwear.errors import FenwearError, Problem
 
@@ -130,7 +130,7 @@ def test_bad_mesh(tmp_path: Path, name: str) -> None:
     lines[node], lines[element] = " ".join(coordinates), " ".join((number, *corners))
     (tmp_path / "own.msh").write_text("\n".join(lines) + "\n")
     with pytest.raises(CaseError, match=expected):
-        System(make_case(cases.mesh_tables(), tmp_path))
+        assemble(make_case(cases.mesh_tables(), tmp_path))
 
 
 def test_doubled_element(tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ def test_doubled_element(tmp_path: Path) -> None:
     lines[rows[3]] = f"{lines[rows[3]].split()[0]} {lines[rows[4]].split(' ', 1)[1]}"
     (tmp_path / "own.msh").write_text("\n".join(lines) + "\n")
     with pytest.raises(CaseError, match="there twice"):
-        System(make_case(cases.mesh_tables(), tmp_path))
+        assemble(make_case(cases.mesh_tables(), tmp_path))
 
 
 # ------------------------------------------------------------------- laws, motions, loads

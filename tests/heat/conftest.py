@@ -10,7 +10,7 @@ import pytest
 from dolfinx.mesh import CellType, create_rectangle, locate_entities, locate_entities_boundary, meshtags
 from mpi4py import MPI
 
-from fenwear import Case, System, make_case
+from fenwear import Case, Tribosystem, assemble, make_case
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Heat, Material, Model
 from fenwear.heat.conduction import HeatBody
@@ -97,12 +97,12 @@ def conducting() -> Callable[..., HeatBody]:
 
 
 @pytest.fixture(scope="session")
-def blocks() -> Callable[..., System]:
+def blocks() -> Callable[..., Tribosystem]:
     """Return blocks(case, **parameters): two rectangles of the same width on each other, from blocks.geo."""
 
-    def blocks(case: dict[str, Any], **parameters: float) -> System:
+    def blocks(case: dict[str, Any], **parameters: float) -> Tribosystem:
         geometry = {"file": "blocks.geo", **case.pop("geometry", {}), "parameters": parameters}
         made: Case = make_case({"geometry": geometry, **case})
-        return System(made)
+        return assemble(made)
 
     return blocks

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from fenwear import CaseError, System, load_case, march, steady
+from fenwear import CaseError, Tribosystem, assemble, load_case, march, steady
+from fenwear.assembly import steady_exchange
 
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 ISOLATED = ("heat.convection=0", "strip.temperatures=[]")
@@ -61,18 +62,18 @@ def test_held_temperature_off_the_body(group: str, expected: str) -> None:
     """A group that is not there, or that takes the friction heat: refused when the geometry is read."""
     case = load_case("example1-heat", [*COARSE, f"strip.temperatures.1={{on='{group}'}}"])
     with pytest.raises(CaseError, match=rf"strip\.temperatures\.1\.on: .*{expected}"):
-        System(case)
+        assemble(case)
 
 
 @pytest.mark.parametrize("settings", [ISOLATED, ("heat.convection=0",)])
 @pytest.mark.mpi
-def test_isolated_body_has_no_steady_state(assemble: Callable[..., System], settings: tuple[str, ...]) -> None:
+def test_isolated_body_has_no_steady_state(assembled: Callable[..., Tribosystem], settings: tuple[str, ...]) -> None:
     """Without any heat sink no temperature is steady; for some half-cycles there is no need of one."""
-    system = assemble("example1-heat", *COARSE, *settings)
+    system = assembled("example1-heat", *COARSE, *settings)
     with pytest.raises(CaseError, match=r"heat\.convection: the punch loses heat nowhere"):
         steady(system)
     with pytest.raises(CaseError, match=r"heat\.convection: the punch loses heat nowhere"):
-        system.steady_exchange([9.5])
+        steady_exchange(system, [9.5])
     (block,) = march(system, 4)
     assert block.heat.max_temperature[-1] > 0
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import System, jump, march
+from fenwear import Tribosystem, jump, march
 from fenwear.arrays import Array
+from fenwear.assembly import steady_exchange
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
 
@@ -44,9 +45,9 @@ def stack(heat: dict[str, Any], held: tuple[bool, bool] = (True, True)) -> dict[
     }
 
 
-def steady_contact(system: System, velocity: float, pressure: Array) -> tuple[Array, Array]:
+def steady_contact(system: Tribosystem, velocity: float, pressure: Array) -> tuple[Array, Array]:
     """Return the temperatures of the contact surfaces in the steady state at these pressures."""
-    exchange = system.steady_exchange([velocity])
+    exchange = steady_exchange(system, [velocity])
     state, _ = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
     return exchange.contact_temperatures(state)
 
@@ -87,13 +88,13 @@ def test_open_nodes(blocks: Make, conducting: str) -> None:
     }
     sizes = {"width": 60, "across": 20, "punch_layers": 3, "strip_layers": 3}
     system = blocks(stack(heat), punch_height=HEIGHTS[0], strip_height=HEIGHTS[1], **sizes)
-    found = steady_contact(system, 0.0, np.zeros(len(system.facing.x)))
+    found = steady_contact(system, 0.0, np.zeros(len(system.pair.x)))
     if conducting == "nominal":
         exact = in_series(conductance, 0.0, 0.5)
     else:
         biot = [h * height / k for height, k in zip(HEIGHTS, CONDUCTIVITIES, strict=True)]
         exact = tuple((t + b * ambient) / (1 + b) for t, b in zip(FAR, biot, strict=True))
-    middle = len(system.facing.x) // 2
+    middle = len(system.pair.x) // 2
     assert (found[0][middle], found[1][middle]) == pytest.approx(exact, rel=1e-5)
 
 
@@ -109,7 +110,7 @@ def test_one_step_shares_the_heat(blocks: Make) -> None:
         material["conductivity"] = 1e6
     system = blocks(case, punch_height=HEIGHTS[0], strip_height=HEIGHTS[1])
     exchange, heat, dt = system.exchange, FRICTION * PRESSURE * SPEED, 0.5
-    pressure = np.full(len(system.facing.x), PRESSURE)
+    pressure = np.full(len(system.pair.x), PRESSURE)
     state, terms = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
     t = np.array([15.0, 15.0])
     capacity, between = np.diag(HEIGHTS) / dt, 0.7 * np.array([[1, -1], [-1, 1]])
@@ -144,28 +145,28 @@ def check_balance(block: Block) -> None:
     # The friction heat is mu F0 times the sliding distance, whatever the pressure; mJ.
     system = block.system
     np.testing.assert_allclose(friction, 0.25 * 1e4 * system.motion.sliding()[0], rtol=1e-9)
-    np.testing.assert_allclose(rest[0], system.case.heat.debris * friction, rtol=1e-12)
+    np.testing.assert_allclose(rest[0], system.heat.debris * friction, rtol=1e-12)
 
 
 @pytest.mark.parametrize("run", ["march", "split", "jump"])
 @pytest.mark.parametrize("operator", ["reduced", "full"])
 @pytest.mark.parametrize("name", EXCHANGES)
 @pytest.mark.mpi
-def test_heat_balance(assemble: Make, name: str, operator: str, run: str) -> None:
+def test_heat_balance(assembled: Make, name: str, operator: str, run: str) -> None:
     """Verification 16: friction work = debris + stored + convected + held + carried in every half-cycle, to 1e-8."""
     coupling = "split" if run == "split" else "implicit"
     settings = (f"heat.operator={operator}", f"heat.coupling={coupling}", "heat.partition=0.2")
-    system = assemble("example1-heat", *COARSE, *settings, *EXCHANGES[name])
+    system = assembled("example1-heat", *COARSE, *settings, *EXCHANGES[name])
     for block in jump(system, 2000, tolerance=1e-2) if run == "jump" else march(system, 12, implicit=True):
         check_balance(block)
 
 
 @pytest.mark.parametrize("velocity", [-200.0, 9.5])
 @pytest.mark.parametrize("name", ["as published", "warm", "perfect"])
-def test_power_balance_of_a_steady_state(assemble: Make, name: str, velocity: float) -> None:
+def test_power_balance_of_a_steady_state(assembled: Make, name: str, velocity: float) -> None:
     """Verification 16 of the steady state: friction power = convected + held + carried, nothing stored."""
-    system = assemble("example1-heat", *COARSE, "heat.partition=0.2", "heat.debris=0.1", *EXCHANGES[name])
-    exchange = system.steady_exchange([velocity])
+    system = assembled("example1-heat", *COARSE, "heat.partition=0.2", "heat.debris=0.1", *EXCHANGES[name])
+    exchange = steady_exchange(system, [velocity])
     pressure = system.optimum(1 if velocity > 0 else -1).pressure
     _, terms = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
     assert terms[0] == pytest.approx(0.25 * 1e4 * abs(velocity), rel=1e-9)  # mu F0 v

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import newton
 
-from fenwear import System
+from fenwear import Tribosystem
 from fenwear.cycle import growth_rate
 
 Make = Callable[..., Any]
@@ -40,7 +40,7 @@ def euler(s: complex, duration: float) -> float:
 
 
 @pytest.fixture(scope="module")
-def conductor(blocks: Make) -> Callable[..., System]:
+def conductor(blocks: Make) -> Callable[..., Tribosystem]:
     """Return conductor(speed, ...): a punch in full contact, held in x and insulated at its sides."""
     rigid = {"young": 1e14, "poisson": 0.0, "conductivity": 1e-9, "heat_capacity": 1e9, "density": 1e-9}
     punch = {"young": YOUNG, "poisson": POISSON, "conductivity": K, "heat_capacity": RHO_C / 1e-9, "density": 1e-9}
@@ -52,7 +52,7 @@ def conductor(blocks: Make) -> Callable[..., System]:
         duration: float = 0.05,
         partition: float = 1.0,
         wear: float = 0.0,
-    ) -> System:
+    ) -> Tribosystem:
         case = {
             "geometry": {"degree": degree},
             "model": {"plane": "strain"},
@@ -100,5 +100,5 @@ def test_wear_slows_the_growth(conductor: Make, share: float, start: complex) ->
     assert expected.real < (1 - share) * alone
     assert (abs(expected.imag) > 0.1 * alone) == (share > 0.1)
     system = conductor(speed, duration=duration, wear=coefficient)
-    found = growth_rate(system, np.ones((1, len(system.facing.x))))
+    found = growth_rate(system, np.ones((1, len(system.pair.x))))
     assert found == pytest.approx(euler(expected, duration), rel=1e-3)

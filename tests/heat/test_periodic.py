@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import System
+from fenwear import Tribosystem
 from fenwear.arrays import Array
 from fenwear.cycle.jump import cycle_heat
 from fenwear.heat.exchange import State
@@ -18,13 +18,13 @@ WARM = ("heat.initial=-10", "heat.ambient=35", "strip.temperatures=[{on='strip_b
 
 
 @pytest.fixture(params=["reciprocating", "one-way"])
-def heat(request: pytest.FixtureRequest, assemble: Callable[..., System]) -> tuple[CycleHeat, Array, Array]:
+def heat(request: pytest.FixtureRequest, assembled: Callable[..., Tribosystem]) -> tuple[CycleHeat, Array, Array]:
     """Return the maps of cycles, pressures of the phases with open nodes, and the conductances there."""
     one_way = ("motion={kind='one-way', direction='leftward', speed=9.5, duration=3}",)
-    system = assemble("example1-heat", *COARSE, *WARM, *(one_way if request.param == "one-way" else ()))
+    system = assembled("example1-heat", *COARSE, *WARM, *(one_way if request.param == "one-way" else ()))
     cycles = cycle_heat(system)
     assert cycles is not None
-    x = system.facing.x
+    x = system.pair.x
     pressure = np.array([np.maximum(17 + d * x, 0.0) for d in system.motion.directions])
     return cycles, pressure, cycles.conductances(pressure)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import System, march
+from fenwear import Tribosystem, march
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 
@@ -19,7 +19,7 @@ WARM = (
 )
 
 
-def run(system: System) -> Block:
+def run(system: Tribosystem) -> Block:
     (block,) = march(system, 100, block=100)
     return block
 
@@ -31,23 +31,23 @@ def temperatures(block: Block) -> Array:
 
 @pytest.mark.parametrize("settings", [(), WARM, ("heat.conductance=perfect", "heat.partition=0.3")])
 @pytest.mark.mpi
-def test_reduced_equals_full(assemble: Callable[..., System], settings: tuple[str, ...]) -> None:
+def test_reduced_equals_full(assembled: Callable[..., Tribosystem], settings: tuple[str, ...]) -> None:
     """Issue 4: contact temperatures within 0.1 K over 100 coupled half-cycles, with a fraction of the unknowns."""
-    full = assemble("example1-heat", *COARSE, *settings, "heat.operator=full")
-    reduced = assemble("example1-heat", *COARSE, *settings)
-    sizes = [sum(system.comm.allreduce(body.owned) for body in system.heat_bodies) for system in (full, reduced)]
+    full = assembled("example1-heat", *COARSE, *settings, "heat.operator=full")
+    reduced = assembled("example1-heat", *COARSE, *settings)
+    sizes = [sum(system.comm.allreduce(body.owned) for body in system.bodies.heat) for system in (full, reduced)]
     assert sum(len(state) for state in reduced.exchange.initial()) < sizes[0] / 5
     expected, found = run(full), run(reduced)
     assert np.ptp(temperatures(expected)) > 12
     np.testing.assert_allclose(temperatures(found), temperatures(expected), rtol=0, atol=0.1)
 
 
-def test_error_follows_the_tolerance(assemble: Callable[..., System]) -> None:
+def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> None:
     """A smaller tolerance keeps more of the basis, and the error falls with it."""
-    expected = temperatures(run(assemble("example1-heat", *COARSE, "heat.operator=full")))
+    expected = temperatures(run(assembled("example1-heat", *COARSE, "heat.operator=full")))
     errors, sizes = [], []
     for tolerance in (1e-2, 1e-3, 1e-4, 1e-6):
-        system = assemble("example1-heat", *COARSE, f"heat.reduction_tolerance={tolerance}")
+        system = assembled("example1-heat", *COARSE, f"heat.reduction_tolerance={tolerance}")
         errors.append(np.abs(temperatures(run(system)) - expected).max())
         sizes.append(len(system.exchange.initial()[0]))
     assert sizes == sorted(set(sizes))
@@ -55,12 +55,14 @@ def test_error_follows_the_tolerance(assemble: Callable[..., System]) -> None:
     assert errors[3] < 2e-3 < errors[2]
 
 
-def test_steady_state_is_in_the_basis(assemble: Callable[..., System]) -> None:
+def test_steady_state_is_in_the_basis(assembled: Callable[..., Tribosystem]) -> None:
     """Long times too: half-cycles without number end at the same temperatures."""
     ends = []
     for operator in ("full", "reduced"):
-        system = assemble("example1-heat", *COARSE, *WARM, "motion.angular_frequency=0.01", f"heat.operator={operator}")
-        exchange, pressure = system.exchange, np.full(len(system.facing.x), 5.0)
+        system = assembled(
+            "example1-heat", *COARSE, *WARM, "motion.angular_frequency=0.01", f"heat.operator={operator}"
+        )
+        exchange, pressure = system.exchange, np.full(len(system.pair.x), 5.0)
         state = exchange.initial()
         for half_cycle in range(200):  # of 314 s each
             state, _ = exchange.half_cycle(state, half_cycle % 2, pressure, exchange.conductance(pressure))

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import System, march
+from fenwear import Tribosystem, march
 from fenwear.results.fields import body_fields, write_fields
 
 COARSE = ("geometry.degree=3", "geometry.parameters.elements_along_contact=8")
 
 
-def write(system: System, folder: Path, half_cycles: int) -> xarray.Dataset:
+def write(system: Tribosystem, folder: Path, half_cycles: int) -> xarray.Dataset:
     """March, write the fields of the last half-cycle, and read them back."""
     *_, block = march(system, half_cycles)
     temperatures = None
@@ -36,21 +36,21 @@ def surface(data: xarray.Dataset, body: str, name: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["example1", "example1-heat"])
-def test_fields_close_the_gap(assemble: Callable[..., System], tmp_path: Path, name: str) -> None:
+def test_fields_close_the_gap(assembled: Callable[..., Tribosystem], tmp_path: Path, name: str) -> None:
     """The displacements of the whole bodies give the gap that the condensed inequality found."""
-    system = assemble(name, *COARSE)
+    system = assembled(name, *COARSE)
     data = write(system, tmp_path, 21)
     *_, block = march(system, 21)
     opened = surface(data, "punch", "displacement_z") - surface(data, "strip", "displacement_z")
-    found = opened + system.facing.initial_gap + block.wear[-2]
+    found = opened + system.pair.initial_gap + block.wear[-2]
     np.testing.assert_allclose(found, block.gap[-1], rtol=0, atol=1e-12)
     if block.heat is not None:
         np.testing.assert_allclose(surface(data, "punch", "temperature"), block.heat.temperature_punch[-1], atol=1e-9)
 
 
-def test_cells_tile_the_bodies(assemble: Callable[..., System], tmp_path: Path) -> None:
+def test_cells_tile_the_bodies(assembled: Callable[..., Tribosystem], tmp_path: Path) -> None:
     """The linear cells between the nodes cover 60 x 100 and 1140 x 100 mm²."""
-    data = write(assemble("example1", *COARSE), tmp_path, 1)
+    data = write(assembled("example1", *COARSE), tmp_path, 1)
     for body, area in (("punch", 6000), ("strip", 114000)):
         corners = data[f"{body}_cells"].values
         x, z = data[f"{body}_x"].values[corners], data[f"{body}_z"].values[corners]
@@ -60,10 +60,10 @@ def test_cells_tile_the_bodies(assemble: Callable[..., System], tmp_path: Path) 
 
 @pytest.mark.parametrize(("plane", "expected"), [("stress", 1.0), ("strain", np.sqrt(1 - 0.3 + 0.3**2))])
 def test_von_mises_of_a_uniaxial_load(
-    assemble: Callable[..., System], tmp_path: Path, plane: str, expected: float
+    assembled: Callable[..., Tribosystem], tmp_path: Path, plane: str, expected: float
 ) -> None:
     """Far from the contact the punch is under 16.667 MPa alone: sigma_yy = 0, or nu sigma in plane strain."""
     settings = ("contact.friction=0", "geometry.parameters.punch_height=300", f"model.plane={plane}")
-    data = write(assemble("example2", *COARSE, *settings), tmp_path, 1)
+    data = write(assembled("example2", *COARSE, *settings), tmp_path, 1)
     middle = np.abs(data.punch_z - 300) < 25
     np.testing.assert_allclose(data.punch_von_mises[middle], expected * 1e4 / 600, rtol=2e-3)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import CaseError, ConvergenceError, System, load_case, march, run
+from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
 from fenwear.report.figures import mean_pressure, nominal_width, open_history
 from fenwear.results.history import free_directory, make_directory
 from fenwear.run import run_case
@@ -27,7 +27,7 @@ def save(folder: Path, *settings: str, name: str = "example1") -> tuple[xarray.D
 
 
 @pytest.mark.parametrize("integration", ["explicit", "implicit", "jump"])
-def test_history_is_what_was_computed(assemble: Callable[..., System], tmp_path: Path, integration: str) -> None:
+def test_history_is_what_was_computed(assembled: Callable[..., Tribosystem], tmp_path: Path, integration: str) -> None:
     """Every variable has units and a long name, no value is missing, and the dimensions are those of the design."""
     history, summary = save(tmp_path / "run", f"run.integration='{integration}'", "run.half_cycles=30")
     for name, variable in history.variables.items():
@@ -41,7 +41,7 @@ def test_history_is_what_was_computed(assemble: Callable[..., System], tmp_path:
     np.testing.assert_allclose((history.pressure * history.weight).sum("x"), 1000, rtol=1e-8)
     np.testing.assert_allclose(history.worn_area, 4e-7 * 1e4 * 3 / 10, rtol=1e-10)
     if integration != "jump":
-        system = assemble("example1", *SMALL)
+        system = assembled("example1", *SMALL)
         (block,) = march(system, 30, implicit=integration == "implicit")
         np.testing.assert_array_equal(history.pressure, block.pressure)
         np.testing.assert_array_equal(history.wear, block.wear)
@@ -148,7 +148,7 @@ def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypa
     """A solver that fails after two blocks: history, summary and figures of what was computed, and the error."""
     case = load_case("example1", [*SMALL, "run.half_cycles=1000"])
 
-    def failing(system: System, half_cycles: int, **options: object):  # type: ignore[no-untyped-def]
+    def failing(system: Tribosystem, half_cycles: int, **options: object):  # type: ignore[no-untyped-def]
         for number, block in enumerate(march(system, half_cycles)):
             if number == 2:
                 raise ConvergenceError("DIVERGED_ON_PURPOSE")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import CaseError, System, load_case
+from fenwear import CaseError, Tribosystem, load_case
 from fenwear.arrays import Array
 from fenwear.case import Contact, Dependence, WearLaw
 from fenwear.sliding.friction import ContactConditions, Friction
@@ -26,20 +26,20 @@ def conditions(pressure: Array, speed: float = 2.0, temperature: float = 300.0) 
 
 
 @pytest.mark.parametrize("b", [0.5, 1.0, 2.0, 3.0])
-def test_depth(assemble: Callable[..., System], b: float) -> None:
+def test_depth(assembled: Callable[..., Tribosystem], b: float) -> None:
     """w = beta~ p^b S, node by node, and none where there is no pressure; equations (1), (26)."""
-    system = assemble("example1", f"wear.punch={{coefficient=2e-8, pressure_exponent={b}}}")
-    n = len(system.facing.x)
+    system = assembled("example1", f"wear.punch={{coefficient=2e-8, pressure_exponent={b}}}")
+    n = len(system.pair.x)
     p = np.stack([np.linspace(0, 9, n), np.linspace(5, 0, n)])
     np.testing.assert_allclose(system.phases_wear.depth(p), 6e-8 * p**b, rtol=1e-13)
     assert system.phases_wear.worn(p).strip.max() == 0
 
 
-def test_layer_and_its_border(assemble: Callable[..., System]) -> None:
+def test_layer_and_its_border(assembled: Callable[..., Tribosystem]) -> None:
     """The layer opens the gap by N cycles' wear of both bodies; L_k R_j is its derivative (central differences)."""
-    system = assemble("example1", *BOTH)
+    system = assembled("example1", *BOTH)
     layer = WornLayer(system.phases_wear, repeats=50)
-    shape = (len(system.motion.phases), len(system.facing.x))
+    shape = (len(system.motion.phases), len(system.pair.x))
     random = np.random.default_rng(1)
     p, change = random.uniform(1, 20, shape), random.uniform(-1, 1, shape)
     left, right = layer.border(p)
@@ -49,22 +49,22 @@ def test_layer_and_its_border(assemble: Callable[..., System]) -> None:
     np.testing.assert_allclose(derivative, difference, rtol=1e-6, atol=1e-6 * np.abs(difference).max())
 
 
-def test_strip_loses_what_its_pressure_wears(assemble: Callable[..., System]) -> None:
+def test_strip_loses_what_its_pressure_wears(assembled: Callable[..., Tribosystem]) -> None:
     """The cross-section worn off the strip is the integral of beta~ p^b S, at every offset."""
-    system = assemble("example1", *BOTH)
-    p = np.random.default_rng(2).uniform(1, 20, (len(system.motion.phases), len(system.facing.x)))
+    system = assembled("example1", *BOTH)
+    p = np.random.default_rng(2).uniform(1, 20, (len(system.motion.phases), len(system.pair.x)))
     worn = system.phases_wear.worn(p)
     sliding = np.array([phase.distance for phase in system.motion.phases])
-    exact = 2e-8 * (sliding[:, None] * p**2) @ system.facing.weights
-    assert system.facing.strip.weights @ worn.strip == pytest.approx(exact.sum(), rel=1e-13)
+    exact = 2e-8 * (sliding[:, None] * p**2) @ system.pair.weights
+    assert system.pair.strip.weights @ worn.strip == pytest.approx(exact.sum(), rel=1e-13)
     assert system.phases_wear.worn_area(p)[1] == pytest.approx(exact.sum(), rel=1e-13)
 
 
-def test_uniform_pressure_wears_the_strip_evenly(assemble: Callable[..., System]) -> None:
+def test_uniform_pressure_wears_the_strip_evenly(assembled: Callable[..., Tribosystem]) -> None:
     """Where the punch stands in every position the track is flat, though no node meets another: a patch test."""
-    system = assemble("example1", *BOTH)
-    p = np.full((len(system.motion.phases), len(system.facing.x)), 10.0)
-    worn, x = system.phases_wear.worn(p), system.facing.strip.x[:, 0]
+    system = assembled("example1", *BOTH)
+    p = np.full((len(system.motion.phases), len(system.pair.x)), 10.0)
+    worn, x = system.phases_wear.worn(p), system.pair.strip.x[:, 0]
     always = np.abs(x) < 25
     np.testing.assert_allclose(worn.strip[always], 2e-8 * 100 * 6, rtol=1e-12)
     assert worn.strip[np.abs(x) > 33].max() == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -9,15 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from scipy.sparse import csr_array
 
-from fenwear import System, system
-from fenwear.bodies import elasticity
-from fenwear.bodies.elasticity import ElasticBody
-from fenwear.case import Model
-from fenwear.contact import CondensedContact, Sliding
+from fenwear import Tribosystem, assembly
+from fenwear.bodies import material
+from fenwear.bodies.material import Isotropic
+from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import TERMS, HeatExchange
-from fenwear.interface import Facing, Interface, Statics, facing, interpolation
+from fenwear.interface import ContactPair, Interface, RigidEquilibrium, interpolation
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.wear import Wear
 from fenwear.verify import registered, run_cases
@@ -49,61 +50,68 @@ def opposite_friction(patch: Patch) -> None:
 
 def opposite_moment(patch: Patch) -> None:
     """Moment of the friction with the other sign."""
-    right = Statics.equilibrium
-    patch.setattr(Statics, "equilibrium", lambda self, slip: right(self, -slip))
+    right = RigidEquilibrium.equilibrium
+    patch.setattr(RigidEquilibrium, "equilibrium", lambda self, slip: right(self, -slip))
 
 
 def punch_without_poisson(patch: Patch) -> None:
     """The punch in plane stress, so that E* lacks its 1 - nu²."""
-    right = ElasticBody.__init__
+    right = assembly.isotropic
 
-    def init(self: ElasticBody, body: Any, description: Any, materials: Any, model: Model, degree: int) -> None:
-        flat = model.model_copy(update={"plane": "stress"}) if body.name == "punch" else model
-        right(self, body, description, materials, flat, degree)
+    def isotropic(body: Any, regions: Any, materials: Any, kind: Any) -> Isotropic:
+        return right(body, regions, materials, "stress" if body.name == "punch" else kind)
 
-    patch.setattr(ElasticBody, "__init__", init)
+    patch.setattr(assembly, "isotropic", isotropic)
 
 
 def lame_of_the_other_plane(patch: Patch) -> None:
     """Plane stress for plane strain, and the other way round."""
-    right = elasticity.lame
+    right = material.lame
     other = {"stress": "strain", "strain": "stress"}
-    patch.setattr(elasticity, "lame", lambda young, poisson, plane: right(young, poisson, other[plane]))
+    patch.setattr(material, "lame", lambda young, poisson, plane: right(young, poisson, other[plane]))
+
+
+def _pairs_with(patch: Patch, change: Callable[[ContactPair], dict[str, Any]]) -> None:
+    right = assembly.pair
+
+    def pair(*surfaces: Any) -> ContactPair:
+        found = right(*surfaces)
+        return replace(found, **change(found))
+
+    patch.setattr(assembly, "pair", pair)
 
 
 def even_weights(patch: Patch) -> None:
     """Nodes that all stand for the same length."""
-    patch.setattr(Facing, "weights", property(lambda self: np.full_like(self.punch.weights, self.punch.weights.mean())))
+    _pairs_with(patch, lambda pair: {"weights": np.full_like(pair.weights, pair.weights.mean())})
 
 
 def smaller_gap(patch: Patch) -> None:
     """Distances of the geometry one per cent too small."""
-    right = system.face
-
-    def face(punch: Any, strip: Any) -> Facing:
-        found = right(punch, strip)
-        return replace(found, initial_gap=0.99 * found.initial_gap)
-
-    patch.setattr(system, "face", face)
+    _pairs_with(patch, lambda pair: {"initial_gap": 0.99 * pair.initial_gap})
 
 
 def strip_wears_where_it_meets(patch: Patch) -> None:
     """Depths put on the strip's nodes by interpolation, which keeps no area."""
 
-    def to_strip(self: Facing) -> Any:
-        return interpolation(self.x, self.punch.degree, self.strip.x[:, 0])
+    def deposit(self: ContactPair) -> Any:
+        return csr_array(interpolation(self.x, self.punch.degree, self.strip.x[:, 0]))
 
-    patch.setattr(Facing, "to_strip", property(to_strip))
+    patch.setattr(ContactPair, "deposit", property(deposit))
 
 
 def strip_does_not_wear(patch: Patch) -> None:
     """The strip's wear forgotten in the gap."""
-    patch.setattr(Facing, "opening", lambda self, punch, strip: punch)
+    patch.setattr(ContactPair, "opening", lambda self, punch, strip: punch)
 
 
 def collocated(patch: Patch) -> None:
     """Values picked at the punch's nodes in place of the mortar."""
-    patch.setattr(facing, "transfer_matrix", lambda x, degree, other, own: interpolation(other, own, x))
+
+    def transfer(first: Any, second: Any, _: Any) -> Any:
+        return csr_array(interpolation(second.s[:, 0], second.degree, first.s[:, 0]))
+
+    patch.setattr(sys.modules["fenwear.interface.pair"], "dual_transfer", transfer)
 
 
 def half_distance(patch: Patch) -> None:
@@ -154,11 +162,14 @@ def other_share(patch: Patch) -> None:
 def thermal_modulus_without_poisson(patch: Patch) -> None:
     """E alpha in place of E alpha / (1 - nu) and E alpha / (1 - 2 nu)."""
 
-    def modulus(self: ElasticBody, materials: Any) -> Any:
-        used = {region: materials[name] for region, name in self._regions.items()}
-        return elasticity.region_field(self.body, {r: m.young * (m.expansion or 0.0) for r, m in used.items()})
+    right = assembly.isotropic
 
-    patch.setattr(ElasticBody, "thermal_modulus", modulus)
+    def isotropic(body: Any, regions: Any, materials: Any, kind: Any) -> Isotropic:
+        of_region = {region: materials[name] for region, name in regions.items()}
+        modulus = {r: m.young * (m.expansion or 0.0) for r, m in of_region.items()}
+        return replace(right(body, regions, materials, kind), thermal_modulus=material.region_field(body, modulus))
+
+    patch.setattr(assembly, "isotropic", isotropic)
 
 
 def material_the_other_way(patch: Patch) -> None:
@@ -240,11 +251,11 @@ def test_it_is_found(monkeypatch: pytest.MonkeyPatch, name: str, break_it: Calla
 def test_ranks_that_differ_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """A friction that depends on the number of ranks, by a part in a million."""
 
-    def contact(self: System, directions: tuple[int, ...]) -> CondensedContact:
+    def contact(self: Tribosystem, directions: tuple[int, ...]) -> CondensedContact:
         return CondensedContact(
-            [Sliding(self.interface, self.slip(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
+            [SlidingContact(self.interface, self.friction_ratio(d) * (1 + 1e-6 * self.comm.size)) for d in directions]
         )
 
-    monkeypatch.setattr(System, "contact", contact)
+    monkeypatch.setattr(Tribosystem, "contact", contact)
     (outcome,) = run_cases(registered(["ranks"]))
     assert outcome.verdict == "differs"

@@ -11,10 +11,10 @@ import ufl
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from fenwear import System, load_case
+from fenwear import Tribosystem, assemble, load_case
 from fenwear.bodies import elasticity
+from fenwear.bodies.condensation import CondensedBody, condense
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.surface import condense, surface_nodes
 from fenwear.interface import interpolation
 
 SMALL = ("geometry.parameters.elements_along_contact=8",)
@@ -36,49 +36,60 @@ def solve_directly(body: ElasticBody, traction: Callable[[ufl.SpatialCoordinate]
     return solution
 
 
+UP = np.array([0.0, 1.0])
+
+
+def condensed(body: ElasticBody) -> CondensedBody:
+    """Condense a body onto its contact nodes, with forces along z."""
+    return condense(body, body.surface.spread, np.broadcast_to(UP, body.surface.x.shape))
+
+
 @pytest.mark.parametrize("name", ["punch", "strip"])
 @pytest.mark.mpi
-def test_compliance_is_symmetric_and_positive(assemble: Callable[..., System], name: str) -> None:
+def test_compliance_is_symmetric_and_positive(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Maxwell and Betti, and the work of any pressure is positive."""
-    body = getattr(assemble("example1", *SMALL), name)
-    matrix = condense(body, surface_nodes(body)).normal_by_normal
-    np.testing.assert_array_equal(matrix, matrix.T)
+    body = getattr(assembled("example1", *SMALL).bodies, name)
+    matrix = condensed(body).response[:, 1, :, 0]
+    np.testing.assert_allclose(matrix, matrix.T, rtol=0, atol=1e-14 * np.abs(matrix).max())
     assert np.linalg.eigvalsh(matrix).min() > 1e-6 * np.abs(matrix).max()
 
 
+@pytest.mark.parametrize("every_axis", [False, True])
 @pytest.mark.parametrize("kind", ["normal", "tangential"])
 @pytest.mark.parametrize("name", ["punch", "strip"])
 @pytest.mark.mpi
-def test_compliance_equals_a_direct_solve(assemble: Callable[..., System], name: str, kind: str) -> None:
-    """D_nn W p and D_nt W p are the normal displacement under that traction, integrated consistently and solved by CG.
+def test_compliance_equals_a_direct_solve(
+    assembled: Callable[..., Tribosystem], name: str, kind: str, every_axis: bool
+) -> None:
+    """The displacement along z under a traction along z or x, integrated consistently and solved by CG.
 
-    Lumping at Gauss-Lobatto nodes is exact for p of degree k - 1 (here 3).
+    Condensed along z alone, where it follows by symmetry, or along every axis. Lumping at Gauss-Lobatto
+    nodes is exact for p of degree k - 1 (here 3).
     """
-    body = getattr(assemble("example1", *SMALL), name)
-    surface = condense(body, nodes := surface_nodes(body))
+    body = getattr(assembled("example1", *SMALL).bodies, name)
+    surface = body.surface
 
     def p(x):  # type: ignore[no-untyped-def]
         return 5 + x / 10 - (x / 20) ** 2 + (x / 30) ** 3
 
-    into_punch = nodes.normal[0, 1]
-    assert into_punch == pytest.approx(1)
     axis = (0, 1) if kind == "normal" else (1, 0)
     direct = solve_directly(body, lambda x: ufl.as_vector([c * p(x[0]) for c in axis]))
-    start, stop = body.space.dofmap.index_map.local_range
-    displacement = np.zeros(len(nodes.block))
-    own = (nodes.block >= start) & (nodes.block < stop)
-    displacement[own] = direct.array_r[2 * (nodes.block[own] - start) + 1]
-    displacement = body.body.mesh.comm.allreduce(displacement)
-    matrix = surface.normal_by_normal if kind == "normal" else surface.normal_by_tangential
-    condensed = matrix @ (nodes.weights * p(nodes.x[:, 0]))
-    np.testing.assert_allclose(condensed, displacement, rtol=0, atol=1e-8 * np.abs(displacement).max())
+    displacement = body.trace.pick(direct.array_r[:, None])[:, 1, 0]
+    found = condense(body, surface.spread) if every_axis else condensed(body)
+    along = found.normal_response(np.broadcast_to(UP, surface.x.shape)) @ np.array(axis, dtype=float)
+    np.testing.assert_allclose(
+        along @ (surface.weights * p(surface.x[:, 0])),
+        displacement,
+        rtol=0,
+        atol=1e-8 * np.abs(displacement).max(),
+    )
 
 
 @pytest.mark.parametrize("degree", range(1, 9))
 @pytest.mark.mpi
-def test_weights_integrate_polynomials(assemble: Callable[..., System], degree: int) -> None:
+def test_weights_integrate_polynomials(assembled: Callable[..., Tribosystem], degree: int) -> None:
     """Gauss-Lobatto with degree + 1 nodes: exact up to degree 2 k - 1, positive; the interval is [-30, 30]."""
-    nodes = surface_nodes(assemble("example1", *SMALL, f"geometry.degree={degree}").punch)
+    nodes = assembled("example1", *SMALL, f"geometry.degree={degree}").bodies.punch.surface
     assert (nodes.weights > 0).all()
     xi = nodes.x[:, 0] / 30
     for power in range(2 * degree):
@@ -104,9 +115,9 @@ def test_further_supports_carry_nothing(name: str, monkeypatch: pytest.MonkeyPat
     """The supports that make K regular are arbitrary: others give the same pressure and the same gap."""
 
     def solve() -> tuple[set[int], NDArray[np.float64], NDArray[np.float64]]:
-        system = System(load_case(name, [*SMALL, "contact.friction=0.4", "geometry.parameters.pin_height_1=40"]))
-        state = system.contact((1,)).solve(system.facing.initial_gap + 1e-4 * np.cos(system.facing.x))
-        return set(system.punch.supported.tolist()), state.pressure, state.gap
+        system = assemble(load_case(name, [*SMALL, "contact.friction=0.4", "geometry.parameters.pin_height_1=40"]))
+        state = system.contact((1,)).solve(system.pair.initial_gap + 1e-4 * np.cos(system.pair.x))
+        return set(system.bodies.punch.supported.tolist()), state.pressure, state.gap
 
     best_rows = elasticity._best_rows
     supported, pressure, gap = solve()

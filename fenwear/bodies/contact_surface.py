@@ -1,0 +1,262 @@
+"""The contact surface of a body: its trace as a small mesh, the same on every rank.
+
+Displacements and temperatures live on the trace nodes, pressures and heat fluxes on the pressure
+nodes. They are the same nodes where the shape functions of the trace have positive integrals at
+Gauss-Lobatto nodes: on lines and quadrilaterals of any degree. Quadratic triangles have integrals of
+zero at their vertices; there the pressure lives on the vertices alone, in the dual piecewise linear
+basis psi_i = 4 lambda_i - 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import basix
+import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.mesh import BodyMesh
+
+CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
+
+
+@dataclass(frozen=True)
+class ContactSurface:
+    """The contact surface of a body in d dimensions, with N trace nodes and n pressure nodes.
+
+    Attributes:
+        body: Name of the body.
+        trace: Coordinates of the trace nodes (N, d), mm, in ascending order of x, then y, then z.
+        facets: Trace nodes of each facet (f, k), in the order of the Lagrange element on `cell`.
+        cell: "interval", "triangle" or "quadrilateral".
+        degree: Polynomial degree of the trace.
+        nodes: Trace nodes that carry a pressure (n,).
+        weights: Integrals of the pressure nodes' functions over the surface (n,), all positive; mm in
+            the plane, mm² in a solid and in an axisymmetric body.
+        outward: Unit normals out of the body at the pressure nodes (n, d).
+        spread: Forces at the trace nodes from a unit force at each pressure node (N, n).
+    """
+
+    body: str
+    trace: Array
+    facets: NDArray[np.int64]
+    cell: str
+    degree: int
+    nodes: NDArray[np.int64]
+    weights: Array
+    outward: Array
+    spread: csr_array
+
+    @cached_property
+    def x(self) -> Array:
+        """Coordinates of the pressure nodes (n, d), mm."""
+        return self.trace[self.nodes]
+
+    @property
+    def dim(self) -> int:
+        """Number of space dimensions d."""
+        return self.trace.shape[1]
+
+    def extent(self) -> float:
+        """Return the largest extent of the surface along an axis, mm."""
+        return float(np.ptp(self.trace, axis=0).max())
+
+
+class Trace:
+    """A contact surface among the degrees of freedom of one Lagrange space, scalar or vector, on its body.
+
+    Attributes:
+        surface: The contact surface.
+        blocks: Global number of the block of degrees of freedom at each trace node (N,).
+    """
+
+    def __init__(self, surface: ContactSurface, space: fem.FunctionSpace, blocks: NDArray[np.int64]) -> None:
+        self.surface, self.blocks = surface, blocks
+        self._comm = space.mesh.comm
+        index_map = space.dofmap.index_map
+        start, stop = index_map.local_range
+        self._size, self._block_size = stop - start, space.dofmap.index_map_bs
+        self.own = np.flatnonzero((blocks >= start) & (blocks < stop))
+        self.local = blocks[self.own] - start
+
+    def pick(self, fields: Array) -> Array:
+        """Return fields at the trace nodes (N, components, k), equal on every rank; collective.
+
+        Args:
+            fields: Owned degrees of freedom of k fields (owned, k).
+        """
+        components = self._block_size
+        picked = np.zeros((len(self.blocks), components, fields.shape[1]))
+        picked[self.own] = fields.reshape(self._size, components, -1)[self.local]
+        self._comm.Allreduce(MPI.IN_PLACE, picked, op=MPI.SUM)  # each node has one owner: exact
+        return picked
+
+    def place(self, loads: Array) -> Array:
+        """Return loads at the trace nodes (N, components, k) on the owned degrees of freedom (owned, k)."""
+        placed = np.zeros((self._size, *loads.shape[1:]))
+        placed[self.local] = loads[self.own]
+        return placed.reshape(self._size * self._block_size, -1)
+
+    @cached_property
+    def rows(self) -> csr_array:
+        """The matrix that picks this rank's part of a scalar field at the trace nodes (N, owned)."""
+        shape = (len(self.blocks), self._size)
+        return csr_array((np.ones(len(self.own)), (self.own, self.local)), shape=shape)
+
+
+def contact_tag(body: BodyMesh) -> int:
+    """Return the tag of the facets of the contact."""
+    return body.curves[f"{body.name}_contact"]
+
+
+def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0) -> tuple[ContactSurface, Trace]:
+    """Gather the contact surface of a body and its trace of a space; collective.
+
+    Args:
+        body: The body.
+        space: Vector Lagrange space of the displacement.
+        measure: Of the surface by that of the mesh, in UFL: 2 pi r for axisymmetric bodies.
+    """
+    mesh, fdim = body.mesh, body.mesh.topology.dim - 1
+    degree, dim = space.ufl_element().degree, mesh.geometry.dim
+    cell = basix.cell.subentity_types(space.element.basix_element.cell_type)[fdim][0].name
+    points = space.tabulate_dof_coordinates()[:, :dim]
+    local, cells = _facet_dofs(body, space)
+    local = np.take_along_axis(local, _in_reference_order(local, points, cell, degree), axis=1)
+    own = space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64).reshape(local.shape)
+    inner = points[space.dofmap.list[cells]].mean(axis=1)
+    facets, coordinates, inner = (
+        np.concatenate(parts) for parts in zip(*mesh.comm.allgather((own, points[local], inner)), strict=True)
+    )
+    blocks, first, inverse = np.unique(facets, return_index=True, return_inverse=True)
+    trace = coordinates.reshape(-1, dim)[first]
+    order = _ascending(trace)
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    facets = rank[inverse.reshape(facets.shape)]
+    by_nodes = np.lexsort(facets.T[::-1])  # the same on any number of ranks
+    facets, inner = facets[by_nodes], inner[by_nodes]
+    trace, blocks = trace[order], blocks[order]
+    if cell == "triangle":
+        surface = _on_vertices(body.name, trace, facets, degree, inner)
+    else:
+        weights, outward = _integrals(body, space, measure, blocks)
+        every = np.arange(len(trace))
+        identity = csr_array((np.ones(len(trace)), (every, every)), shape=(len(trace), len(trace)))
+        surface = ContactSurface(body.name, trace, facets, cell, degree, every, weights, outward, identity)
+    return surface, Trace(surface, space, blocks)
+
+
+def trace_of(surface: Trace, vector: fem.FunctionSpace, space: fem.FunctionSpace) -> Trace:
+    """Return the trace of another space of the same degree on the same mesh; collective.
+
+    Args:
+        surface: The trace of `vector`.
+        vector: Its space.
+        space: The other space, which may number its nodes in another way.
+    """
+    index_map = vector.dofmap.index_map
+    other = np.empty(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    other[vector.dofmap.list.ravel()] = space.dofmap.list.ravel()
+    blocks = np.zeros(len(surface.blocks), dtype=np.int64)
+    blocks[surface.own] = space.dofmap.index_map.local_to_global(other[surface.local])
+    space.mesh.comm.Allreduce(MPI.IN_PLACE, blocks, op=MPI.SUM)
+    return Trace(surface.surface, space, blocks)
+
+
+def _facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the local blocks of this rank's own contact facets (f, k), corners first, and their cells (f,)."""
+    topology, fdim = body.mesh.topology, body.mesh.topology.dim - 1
+    topology.create_connectivity(fdim, fdim + 1)
+    topology.create_connectivity(fdim + 1, fdim)
+    facets = body.facet_tags.find(contact_tag(body))
+    facets = facets[facets < topology.index_map(fdim).size_local]
+    to_cell, to_facet = topology.connectivity(fdim, fdim + 1), topology.connectivity(fdim + 1, fdim)
+    closures = space.element.basix_element.entity_closure_dofs[fdim]
+    cells = np.array([to_cell.links(facet)[0] for facet in facets], dtype=np.int32)
+    numbers = [int(np.flatnonzero(to_facet.links(c) == f)[0]) for c, f in zip(cells, facets, strict=True)]
+    found = [space.dofmap.cell_dofs(c)[sorted(closures[k])] for c, k in zip(cells, numbers, strict=True)]
+    return np.array(found, dtype=np.int32).reshape(-1, len(closures[0])), cells
+
+
+def _in_reference_order(local: NDArray[np.int32], points: Array, cell: str, degree: int) -> NDArray[np.int64]:
+    """Return the order (f, k) that brings the nodes of each facet to those of the reference element.
+
+    Edges that elements share may run either way in the numbering: nodes are told by their place.
+    """
+    reference = basix.create_element(
+        basix.ElementFamily.P, basix.CellType[cell], degree, basix.LagrangeVariant.gll_warped
+    ).points
+    x = points[local]
+    corners = x[:, : CORNERS[cell]]
+    expected = np.einsum("kc,fcd->fkd", corner_functions(cell, reference), corners)
+    distance = np.linalg.norm(expected[:, :, None] - x[:, None], axis=3)
+    return np.argmin(distance, axis=2)
+
+
+def corner_functions(cell: str, points: Array) -> Array:
+    """Return the linear shape functions of a facet's corners at reference points (q, corners)."""
+    linear = basix.create_element(basix.ElementFamily.P, basix.CellType[cell], 1)
+    return linear.tabulate(0, points)[0, :, :, 0]
+
+
+def _ascending(x: Array) -> NDArray[np.int64]:
+    """Return the order of points by x, then by y, then by z; equal up to rounding counts as equal."""
+    grain = 1e-9 * max(float(np.ptp(x, axis=0).max(initial=0.0)), 1e-300)
+    keys = np.round(x / grain)
+    return np.lexsort(keys.T[::-1])
+
+
+def _integrals(
+    body: BodyMesh, space: fem.FunctionSpace, measure: Any, blocks: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """Return the integrals of the trace's shape functions (N,) and the mean normals there (N, d); collective."""
+    dim = body.mesh.geometry.dim
+    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)(contact_tag(body))
+    v = ufl.TestFunction(space)
+    start, stop = space.dofmap.index_map.local_range
+    own = np.flatnonzero((blocks >= start) & (blocks < stop))
+    found = np.zeros((2, len(blocks), dim))
+    for k, traction in enumerate((ufl.as_vector((1.0,) * dim), ufl.FacetNormal(body.mesh))):
+        vector = fem.petsc.assemble_vector(fem.form(measure * ufl.inner(traction, v) * ds))
+        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+        found[k, own] = vector.array_r.reshape(-1, dim)[blocks[own] - start]
+    body.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
+    weights, normals = found[0, :, 0], found[1]
+    return weights, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def _on_vertices(name: str, trace: Array, facets: NDArray[np.int64], degree: int, inner: Array) -> ContactSurface:
+    """Return the surface of triangles, with the pressure on the vertices in the dual linear basis."""
+    corners = facets[:, :3]
+    cross = np.cross(trace[corners[:, 1]] - trace[corners[:, 0]], trace[corners[:, 2]] - trace[corners[:, 0]]) / 2
+    cross *= np.sign(np.einsum("fd,fd->f", cross, trace[corners].mean(axis=1) - inner))[:, None]
+    area = np.linalg.norm(cross, axis=1)
+    nodes, place = np.unique(corners, return_inverse=True)
+    place = place.reshape(corners.shape)
+    weights, normals = np.zeros(len(nodes)), np.zeros((len(nodes), 3))
+    for k in range(3):
+        np.add.at(weights, place[:, k], area / 3)
+        np.add.at(normals, place[:, k], cross / 3)
+    # Force at trace node a from the pressure function psi_i: the integral of psi_i phi_a over each facet.
+    points, gauss = basix.make_quadrature(basix.CellType.triangle, degree + 1)
+    shape = basix.create_element(
+        basix.ElementFamily.P, basix.CellType.triangle, degree, basix.LagrangeVariant.gll_warped
+    ).tabulate(0, points)[0, :, :, 0]
+    dual = 4 * corner_functions("triangle", points) - 1
+    local = 2 * np.einsum("q,qa,qi->ai", gauss, shape, dual)  # over the facet's area
+    values = area[:, None, None] * local / weights[place][:, None, :]
+    rows = np.broadcast_to(facets[:, :, None], values.shape)
+    columns = np.broadcast_to(place[:, None, :], values.shape)
+    spread = csr_array((values.ravel(), (rows.ravel(), columns.ravel())), shape=(len(trace), len(nodes)))
+    outward = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return ContactSurface(name, trace, facets, "triangle", degree, nodes, weights, outward, spread)

@@ -1,0 +1,179 @@
+"""Linear-elastic materials in UFL: the stress of a displacement and of a temperature, in every model.
+
+Plane models lie in (x, z), axisymmetric ones in (r, z) with r at x; a solid has x, y and z. Volumes
+and surfaces of a plane model are per thickness, those of an axisymmetric one are the whole ring's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+
+from fenwear.bodies.mesh import BodyMesh
+from fenwear.case import Material
+from fenwear.errors import CaseError, Problem
+
+Kind = Literal["stress", "strain", "axisymmetric", "solid"]
+
+
+def strain(u: Any) -> Any:
+    """Return eps(u) = (grad u + grad u^T) / 2."""
+    return ufl.sym(ufl.grad(u))
+
+
+def ring_strain(u: Any) -> Any:
+    """Return eps(u) of an axisymmetric displacement (u_r, u_z), in r, the circumference and z: eps_tt = u_r / r."""
+    r = ufl.SpatialCoordinate(ufl.domain.extract_unique_domain(u))[0]
+    plane = strain(u)
+    return ufl.as_matrix(
+        ((plane[0, 0], 0, plane[0, 1]), (0, u[0] / r, 0), (plane[1, 0], 0, plane[1, 1])),
+    )
+
+
+def lame(young: Any, poisson: Any, plane: Kind) -> tuple[Any, Any]:
+    """Return Lame's lambda and mu of the model, MPa.
+
+    In plane stress lambda is 2 lambda mu / (lambda + 2 mu), so that sigma_yy = 0.
+    """
+    mu = young / (2 * (1 + poisson))
+    if plane == "stress":
+        return young * poisson / (1 - poisson**2), mu
+    return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu
+
+
+def stress(eps: Any, lmbda: Any, mu: Any) -> Any:
+    """Return sigma = lambda tr(eps) I + 2 mu eps, MPa."""
+    return lmbda * ufl.tr(eps) * ufl.Identity(eps.ufl_shape[0]) + 2 * mu * eps
+
+
+class ElasticLaw(Protocol):
+    """How a body answers to a displacement and to a temperature, linear in both, in UFL."""
+
+    @property
+    def kind(self) -> Kind:
+        """Which model it belongs to: it tells the rigid modes."""
+
+    def strain(self, u: Any) -> Any:
+        """Return the strain of a displacement."""
+
+    def stress(self, u: Any) -> Any:
+        """Return its stress, MPa, of the strain's shape; linear in grad u."""
+
+    def thermal_stress(self, theta: Any) -> Any:
+        """Return the stress that holds back the free expansion of a change of temperature, MPa; linear in theta."""
+
+    def stress_out_of_plane(self, u: Any, theta: Any) -> Any:
+        """Return sigma_yy of a plane model at a change of temperature, None for none, MPa."""
+
+    @property
+    def shear_modulus(self) -> Any:
+        """G of shear out of a plane, MPa."""
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return what one unit of the mesh's volume stands for: 1, or 2 pi r."""
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """Hooke's law with thermal expansion, in one of the models.
+
+    Attributes:
+        kind: Of the model.
+        lame: lambda and mu of the model, fields or numbers, MPa.
+        thermal_modulus: gamma, the stress that holds back each kelvin, MPa/K: E alpha / (1 - nu) in
+            plane stress, else E alpha / (1 - 2 nu).
+    """
+
+    kind: Kind
+    lame: tuple[Any, Any]
+    thermal_modulus: Any
+
+    def strain(self, u: Any) -> Any:
+        """Return the strain of a displacement."""
+        return ring_strain(u) if self.kind == "axisymmetric" else strain(u)
+
+    def stress(self, u: Any) -> Any:
+        """Return lambda tr(eps) I + 2 mu eps, MPa."""
+        return stress(self.strain(u), *self.lame)
+
+    def thermal_stress(self, theta: Any) -> Any:
+        """Return gamma theta I, MPa."""
+        dim = 2 if self.kind in ("stress", "strain") else 3
+        return self.thermal_modulus * theta * ufl.Identity(dim)
+
+    def stress_out_of_plane(self, u: Any, theta: Any) -> Any:
+        """Return sigma_yy: zero in plane stress, in plane strain from eps_yy = 0."""
+        if self.kind == "stress":
+            return ufl.as_ufl(0.0)
+        thermal = 0.0 if theta is None else self.thermal_modulus * theta
+        return self.lame[0] * ufl.tr(strain(u)) - thermal
+
+    @property
+    def shear_modulus(self) -> Any:
+        """Lame's mu, MPa."""
+        return self.lame[1]
+
+    def measure(self, mesh: Mesh) -> Any:
+        """Return 2 pi r in an axisymmetric model, else 1."""
+        return ring_measure(mesh) if self.kind == "axisymmetric" else ufl.as_ufl(1.0)
+
+
+def ring_measure(mesh: Mesh) -> Any:
+    """Return the circumference 2 pi r, mm."""
+    return 2 * ufl.pi * ufl.SpatialCoordinate(mesh)[0]
+
+
+def region_field(body: BodyMesh, values: dict[str, float]) -> fem.Function:
+    """Return the field that is constant on each material region.
+
+    Args:
+        body: The body.
+        values: The value on each region, by its name.
+    """
+    field = fem.Function(fem.functionspace(body.mesh, ("DG", 0)))
+    for region, value in values.items():
+        field.x.array[body.cell_tags.find(body.regions[region])] = value
+    field.x.scatter_forward()
+    return field
+
+
+def isotropic(body: BodyMesh, regions: dict[str, str], materials: dict[str, Material], kind: Kind) -> Isotropic:
+    """Return the isotropic law of a body's regions.
+
+    Args:
+        body: The body.
+        regions: Name of the material of each region.
+        materials: By their names.
+        kind: Of the model.
+
+    Raises:
+        CaseError: an unknown region, or one without a material.
+    """
+    _check_regions(body, regions)
+    of_region = {region: materials[name] for region, name in regions.items()}
+    young = region_field(body, {r: m.young for r, m in of_region.items()})
+    poisson = region_field(body, {r: m.poisson for r, m in of_region.items()})
+    held = 1 if kind == "stress" else 2
+    modulus = {r: m.young * (m.expansion or 0.0) / (1 - held * m.poisson) for r, m in of_region.items()}
+    return Isotropic(kind, lame(young, poisson, kind), region_field(body, modulus))
+
+
+def _check_regions(body: BodyMesh, regions: dict[str, str]) -> None:
+    problems = [
+        Problem(
+            f"{body.name}.regions.{name}",
+            f"no physical surface of that name; the geometry has {', '.join(body.regions)}",
+        )
+        for name in regions
+        if name not in body.regions
+    ] + [
+        Problem(f"{body.name}.regions", f"no material for the physical surface {name!r}")
+        for name in body.regions
+        if name not in regions
+    ]
+    if problems:
+        raise CaseError(problems)

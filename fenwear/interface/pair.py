@@ -1,0 +1,205 @@
+"""Two contact surfaces opposite each other at one place of the counter-body: gap, frame, weights, transfer.
+
+Pressure and gap live at the punch's pressure nodes. With the weights w_i the force of a node is w_i p_i,
+so that each node is one complementarity pair. The contact frame has its normal e_n into the punch, on
+the strip's surface opposite each node as the strip lies there: what acts on one body acts on the other
+the other way, on curved surfaces and in every place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.errors import CaseError, Problem
+from fenwear.interface.overlap import ChartedSurface, Overlap, overlap
+from fenwear.interface.placement import HERE, Placement
+from fenwear.interface.transfer import dual_transfer, wear_transfer
+
+STEEPEST = 0.7  # cosine between the normals of the two surfaces: steeper parts never touch
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """The punch's pressure nodes opposite the strip's surface, n nodes in d dimensions.
+
+    Attributes:
+        punch: The punch's contact surface.
+        strip: The strip's contact surface, as it was meshed.
+        placement: Where the strip is.
+        normal: e_n (n, d), unit normals into the punch.
+        weights: Areas of the nodes seen along e_n (n,), mm in the plane, mm² in a solid.
+        transfer: Takes displacements and temperatures at the strip's trace nodes to the punch's nodes (n, N_strip).
+        material: Takes worn depths on the strip's material to the punch's nodes (n, n_strip); not negative.
+        initial_gap: Distance along e_n before any deformation and wear (n,), mm.
+    """
+
+    punch: ContactSurface
+    strip: ContactSurface
+    placement: Placement
+    normal: Array
+    weights: Array
+    transfer: csr_array
+    material: csr_array
+    initial_gap: Array
+
+    @property
+    def x(self) -> Array:
+        """Abscissae of the contact nodes (n,), mm."""
+        return self.punch.x[:, 0]
+
+    @cached_property
+    def deposit(self) -> csr_array:
+        """Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, never negative."""
+        scaled = self.material.multiply(self.weights[:, None]).T / self.strip.weights[:, None]
+        return csr_array(scaled)
+
+    @cached_property
+    def normal_on_strip(self) -> Array:
+        """e_n in the strip's own, unmoved frame (n, d)."""
+        return self.placement.back(self.normal)
+
+    def opening(self, punch: Array, strip: Array) -> Array:
+        """Return the gap opened by depths worn off both bodies (n,), mm."""
+        return punch + self.material @ strip
+
+    def interpolate(self, values: Array, x: Array) -> Array:
+        """Return the finite-element function of nodal `values` (n,) of a plane contact at abscissae `x`, mm."""
+        return interpolation(self.x, self.punch.degree, np.atleast_1d(x)) @ values
+
+
+def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE) -> ContactPair:
+    """Bring the punch's nodes opposite the strip's surface, moved to its place.
+
+    Raises:
+        CaseError: the surfaces do not face each other, or the strip's does not reach below the whole punch.
+    """
+    axis = _chart_axis(strip)
+    strip_trace, strip_outward = placement.points(strip.trace), placement.vectors(strip.outward)
+    first, second = _charted(punch, punch.trace, axis), _charted(strip, strip_trace, axis)
+    if placement == HERE:
+        for surface in (punch, strip):
+            if _folds(surface, axis):
+                _not_facing(f"{surface.body}_contact folds back on itself seen along {'xyz'[axis]}")
+    common = overlap(first, second)
+    _check_covered(common, first, second, placement)
+    transfer = dual_transfer(first, second, common)
+    normal = wear_transfer(first, second) @ strip_outward if strip.cell == "triangle" else transfer @ strip_outward
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    facing = -np.einsum("ic,ic->i", punch.outward, normal)
+    if placement == HERE:
+        _check_facing(punch, normal, facing, axis)
+    gap = np.einsum("ic,ic->i", normal, punch.spread.T @ punch.trace - transfer @ strip_trace)
+    # Forces act along the common normal: a node's weight is its area seen along it.
+    return ContactPair(
+        punch, strip, placement, normal, punch.weights * facing, transfer, wear_transfer(first, second), gap
+    )
+
+
+def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
+    """Return a pair whose strip stays in place while its material moves: only worn depths change place.
+
+    Raises:
+        CaseError: the strip's contact surface does not reach below the whole punch there.
+    """
+    if placement == middle.placement:
+        return middle
+    axis = _chart_axis(middle.strip)
+    first = _charted(middle.punch, middle.punch.trace, axis)
+    second = _charted(middle.strip, placement.points(middle.strip.trace), axis)
+    _check_covered(overlap(first, second), first, second, placement)
+    return replace(middle, placement=placement, material=wear_transfer(first, second))
+
+
+def check_distance(pair: ContactPair) -> None:
+    """Make sure that the surfaces touch, or nearly so, before anything deforms or wears.
+
+    Raises:
+        CaseError: they are apart, or one inside the other.
+    """
+    closest = float(pair.initial_gap.min())
+    if abs(closest) > 0.01 * pair.punch.extent():
+        way = "above" if closest > 0 else "inside"
+        _not_facing(f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest")
+
+
+def _chart_axis(strip: ContactSurface) -> int:
+    """Return the axis along which the surfaces are seen: the one nearest to the strip's mean normal."""
+    return int(np.argmax(np.abs(strip.weights @ strip.outward)))
+
+
+def _charted(surface: ContactSurface, trace: Array, axis: int) -> ChartedSurface:
+    return ChartedSurface(np.delete(trace, axis, axis=1), surface.facets, surface.cell, surface.degree, surface.nodes)
+
+
+def _folds(surface: ContactSurface, axis: int) -> bool:
+    """Return whether a surface is no graph over its chart: its normals then point both ways along the axis."""
+    along = surface.outward[:, axis]
+    return bool((along * np.sign(surface.weights @ along) <= 0).any())
+
+
+def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurface, placement: Placement) -> None:
+    """Raise where a part of the punch's surface has nothing of the strip's below it."""
+    if common.covered.all():
+        return
+    spans = [
+        " and ".join(f"{low:g} to {high:g}" for low, high in zip(c.s.min(axis=0), c.s.max(axis=0), strict=True))
+        for c in (first, second)
+    ]
+    if placement == HERE:
+        _not_facing(
+            f"punch_contact spans x = {spans[0]} mm, strip_contact only {spans[1]} "
+            "(are the names of punch and strip exchanged?)"
+        )
+    raise CaseError(
+        Problem(
+            "motion",
+            f"the stroke runs off the meshed strip: {placement}, strip_contact spans x = {spans[1]} mm, "
+            f"but punch_contact {spans[0]} mm (lengths of a mesh are taken as mm)",
+        )
+    )
+
+
+def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int) -> None:
+    """Raise where the surfaces look past each other."""
+    if (facing < STEEPEST).any():
+        worst = int(np.argmin(facing))
+        angle = np.degrees(np.arccos(np.clip(facing[worst], -1, 1)))
+        place = ", ".join(f"{c:g}" for c in punch.x[worst][: punch.dim - 1])
+        _not_facing(
+            f"their outward normals do not point at each other at x = {place} mm: they are {angle:.0f} degrees off"
+        )
+    if punch.dim == 2 and axis == 1 and normal[:, 1].mean() < 0:
+        _not_facing("the punch lies below the strip; expected it above, with z upwards")
+
+
+def _not_facing(reason: str) -> None:
+    raise CaseError(Problem("geometry", f"the contact surfaces do not face each other: {reason}"))
+
+
+def interpolation(nodes: Array, degree: int, x: Array) -> Array:
+    """Return the matrix of piecewise Lagrange interpolation from `nodes` to `x`.
+
+    Args:
+        nodes: Ascending abscissae; every facet has degree + 1 of them, its ends shared.
+        x: Abscissae inside the nodes' range.
+    """
+    ends = nodes[::degree]
+    facet = np.clip(np.searchsorted(ends, x, side="right") - 1, 0, len(ends) - 2)
+    columns = facet[:, None] * degree + np.arange(degree + 1)
+    matrix = np.zeros((len(x), len(nodes)))
+    np.put_along_axis(matrix, columns, lagrange(nodes[columns], x), axis=1)
+    return matrix
+
+
+def lagrange(nodes: Array, x: Array) -> Array:
+    """Return the Lagrange polynomials of `nodes` (..., k) at `x` (...), shape (..., k)."""
+    difference = x[..., None, None] - nodes[..., None, :]
+    spacing = nodes[..., :, None] - nodes[..., None, :]
+    same = np.eye(nodes.shape[-1], dtype=bool)
+    return (np.where(same, 1.0, difference) / np.where(same, 1.0, spacing)).prod(axis=-1)

@@ -1,0 +1,101 @@
+"""Transfer between two surfaces whose facets need not match, in their common chart: dual mortar and wear.
+
+The nodal pressures p_i of the first surface, forces w_i p_i, act as the traction sum of p_i psi_i. On each
+facet its dual functions psi_i span the same polynomials as the shape functions lambda_i of the pressure, and
+
+    integral of psi_i lambda_j = delta_ij w_i,    w_i = integral of lambda_i = integral of psi_i
+
+(on a triangle psi_i = 4 lambda_i - 1, on its three vertices). With the shape functions phi_j of the second
+surface T_ij = integral of psi_i phi_j / w_i takes values to the first surface, and T^T w takes forces back. As
+the psi_i add up to one, a uniform pressure is transferred exactly (the patch test); as T reproduces the
+pressure's polynomials, force and moment are kept; T is the identity where nodes match (Wohlmuth, SIAM J.
+Numer. Anal. 38, 2000).
+
+The psi_i have negative parts, by which wear would let material grow. Worn depths go by shares of area instead.
+"""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+from scipy.sparse import coo_array, csr_array, diags_array
+
+from fenwear.arrays import Array
+from fenwear.interface.overlap import ChartedSurface, Indices, Overlap, overlap, shared_areas, tabulate
+
+ROUNDING = 1e-14  # entries of T that are left of zero
+
+
+def dual_transfer(first: ChartedSurface, second: ChartedSurface, common: Overlap | None = None) -> csr_array:
+    """Return T (n1, N2): values at the second surface's trace nodes to the first's pressure nodes.
+
+    The integrals, those of the psi_i too, are sums over the same points, so that constants and the pressure's
+    polynomials are reproduced to rounding on facets of any form. Rows of nodes that are not covered are zero.
+
+    Args:
+        common: The overlap of the two surfaces, where it is known already.
+    """
+    common = overlap(first, second) if common is None else common
+    shape = (len(first.nodes), len(second.s))
+    used = common.covered_facets[common.facet1]
+    facet1, facet2 = (facet[used][:: common.per_simplex] for facet in (common.facet1, common.facet2))
+    if len(facet1) == 0:
+        return csr_array(shape)
+    points = (len(facet1), common.per_simplex)
+    own = first.pressure_functions(common.points1[used]).reshape(*points, -1)
+    other = second.shape_functions(common.points2[used]).reshape(*points, -1)
+    weighted = (own * common.weights[used].reshape(*points, 1)).swapaxes(1, 2)
+    number = np.unique(facet1, return_inverse=True)[1]
+    sums = csr_array((np.ones(len(number)), (number, np.arange(len(number)))))
+    functions = own.shape[2]
+    mass = (sums @ (weighted @ own).reshape(len(number), -1)).reshape(-1, functions, functions)
+    weights = sums @ weighted.sum(axis=2)
+    dual = np.linalg.solve(mass, weights[:, :, None] * np.eye(functions))  # psi_i = sum of dual_ki lambda_k
+    parts = dual.swapaxes(1, 2)[number] @ (weighted @ other)
+    matrix = _assemble(first.pressure_facets[facet1], second.facets[facet2], parts, shape)
+    matrix = _rows_to_one(matrix)  # by w_i: the phi_j add up to one
+    matrix.data[np.abs(matrix.data) < ROUNDING] = 0.0
+    matrix = csr_array(diags_array(common.covered.astype(float)) @ matrix)
+    matrix.eliminate_zeros()
+    return _rows_to_one(matrix)
+
+
+def wear_transfer(first: ChartedSurface, second: ChartedSurface) -> csr_array:
+    """Return W (n1, n2): worn depths at the second surface's pressure nodes to the first's.
+
+    Each entry is the share of node i's area that node k's lies over: none is negative, rows add up to one where
+    anything lies over the node. Depths v worn at the first are put down as W^T (w1 v) / w2: volume is kept.
+    """
+    return _rows_to_one(shared_areas(first, second))
+
+
+def trace_spread(surface: ChartedSurface) -> csr_array:
+    """Return the forces at the trace nodes of unit forces at the pressure nodes: integral of phi_a psi_i / w_i (N, n).
+
+    Where every trace node has a pressure it is the identity: forces act at their node.
+    """
+    shape = (len(surface.s), len(surface.nodes))
+    if surface.pressure_degree == surface.degree:
+        return csr_array((np.ones(shape[1]), (surface.nodes, np.arange(shape[1]))), shape=shape)
+    points, gauss = basix.make_quadrature(basix.CellType.triangle, surface.degree + 1)
+    dual = 4 * tabulate("triangle", 1, points) - 1
+    share = np.einsum("q,qi,qa->ia", gauss / gauss.sum(), dual, surface.shape_functions(points))
+    corners = surface.corners
+    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
+    parts = area[:, None, None] * share
+    spread = _assemble(surface.pressure_facets, surface.facets, parts, (shape[1], shape[0]))
+    return csr_array(_rows_to_one(spread).T)
+
+
+def _assemble(rows: Indices, columns: Indices, parts: Array, shape: tuple[int, int]) -> csr_array:
+    """Add up local matrices (t, k, l) of rows (t, k) and columns (t, l)."""
+    row = np.broadcast_to(rows[:, :, None], parts.shape).ravel()
+    column = np.broadcast_to(columns[:, None, :], parts.shape).ravel()
+    return coo_array((parts.ravel(), (row, column)), shape=shape).tocsr()
+
+
+def _rows_to_one(matrix: csr_array) -> csr_array:
+    """Divide each row by its sum; empty rows stay empty."""
+    sums = matrix.sum(axis=1)
+    data = matrix.data / np.repeat(np.where(sums == 0, 1.0, sums), np.diff(matrix.indptr))
+    return csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)

@@ -1,0 +1,56 @@
+"""The sliding field: the velocity of the counter-body over the contact.
+
+The counter-body moves as a rigid one, v = V + omega x (x - c), times the scalar law of the stroke. A
+translation is counted in mm, a rotation in rad: then speed, wear and heat vary over the contact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.interface.placement import ZERO, Placement, Vector, in_space
+
+
+@dataclass(frozen=True)
+class SlidingField:
+    """A rigid motion of unit amount, in space (x, y, z); a plane model lies at y = 0.
+
+    Attributes:
+        shift: V, the direction of a translation; a unit vector, or zero.
+        turn: omega, the axis of a rotation; a unit vector, or zero.
+        centre: c, a point on the axis, mm.
+    """
+
+    shift: Vector = ZERO
+    turn: Vector = ZERO
+    centre: Vector = ZERO
+
+    def velocity(self, x: Array) -> Array:
+        """Return v of the counter-body's material at points x (n, d) for a unit of the stroke's law (n, 3)."""
+        return np.array(self.shift) + np.cross(self.turn, in_space(x) - self.centre)
+
+    def rate(self, x: Array) -> Array:
+        """Return what each point slides for a unit of the stroke's law (n,): 1, or mm/rad."""
+        return np.linalg.norm(self.velocity(x), axis=1)
+
+    def direction(self, x: Array, normal: Array) -> Array:
+        """Return e_v (n, 3), the unit direction of sliding within the contact of normal e_n (n, d), or zero."""
+        v, n = self.velocity(x), in_space(normal)
+        tangential = v - np.einsum("ic,ic->i", v, n)[:, None] * n
+        size = np.linalg.norm(tangential, axis=1, keepdims=True)
+        still = size <= 1e-12 * size.max(initial=1e-300)
+        return np.where(still, 0.0, tangential / np.where(still, 1.0, size))
+
+    def placement(self, amount: float) -> Placement:
+        """Return where the counter-body is after this amount of the motion, mm or rad."""
+        if amount == 0.0:
+            return Placement()
+        (x, y, z), (a, b, c) = self.shift, self.turn
+        return Placement((amount * x, amount * y, amount * z), (amount * a, amount * b, amount * c), self.centre)
+
+
+ALONG_X = SlidingField(shift=(1.0, 0.0, 0.0))
+ALONG_Y = SlidingField(shift=(0.0, 1.0, 0.0))

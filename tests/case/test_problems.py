@@ -38,7 +38,7 @@ def problems(*settings: str, name: str = "example1-heat") -> list[str]:
                                  "did you mean 'sinusoidal'?"),
         ("contact.friction={table = 3}", "contact.friction.table: expected a list, got 3"),
         ("contact.friction={tabel = [[0, 1], [1, 1]]}", "contact.friction.tabel: unknown key; did you mean 'table'?"),
-        ("materials.number={}", "materials.number.young: missing, but required"),
+        ("materials.number={poisson = 0.3}", "materials.number.young: missing, but required"),
     ],
 )  # fmt: skip
 def test_in_words_of_case_files(setting: str, expected: str) -> None:

@@ -185,7 +185,7 @@ def make_sliding(case: Case, parts: int = 1) -> Sliding:
 # ---------------------------------------------------------------------------- the surfaces
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Placed:
     """Both bodies opposite each other in every phase, in equilibrium; nothing elastic in it.
 
@@ -210,6 +210,11 @@ class Placed:
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
     remedies: Remedies = field(default_factory=Remedies)
+
+    def __repr__(self) -> str:
+        """Say in a line what it is."""
+        title = "made in Python" if self.made_from is None else repr(self.made_from.title)
+        return f"<{type(self).__name__} {title}: {len(self.pair.weights)} contact nodes, {len(self.pairs)} phases>"
 
     @property
     def comm(self) -> MPI.Comm:
@@ -311,8 +316,7 @@ class Placed:
     @cached_property
     def element_heights(self) -> Worn:
         """Height of the elements at the contact nodes of both bodies, mm."""
-        degree = self.bodies.punch.surface.degree
-        return Worn(element_height(self.bodies.punch.body, degree), element_height(self.bodies.strip.body, degree))
+        return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
     def conditions(
         self, phase: int, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
@@ -473,7 +477,7 @@ class Condensed:
         return replace(self, punch=punch, strip=strip)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Tribosystem(Placed):
     """Punch and strip, condensed and joined in every phase of the motion: ready for contact, wear and cycles.
 

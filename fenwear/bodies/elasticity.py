@@ -22,7 +22,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
 from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor
-from fenwear.bodies.material import ElasticLaw, Kind
+from fenwear.bodies.material import ElasticLaw, Kind, measure, strain_of
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Body, Load, Support
 from fenwear.errors import CaseError, Problem
@@ -84,14 +84,14 @@ class ElasticBody:
         self.dim = dim
         element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(dim,))
         self.space = fem.functionspace(mesh, element)
-        self.surface, self.trace = contact_surface(body, self.space, law.measure(mesh))
+        self.surface, self.trace = contact_surface(body, self.space, measure(mesh, law.kind))
         self.pivot = _pivot(body, description)
         supports = self._supports(description.supports)
         modes, self.mode_names = self._free_modes(supports)
         self.rigid_modes = modes
 
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        a = ufl.inner(law.stress(u), law.strain(v)) * law.measure(mesh) * ufl.dx
+        a = ufl.inner(law.stress(u), strain_of(v, law.kind)) * measure(mesh, law.kind) * ufl.dx
         bcs = supports + self._regularise()
         self.supported = self._owned_dofs(bcs)
         self._set_loads(description.loads)
@@ -119,8 +119,9 @@ class ElasticBody:
     @cached_property
     def rigid_motion(self) -> Array:
         """Displacement of the contact surface's trace nodes by each rigid mode (N, d, modes); collective."""
-        modes = np.array(self.rigid_modes).reshape(len(self.rigid_modes), -1).T
-        return self.trace.pick(modes) if self.rigid_modes else np.zeros((*self.surface.trace.shape, 0))
+        if not self.rigid_modes:
+            return np.zeros((*self.surface.trace.shape, 0))
+        return self.trace.pick(np.array(self.rigid_modes).T)
 
     @property
     def factor(self) -> Factor:
@@ -248,7 +249,7 @@ class ElasticBody:
         # dolfinx assembles square blocks only: blocks of temperatures, numbered as single ones, of which one counts.
         element = basix.ufl.blocked_element(temperature.ufl_element(), shape=(dim,))
         theta, v = ufl.TrialFunction(fem.functionspace(self.body.mesh, element))[0], ufl.TestFunction(self.space)
-        work = ufl.inner(law.thermal_stress(theta), law.strain(v)) * law.measure(self.body.mesh) * ufl.dx
+        work = ufl.inner(law.thermal_stress(theta), strain_of(v, law.kind)) * measure(self.body.mesh, law.kind) * ufl.dx
         coupling = assembled(work, first_column=True)
         start = dim * self.space.dofmap.index_map.local_range[0]
         coupling.zeroRows((self.supported + start).astype(np.int32), diag=0.0)
@@ -257,7 +258,7 @@ class ElasticBody:
     def surface_integral(self, traction: Any, tag: int) -> PETSc.Vec:
         """Return the vector of the integral of traction . v over the facets tagged `tag`; collective."""
         ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.body.facet_tags)
-        work = ufl.inner(traction, ufl.TestFunction(self.space)) * self.law.measure(self.body.mesh)
+        work = ufl.inner(traction, ufl.TestFunction(self.space)) * measure(self.body.mesh, self.law.kind)
         vector = fem.petsc.assemble_vector(fem.form(work * ds(tag)))
         vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
         return vector
@@ -269,7 +270,7 @@ class ElasticBody:
         for number, load in enumerate(loads):
             tag = self.body.curve(load.on, f"{self.body.name}.loads.{number}.on")
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
-            facets = fem.form(self.law.measure(mesh) * ds(tag))
+            facets = fem.form(measure(mesh, self.law.kind) * ds(tag))
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
             resultant = load.force if load.traction is None else [area * component for component in load.traction]
             traction = np.array(resultant) / area

@@ -6,6 +6,7 @@ and surfaces of a plane model are per thickness, those of an axisymmetric one ar
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -51,17 +52,18 @@ def stress(eps: Any, lmbda: Any, mu: Any) -> Any:
 
 
 class ElasticLaw(Protocol):
-    """How a body answers to a displacement and to a temperature, linear in both, in UFL."""
+    """How a body answers to a displacement and to a temperature, linear in both, in UFL.
+
+    Attributes:
+        kind: The model that it belongs to: it tells the strain, the rigid modes and what volumes stand for.
+    """
 
     @property
     def kind(self) -> Kind:
-        """Which model it belongs to: it tells the rigid modes."""
-
-    def strain(self, u: Any) -> Any:
-        """Return the strain of a displacement."""
+        """The model that it belongs to."""
 
     def stress(self, u: Any) -> Any:
-        """Return its stress, MPa, of the strain's shape; linear in grad u."""
+        """Return the stress of a displacement, MPa, of the strain's shape; linear in grad u."""
 
     def thermal_stress(self, theta: Any) -> Any:
         """Return the stress that holds back the free expansion of a change of temperature, MPa; linear in theta."""
@@ -73,8 +75,15 @@ class ElasticLaw(Protocol):
     def shear_modulus(self) -> Any:
         """G of shear out of a plane, MPa."""
 
-    def measure(self, mesh: Mesh) -> Any:
-        """Return what one unit of the mesh's volume stands for: 1, or 2 pi r."""
+
+def strain_of(u: Any, kind: Kind) -> Any:
+    """Return the strain of a displacement in a model."""
+    return ring_strain(u) if kind == "axisymmetric" else strain(u)
+
+
+def measure(mesh: Mesh, kind: Kind) -> Any:
+    """Return what one unit of the mesh's volume stands for: the circumference 2 pi r, or 1."""
+    return 2 * ufl.pi * ufl.SpatialCoordinate(mesh)[0] if kind == "axisymmetric" else ufl.as_ufl(1.0)
 
 
 @dataclass(frozen=True)
@@ -90,15 +99,11 @@ class Isotropic:
 
     kind: Kind
     lame: tuple[Any, Any]
-    thermal_modulus: Any
-
-    def strain(self, u: Any) -> Any:
-        """Return the strain of a displacement."""
-        return ring_strain(u) if self.kind == "axisymmetric" else strain(u)
+    thermal_modulus: Any = 0.0
 
     def stress(self, u: Any) -> Any:
         """Return lambda tr(eps) I + 2 mu eps, MPa."""
-        return stress(self.strain(u), *self.lame)
+        return stress(strain_of(u, self.kind), *self.lame)
 
     def thermal_stress(self, theta: Any) -> Any:
         """Return gamma theta I, MPa."""
@@ -117,14 +122,37 @@ class Isotropic:
         """Lame's mu, MPa."""
         return self.lame[1]
 
-    def measure(self, mesh: Mesh) -> Any:
-        """Return 2 pi r in an axisymmetric model, else 1."""
-        return ring_measure(mesh) if self.kind == "axisymmetric" else ufl.as_ufl(1.0)
 
+@dataclass(frozen=True)
+class OwnLaw:
+    """A user's own law: any stress in UFL that is linear in grad u, such as an anisotropic one.
 
-def ring_measure(mesh: Mesh) -> Any:
-    """Return the circumference 2 pi r, mm."""
-    return 2 * ufl.pi * ufl.SpatialCoordinate(mesh)[0]
+    Attributes:
+        kind: Of the model.
+        of_displacement: sigma(u), MPa, of the strain's shape.
+        of_temperature: The stress that holds back the expansion by a change of temperature, MPa; None for none.
+        out_of_plane: sigma_yy(u, theta) of a plane model, for von Mises' stress; by default zero.
+        shear_modulus: G of shear out of a plane, MPa; needed where a traction acts along y.
+    """
+
+    kind: Kind
+    of_displacement: Callable[[Any], Any]
+    of_temperature: Callable[[Any], Any] | None = None
+    out_of_plane: Callable[[Any, Any], Any] | None = None
+    shear_modulus: Any = None
+
+    def stress(self, u: Any) -> Any:
+        """Return sigma(u), MPa."""
+        return self.of_displacement(u)
+
+    def thermal_stress(self, theta: Any) -> Any:
+        """Return what holds back the expansion, MPa."""
+        dim = 2 if self.kind in ("stress", "strain") else 3
+        return 0.0 * theta * ufl.Identity(dim) if self.of_temperature is None else self.of_temperature(theta)
+
+    def stress_out_of_plane(self, u: Any, theta: Any) -> Any:
+        """Return sigma_yy, MPa."""
+        return ufl.as_ufl(0.0) if self.out_of_plane is None else self.out_of_plane(u, theta)
 
 
 def region_field(body: BodyMesh, values: dict[str, float]) -> fem.Function:

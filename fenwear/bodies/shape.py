@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import Trace, contact_surface, contact_tag, trace_of
+from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.compat import geometry_degree, geometry_dofmap, interpolation_points
 from fenwear.errors import MeshQualityError
@@ -38,27 +40,28 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]
 
     Args:
         body: Its geometry is changed.
-        depth: At the contact nodes of this degree in order along x (n,), mm.
+        depth: At the trace nodes of this degree (N,), mm.
         degree: Of the nodes.
         held: Points that keep their place, such as pins, mm.
 
     Returns:
-        How far the contact nodes have moved into the body, along x (n,), mm: the depth as far as the
-        geometry's polynomials reach, which may be of a lower degree.
+        How far the trace nodes have moved into the body (N,), mm: the depth as far as the geometry's
+        polynomials reach, which may be of a lower degree.
 
     Raises:
         MeshQualityError: an element is left with less than a fifth of its size somewhere.
     """
-    mesh = body.mesh
+    mesh, dim = body.mesh, body.mesh.geometry.dim
     space = fem.functionspace(mesh, ("Lagrange", degree))
+    trace = _trace(body, space, degree)
     x = space.tabulate_dof_coordinates()
     contact = _contact_dofs(body, space)
     shift = fem.Function(space)
-    shift.x.array[contact] = depth[_order_along_x(mesh.comm, x[contact, 0])]
+    shift.x.array[trace.local] = depth[trace.own]
     shift.x.scatter_forward()
     normal = _mean_normal(body)
     fixed = np.setdiff1d(_bent_dofs(body, space, normal), contact)
-    pins = [np.flatnonzero(np.linalg.norm(x[:, :2] - point, axis=1) < 1e-6 * np.ptp(x[:, 0])) for point in held]
+    pins = [np.flatnonzero(np.linalg.norm(x[:, :dim] - point, axis=1) < 1e-6 * np.ptp(x[:, 0])) for point in held]
     fixed = np.union1d(fixed, np.setdiff1d(np.concatenate([*pins, []]).astype(np.int32), contact)).astype(np.int32)
     zero = fem.Function(space)
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
@@ -67,8 +70,7 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]
     solution = _solve(a, bcs, space)
     before = _sizes(body)
     _move(body, solution, -normal)
-    own = contact[contact < space.dofmap.index_map.size_local]
-    displaced = (x - space.tabulate_dof_coordinates())[own, :2] @ normal
+    displaced = (x - space.tabulate_dof_coordinates())[:, :dim] @ normal
     ratio = mesh.comm.allreduce(float((_sizes(body) / before).min(initial=np.inf)), MPI.MIN)
     if ratio < LEAST:
         raise MeshQualityError(
@@ -76,52 +78,45 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]
             f"{max(ratio, 0.0):.0%} of its size; the depth is {depth.max():.3g} mm. Expected a geometry that is higher "
             "where it wears, or less wear"
         )
-    along, displaced = (
-        np.concatenate(parts) for parts in zip(*mesh.comm.allgather((x[own, 0], displaced)), strict=True)
-    )
-    return displaced[np.argsort(along, kind="stable")]
+    owned = space.dofmap.index_map.size_local
+    return trace.pick(displaced[:owned, None])[:, 0, 0]
 
 
-def element_height(body: BodyMesh, degree: int) -> Array:
-    """Return the height of the elements at each contact node, volume over length, along x (n,), mm; collective."""
-    mesh = body.mesh
-    tag = body.curves[f"{body.name}_contact"]
+def element_height(elastic: ElasticBody) -> Array:
+    """Return the height of the elements at each trace node, volume over area of the facet (N,), mm; collective."""
+    body, mesh = elastic.body, elastic.body.mesh
+    tag = contact_tag(body)
     cells = fem.functionspace(mesh, ("DG", 0))
     ds = ufl.Measure("ds", domain=mesh, subdomain_data=body.facet_tags)
     v = ufl.TestFunction(cells)
-    volume, length = (fem.assemble_vector(fem.form(v * measure)).array for measure in (ufl.dx(domain=mesh), ds(tag)))
+    volume, area = (fem.assemble_vector(fem.form(v * measure)).array for measure in (ufl.dx(domain=mesh), ds(tag)))
     height = fem.Function(cells)
-    height.x.array[:] = volume / np.maximum(length, 1e-300)
-    space = fem.functionspace(mesh, ("Lagrange", degree))
-    w = ufl.TestFunction(space)
-    vectors = [fem.petsc.assemble_vector(fem.form(f * w * ds(tag))) for f in (height, ufl.as_ufl(1.0))]
-    for vector in vectors:
+    height.x.array[:] = volume / np.maximum(area, 1e-300)
+    w = ufl.TestFunction(elastic.space)[0]
+    sums = []
+    for f in (height, ufl.as_ufl(1.0)):
+        vector = fem.petsc.assemble_vector(fem.form(f * w * ds(tag)))
         vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-    own = _contact_dofs(body, space)
-    own = own[own < space.dofmap.index_map.size_local]
-    mean = vectors[0].array_r[own] / vectors[1].array_r[own]
-    x = space.tabulate_dof_coordinates()[own, 0]
-    x, mean = (np.concatenate(parts) for parts in zip(*mesh.comm.allgather((x, mean)), strict=True))
-    return mean[np.argsort(x, kind="stable")]
+        sums.append(elastic.trace.pick(vector.array_r[:, None])[:, 0, 0])
+    return sums[0] / sums[1]
+
+
+def _trace(body: BodyMesh, space: fem.FunctionSpace, degree: int) -> Trace:
+    vectors = fem.functionspace(body.mesh, ("Lagrange", degree, (body.mesh.geometry.dim,)))
+    _, trace = contact_surface(body, vectors)
+    return trace_of(trace, vectors, space)
 
 
 def _contact_dofs(body: BodyMesh, space: fem.FunctionSpace) -> NDArray[np.int32]:
-    facets = body.facet_tags.find(body.curves[f"{body.name}_contact"])
+    facets = body.facet_tags.find(contact_tag(body))
     return fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, facets)
 
 
-def _order_along_x(comm: MPI.Comm, x: Array) -> NDArray[np.int64]:
-    """Return the place of each of this rank's contact nodes, ghosts too, among those of all ranks."""
-    everywhere = np.unique(np.concatenate(comm.allgather(x)).round(12))
-    return np.searchsorted(everywhere, x.round(12))
-
-
 def _mean_normal(body: BodyMesh) -> Array:
-    """Return the mean outward unit normal of the contact surface (2,); collective."""
+    """Return the mean outward unit normal of the contact surface (d,); collective."""
     ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
-    tag = body.curves[f"{body.name}_contact"]
-    n = ufl.FacetNormal(body.mesh)
-    parts = [body.mesh.comm.allreduce(fem.assemble_scalar(fem.form(n[i] * ds(tag)))) for i in (0, 1)]
+    tag, n, dim = contact_tag(body), ufl.FacetNormal(body.mesh), body.mesh.geometry.dim
+    parts = [body.mesh.comm.allreduce(fem.assemble_scalar(fem.form(n[i] * ds(tag)))) for i in range(dim)]
     normal = np.array(parts) / np.linalg.norm(parts)
     normal[np.abs(normal) < 1e-9] = 0.0
     return normal / np.linalg.norm(normal)
@@ -132,8 +127,8 @@ def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArr
     mesh, dim = body.mesh, body.mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = exterior_facet_indices(mesh.topology)
-    facets = np.setdiff1d(facets, body.facet_tags.find(body.curves[f"{body.name}_contact"])).astype(np.int32)
-    corners = mesh.geometry.x[entities_to_geometry(mesh, dim - 1, facets)][:, :, :2]
+    facets = np.setdiff1d(facets, body.facet_tags.find(contact_tag(body))).astype(np.int32)
+    corners = mesh.geometry.x[entities_to_geometry(mesh, dim - 1, facets)][:, :, : mesh.geometry.dim]
     extent, along = np.ptp(corners, axis=1), np.ptp(corners @ normal, axis=1)
     bent = along < np.sqrt(1 - ACROSS**2) * np.linalg.norm(extent, axis=1)
     return fem.locate_dofs_topological(space, dim - 1, facets[bent])
@@ -167,8 +162,8 @@ def _move(body: BodyMesh, shift: fem.Function, direction: Array) -> None:
     of_geometry.interpolate(shift)
     x = mesh.geometry.x
     nodes, dofs = geometry_dofmap(mesh).ravel(), space.dofmap.list.ravel()
-    moved = x.copy()
-    moved[nodes, :2] = x[nodes, :2] + of_geometry.x.array[dofs, None] * direction
+    moved, dim = x.copy(), mesh.geometry.dim
+    moved[nodes, :dim] = x[nodes, :dim] + of_geometry.x.array[dofs, None] * direction
     x[:] = moved
 
 

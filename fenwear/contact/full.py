@@ -87,7 +87,7 @@ class FullContact:
         self.snes = PETSc.SNES().create(self.comm)
         self.snes.setFunction(self._residual, self._x.duplicate())
         self.snes.setJacobian(lambda snes, x, J, P: None, self._operator)
-        configure(self.snes, "fenwear_full_contact_")
+        configure(self.snes, "fenwear_full_contact_", zero=1e-10)
         self.snes.setTolerances(atol=1e-9)  # the rounding of a system with all displacements in it
         self.snes.ksp.pc.setFactorSolverType("mumps")
         self.snes.setVariableBounds(lower, upper)

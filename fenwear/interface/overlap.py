@@ -236,7 +236,7 @@ def _pull_back_curved(surface: ChartedSurface, facet: Indices, s: Array) -> Arra
     points = _pull_back(surface.cell, surface.corners, facet, s)
     nodes = surface.s[surface.facets]
     element = _element(surface.cell, surface.degree)
-    for _ in range(CURVED_STEPS):
+    for _ in range(CURVED_STEPS if len(points) else 0):
         table = element.tabulate(1, points)[..., 0]
         rest = s - np.einsum("qa,qad->qd", table[0], nodes[facet])
         if np.abs(rest).max(initial=0.0) <= CURVED * surface.extent:

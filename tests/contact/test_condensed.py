@@ -9,7 +9,7 @@ import pytest
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from fenwear import ConvergenceError, Tribosystem, assemble
+from fenwear import ConvergenceError, Tribosystem
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.contact.full import FullContact
@@ -62,7 +62,7 @@ def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> N
     """gap = g0 + w + (S_n + d mu S_t) p + H a + g_load, from the state alone."""
     state = system.contact((-1,)).solve(gap := worn(system))
     interface = system.interface
-    expected = interface.compliance(-system.case.contact.friction) @ state.pressure[0]
+    expected = interface.compliance(system.friction_ratio(-1)) @ state.pressure[0]
     expected += system.rigid.rigid_normal @ state.rigid[0] + interface.load_gap + gap
     np.testing.assert_allclose(state.gap[0], expected, atol=1e-12)
 
@@ -92,7 +92,8 @@ def test_condensed_equals_full(assembled: Callable[..., Tribosystem], name: str)
 
 def test_condensed_equals_full_on_unmatched_nodes(unmatched: Tribosystem) -> None:
     """The same where the nodes of the two surfaces do not coincide."""
-    full = FullContact(unmatched.punch, unmatched.strip, unmatched.interface, unmatched.slip(-1)).solve(worn(unmatched))
+    bodies, ratio = unmatched.bodies, unmatched.friction_ratio(-1)
+    full = FullContact(bodies.punch, bodies.strip, unmatched.interface, ratio).solve(worn(unmatched))
     condensed = unmatched.contact((-1,)).solve(worn(unmatched))
     np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * condensed.pressure.max())
 
@@ -155,7 +156,7 @@ def test_no_convergence_is_said(assembled: Callable[..., Tribosystem], one_itera
 
 def rounded(assembled: Callable[..., Tribosystem], force: float, *settings: str) -> Tribosystem:
     """Return a punch that is all but rigid, on a strip that is all but a half-plane, under N/mm."""
-    return assemble(
+    return assembled(
         "rounded-punch",
         *("geometry.parameters.strip_length=4000", "geometry.parameters.strip_height=1000", "contact.friction=0"),
         *("materials.stiff={young=1e9, poisson=0.3}", "punch.regions={punch_body='stiff'}"),

@@ -21,7 +21,7 @@ def run(system: Tribosystem, half_cycles: int) -> list[Block]:
     def integrate(now: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         return jump(now, half_cycles, tolerance=0.1, start=start, leave=leave)
 
-    return list(follow(system, integrate, lambda now: now.reduced_exchange))
+    return list(follow(system, integrate, lambda now: now.exchange))
 
 
 def test_moved_meshes_agree_with_the_offset(assembled: Callable[..., Tribosystem]) -> None:
@@ -46,8 +46,8 @@ def test_temperature_keeps_its_place(assembled: Callable[..., Tribosystem]) -> N
     worn = Worn(0.3 + 0.1 * (system.pair.x / 30) ** 2, 0.1 + 0 * system.pair.strip.weights)
     moved = assemble(system.case, system.comm, worn)
     assert system.bodies.heat is not None
-    assert moved.heat_bodies is not None
-    for old, new in zip(system.bodies.heat, moved.heat_bodies, strict=True):
+    assert moved.bodies.heat is not None
+    for old, new in zip(system.bodies.heat, moved.bodies.heat, strict=True):
         x, there = (body.space.tabulate_dof_coordinates()[: body.owned] for body in (old, new))
         linear = partial(np.dot, b=np.array([0.3, 2.0, 0.0]))
         carried = _in_place(old.function(linear(x)), new.function(linear(x)))

@@ -157,7 +157,7 @@ def test_implicit_tends_to_explicit(assembled: Callable[..., Tribosystem]) -> No
     """At the same worn depth the two differ by first order in the step: half the step, half the difference."""
     differences = []
     for steps in (40, 80, 160):
-        system = assemble(
+        system = assembled(
             "example1", "geometry.degree=2", one_way("rightward", 120 / steps), "wear.punch.coefficient=1e-7"
         )
         ends = [run(system, steps, implicit=implicit).pressure[-1] for implicit in (True, False)]

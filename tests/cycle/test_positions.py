@@ -122,7 +122,7 @@ def test_sliding_out_of_the_plane(assembled: Callable[..., Tribosystem]) -> None
     plain = assembled("example1", *COARSE, "contact.friction=0")
     across = assembled("example1", *COARSE, "motion.axis=y")
     np.testing.assert_allclose(steady(across).pressure, steady(plain).pressure, atol=1e-9 * MEAN)
-    np.testing.assert_allclose(across.friction.cross(-1, np.array([0.25])), -0.25)
+    np.testing.assert_allclose(across.friction.ratio(-1, np.full_like(across.pair.x, 0.25), across.pair)[:, 1], -0.25)
     pulled = assembled("example1", *COARSE, "motion.axis=y", "contact.transverse_friction=0.1")
     leftward = assembled("example1", *COARSE, "contact.friction=0.1")
     for direction in (1, -1):
@@ -182,7 +182,7 @@ def test_friction_of_pressure_balances(assembled: Callable[..., Tribosystem]) ->
     system = assembled("example1", *COARSE, "contact.friction={expression='0.1 + 0.002 * p'}")
     *_, block = march(system, 4)
     p = block.pressure[-1]
-    balance = system.rigid.equilibrium(-(0.1 + 0.002 * p)) @ p + system.rigid.resultant
+    balance = system.rigid.equilibrium(np.stack([-(0.1 + 0.002 * p), 0 * p], axis=1)) @ p + system.rigid.resultant
     assert np.abs(balance).max() < 1e-6 * 1000 * 30
 
 

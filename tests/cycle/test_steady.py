@@ -128,7 +128,7 @@ def test_forty_thousand_marched_half_cycles_end_there(assembled: Callable[..., T
 def test_neither_speed_nor_coefficient_changes_it(assembled: Callable[..., Tribosystem]) -> None:
     """For any a, beta~, u0 and omega the pressures and the shape are the same; only the wear per cycle scales."""
     one = steady(assembled("example1"))
-    system = assemble(
+    system = assembled(
         "example1", "wear.punch.speed_exponent=2", "wear.punch.coefficient=1e-6", "motion.angular_frequency=3"
     )
     two = steady(system)

@@ -23,7 +23,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import FenwearError, Tribosystem, assemble, jump, load_case, steady
+from fenwear import FenwearError, assemble, jump, load_case, steady
 from fenwear.cycle import cycles_to_reach
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements

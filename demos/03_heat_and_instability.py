@@ -27,7 +27,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import Tribosystem, assemble, load_case, march, steady
+from fenwear import assemble, load_case, march, steady
 from fenwear.cycle import critical_speed, growth_rate, monotonic
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles

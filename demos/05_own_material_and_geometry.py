@@ -27,7 +27,7 @@ import numpy as np
 import xarray
 from matplotlib.collections import PolyCollection
 
-from fenwear import CaseError, Tribosystem, assemble, make_case, steady
+from fenwear import CaseError, assemble, make_case, steady
 from fenwear.compat import geometry_dofmap
 from fenwear.cycle import growth_rate
 from fenwear.report.figures import read_history

@@ -24,7 +24,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, jump, load_case, steady
+from fenwear import CaseError, ConvergenceError, assemble, jump, load_case, steady
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements and cycles
 ELEMENTS, CYCLES = (16, (100, 500, 1_000)) if COARSE else (30, (1_000, 5_000, 18_000))

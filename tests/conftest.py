@@ -29,6 +29,7 @@ settings.register_profile("search", settings.get_profile("same"), derandomize=Fa
 settings.load_profile("same")
 
 Edit = Callable[[dict[str, Any]], object]
+PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
 
 
 @lru_cache(maxsize=24)  # the largest hold some hundred MB
@@ -80,7 +81,7 @@ def run_python() -> Callable[..., subprocess.CompletedProcess[str]]:
         start = [sys.executable] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable]
         command = [*start, *map(str, arguments)]
         env = {**environment, **variables}
-        return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=env, timeout=300, check=False)
+        return subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=env, timeout=PATIENCE, check=False)
 
     return run_python
 
@@ -89,6 +90,13 @@ def run_python() -> Callable[..., subprocess.CompletedProcess[str]]:
 def fenwear(run_python: Callable[..., Any]) -> Callable[..., Any]:
     """Return fenwear(*arguments, ranks=1, ...): the command line in a process of its own."""
     return lambda *arguments, **options: run_python("-m", "fenwear", *arguments, **options)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what starts a process with the fixtures above: an interpreter and its imports take seconds."""
+    for item in items:
+        if "run_python" in getattr(item, "fixturenames", ()):
+            item.add_marker("process")
 
 
 def pytest_runtest_teardown() -> None:

@@ -12,13 +12,19 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
 ROOT = Path(__file__).parents[1]
 DOCKERFILE = ROOT / "docker" / "Dockerfile"
-pytestmark = pytest.mark.skipif(not DOCKERFILE.is_file(), reason="no checkout: the Dockerfile is not installed")
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(not DOCKERFILE.is_file(), reason="no checkout: the Dockerfile is not installed"),
+]
 
 
 def instructions(stage: str) -> list[tuple[str, str]]:
@@ -57,7 +63,7 @@ def test_jupyter_image_is_not_root() -> None:
 
 def test_no_secrets_in_the_image() -> None:
     """What the host lends is mounted for one instruction; nothing else names a secret, and git's folder stays out."""
-    for stage in ("base", "dev", "jupyter"):
+    for stage in ("run", "full", "dev", "docs", "jupyter"):
         for word, rest in instructions(stage):
             assert word in ("FROM", "RUN", "ENV", "COPY", "WORKDIR", "USER", "EXPOSE", "CMD", "ENTRYPOINT"), word
             if word == "RUN":
@@ -72,7 +78,7 @@ def test_no_secrets_in_the_image() -> None:
 
 def test_jupyter_image_writes_below_tmp() -> None:
     """With --read-only --tmpfs /tmp -v results: what programs write for themselves goes below /tmp."""
-    variables = environment("base", "jupyter")
+    variables = environment("run", "full", "jupyter")
     names = [name for name in variables if name.startswith(("XDG", "MPL", "IPYTHON", "JUPYTER"))]
     assert len(names) >= 5
     assert all(variables[name].startswith("/tmp/") for name in names)
@@ -82,7 +88,7 @@ def test_jupyter_image_writes_below_tmp() -> None:
 def answer(port: int, path: str) -> tuple[int, str]:
     """Return status and last address of a request."""
     try:
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=30) as response:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}", timeout=PATIENCE) as response:
             return response.status, response.url
     except urllib.error.HTTPError as error:
         return error.code, error.url
@@ -104,7 +110,7 @@ def test_jupyterlab_asks_for_its_token(tmp_path: Path) -> None:
             [*command, *root], stdout=out, stderr=subprocess.STDOUT, cwd=tmp_path, env={**os.environ, **variables}
         )
         try:
-            deadline = time.monotonic() + 120
+            deadline = time.monotonic() + PATIENCE
             while not (found := re.search(r"token=(\w{40,})", log.read_text())):
                 assert process.poll() is None, log.read_text()
                 assert time.monotonic() < deadline, log.read_text()
@@ -115,7 +121,7 @@ def test_jupyterlab_asks_for_its_token(tmp_path: Path) -> None:
             assert answer(port, f"/api/contents?token={found[1]}")[0] == 200
         finally:
             process.terminate()
-            process.wait(timeout=30)
+            process.wait(timeout=PATIENCE)
 
 
 READ_ONLY = """
@@ -155,6 +161,115 @@ def test_run_without_root_on_a_read_only_system(tmp_path: Path) -> None:
     (tmp_path / "results").mkdir()
     os.chown(tmp_path / "results", 1000, 1000)
     command = ["unshare", "--mount", "sh", "-c", READ_ONLY, "sh", str(tmp_path), str(ROOT), sys.executable]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "results" / "run" / "summary.json").stat().st_uid == 1000
+
+
+STUB = """#!/bin/sh
+[ "$1" = run ] || exit 0
+for word; do
+    [ "$before" = --workdir ] && workdir=$word
+    case $word in --volume=*) echo "${word#--volume=}" ;; esac
+    before=$word
+done
+echo "$workdir"
+"""
+
+
+@pytest.fixture
+def shown(tmp_path: Path) -> Callable[..., Any]:
+    """Return shown(folder, *command): what docker/fenwear would mount and where it would start, or its refusal."""
+    engine = tmp_path / "engine" / "docker"
+    engine.parent.mkdir()
+    engine.write_text(STUB)
+    engine.chmod(0o755)
+    variables = {
+        "PATH": f"{engine.parent}:{os.environ['PATH']}",
+        "FENWEAR_ENGINE": "docker",
+        "XDG_CACHE_HOME": str(tmp_path / "cache"),
+    }
+    launcher = tmp_path / "checkout" / "docker" / "fenwear"
+    launcher.parent.mkdir(parents=True)
+    shutil.copy(ROOT / "docker" / "fenwear", launcher)
+    shutil.copy(DOCKERFILE, launcher.parent)
+
+    def shown(folder: Path, *command: object) -> tuple[dict[Path, Path], Path] | str:
+        words = [str(launcher), *map(str, command)]
+        env = {**os.environ, **variables}
+        done = subprocess.run(words, cwd=folder, env=env, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        if done.returncode:
+            return done.stderr
+        *volumes, workdir = done.stdout.splitlines()
+        pairs = [volume.split(":")[:2] for volume in volumes]
+        return {Path(inside): Path(outside) for outside, inside in pairs}, Path(workdir)
+
+    return shown
+
+
+def inside(path: Path, mounts: dict[Path, Path]) -> Path | None:
+    """Return what an absolute path without links means inside: a file of this machine, or None."""
+    for target in sorted(mounts, key=lambda target: len(target.parts), reverse=True):
+        if path.is_relative_to(target):
+            return mounts[target] / path.relative_to(target)
+    return None
+
+
+@pytest.fixture
+def places(tmp_path: Path) -> Path:
+    """Return a folder with a case in one folder, its geometry in another, and links."""
+    for name in ("work/deep", "cases", "geometry", "elsewhere", "far"):
+        (tmp_path / name).mkdir(parents=True)
+    (tmp_path / "cases" / "own.toml").write_text(
+        'base = "../work/base.toml"\n[geometry]\nfile = "../geometry/own.geo"\n'
+    )
+    (tmp_path / "work" / "base.toml").write_text('base = "../cases/own.toml"\n')  # in a circle: fenwear refuses it
+    (tmp_path / "work" / "link").symlink_to("../elsewhere/link")
+    (tmp_path / "elsewhere" / "link").symlink_to(tmp_path / "far")
+    (tmp_path / "work" / "round").symlink_to("round")
+    return tmp_path
+
+
+NAMED = {
+    "new": (("run", "example1", "-o", "../elsewhere/new/x"), ["elsewhere/new/x"]),
+    "absolute": (("run", "example1", "-o", "{}/elsewhere/out"), ["elsewhere/out"]),
+    "joined": (("run", "example1", "-o../elsewhere/out"), ["elsewhere/out"]),
+    "with an equals sign": (("run", "example1", "--output=../elsewhere/out"), ["elsewhere/out"]),
+    "link": (("run", "example1", "-o", "link/out"), ["elsewhere", "far/out"]),
+    "case": (("check", "../cases/own.toml"), ["cases/own.toml", "geometry/own.geo", "work/base.toml"]),
+    "setting": (("check", "example1", "--set", 'geometry.file="../geometry/own.geo"'), ["geometry/own.geo"]),
+    "compare": (("compare", "../far", "-o", "../elsewhere/x.png"), ["far", "elsewhere/x.png"]),
+    "mesh": (("mesh", "example1", "-o", "../elsewhere/x.msh"), ["elsewhere/x.msh"]),
+    "ranks": (("mpirun", "-n", "2", "python3", "-m", "fenwear", "run", "example1", "-o", "../far/x"), ["far/x"]),
+    "another program": (("python3", "../cases/script.py", "/usr/share/x", "../far"), ["cases/script.py", "far"]),
+}
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_what_a_command_names_is_visible(name: str, shown: Callable[..., Any], places: Path) -> None:
+    """Under its own name, and seen from the same directory, so that it means the same as outside."""
+    words, expected = NAMED[name]
+    mounts, workdir = shown(places / "work", *(word.format(places) if "{}" in word else word for word in words))
+    assert workdir == places / "work"
+    for path in ("work/x", *expected):
+        assert inside(places / path, mounts) == places / path
+    assert inside(places / "engine", mounts) is None
+
+
+@pytest.mark.parametrize(
+    "path", ["/usr/share/out", "/etc/out", "/new/out", "/home/out", "../../../../../../../../../proc/x", "round/out"]
+)
+def test_what_cannot_be_visible_is_refused(path: str, shown: Callable[..., Any], places: Path) -> None:
+    """Before anything is computed."""
+    for words in (("run", "example1", "-o", path), ("mesh", "example1", f"--output={path}"), ("check", path)):
+        refusal = shown(places / "work", *words)
+        assert f"{path} cannot be shown inside the container" in refusal
+
+
+def test_the_checkout_is_its_own_and_fenwear(shown: Callable[..., Any], places: Path) -> None:
+    """Paths mean the same in the checkout as anywhere else; the package is imported from /fenwear."""
+    mounts, workdir = shown(places / "checkout" / "docker", "run", "example1", "-o", "../../far/x")
+    assert workdir == places / "checkout" / "docker"
+    for path in ("checkout/results", "far/x"):
+        assert inside(places / path, mounts) == places / path
+    assert mounts[Path("/fenwear")] == places / "checkout"

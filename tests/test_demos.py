@@ -24,7 +24,7 @@ NAMES = [
     "06_the_paper",
     "07_fretting",
 ]
-SECONDS = 300
+SECONDS = 1800  # ends what hangs, however busy the machine
 
 
 def _cells(notebook: Any) -> list[tuple[str, str]]:
@@ -45,7 +45,7 @@ def _report(name: str, notebook: Any, error: Exception) -> str:
 
 def test_names() -> None:
     """Every script has its notebook, and none is left out here."""
-    assert sorted(p.stem for p in DEMOS.glob("*.py")) == NAMES
+    assert sorted(p.stem for p in DEMOS.glob("[0-9]*.py")) == NAMES
     assert sorted(p.stem for p in DEMOS.glob("*.ipynb")) == NAMES
 
 

@@ -31,7 +31,7 @@ def slider(tmp_path_factory: pytest.TempPathFactory) -> Case:
         (folder / name).write_text(saved_as(name), "utf-8")
     command = re.search(r"`(gmsh -2 [^`]*)`", README.read_text("utf-8"))
     assert command
-    subprocess.run(command[1].split(), cwd=folder, check=True, capture_output=True, timeout=60)
+    subprocess.run(command[1].split(), cwd=folder, check=True, capture_output=True, timeout=1800)
     return load_case(folder / "slider.toml")
 
 

@@ -97,7 +97,7 @@ class ElasticBody:
         self._set_loads(description.loads)
         try:
             form = fem.form(a)
-        except ArityMismatch:
+        except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(Problem(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
         self.stiffness = assembled(form, bcs)
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)

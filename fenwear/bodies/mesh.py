@@ -7,18 +7,19 @@ the curves that meet; further curves and points are for supports, loads and ther
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from dolfinx.mesh import Mesh, MeshTags
+from dolfinx.mesh import Mesh, MeshTags, locate_entities_boundary, meshtags
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear import compat
+from fenwear.arrays import Array, Mask
 from fenwear.bodies.mesh_check import element_problems
 from fenwear.case import Geometry
 from fenwear.errors import CaseError, OutputError, Problem
@@ -54,6 +55,38 @@ class BodyMesh:
         if group not in self.curves:
             raise CaseError(Problem(key, f"no physical curve {group!r} on the {self.name}{_known(self.curves)}"))
         return self.curves[group]
+
+
+def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]]) -> BodyMesh:
+    """Return the mesh of a body with groups of boundary facets that are marked by functions; collective.
+
+    Args:
+        name: "punch" or "strip".
+        mesh: Its mesh, mm.
+        groups: For each group whether points x (3, q) belong to it, such as NAME_contact for the contact.
+
+    Raises:
+        CaseError: the name is another one, or a group is missing or has no facets.
+    """
+    if name not in BODIES:
+        raise CaseError(Problem("name", f"expected one of {' and '.join(BODIES)}, got {name!r}"))
+    fdim = mesh.topology.dim - 1
+    facets, values = [], []
+    for tag, (group, marker) in enumerate(groups.items(), start=1):
+        found = locate_entities_boundary(mesh, fdim, marker)
+        if mesh.comm.allreduce(len(found)) == 0:
+            raise CaseError(Problem(group, f"no facet on the boundary of the {name} belongs to it"))
+        facets.append(found)
+        values.append(np.full(len(found), tag, dtype=np.int32))
+    if f"{name}_contact" not in groups:
+        raise CaseError(Problem(f"{name}_contact", f"missing, but required{_known(groups)}"))
+    order = np.argsort(np.concatenate(facets), kind="stable")
+    every, first = np.unique(np.concatenate(facets)[order], return_index=True)
+    facet_tags = meshtags(mesh, fdim, every.astype(np.int32), np.concatenate(values)[order][first])
+    cells = np.arange(mesh.topology.index_map(fdim + 1).size_local, dtype=np.int32)
+    cell_tags = meshtags(mesh, fdim + 1, cells, np.ones(len(cells), dtype=np.int32))
+    curves = {group: tag for tag, group in enumerate(groups, start=1)}
+    return BodyMesh(name, mesh, cell_tags, facet_tags, {f"{name}_body": 1}, curves, {})
 
 
 def _known(groups: object) -> str:

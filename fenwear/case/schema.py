@@ -170,7 +170,7 @@ class Prescribed(_Part):
 class Body(_Part):
     """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
-    regions: Annotated[dict[str, str], Field(min_length=1)]
+    regions: dict[str, str] = Field(default={}, description="name of the material of each region")
     supports: tuple[Support, ...] = ()
     loads: tuple[Load, ...] = ()
     temperatures: tuple[Prescribed, ...] = ()
@@ -580,6 +580,11 @@ class Case(_Part):
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
         problems += self._sliding_problems()
+        problems += [
+            f"{body}.regions: missing, but required"
+            for body, part in (("punch", self.punch), ("strip", self.strip))
+            if not part.regions
+        ]
         if not any(load.force or load.traction for load in self.punch.loads):
             problems.append("punch.loads: expected at least one load that presses the punch on the strip")
         if problems:

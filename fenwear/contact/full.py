@@ -20,6 +20,10 @@ from fenwear.contact.condensed import ContactState, Layer
 from fenwear.contact.inequality import check, configure
 from fenwear.interface import Interface
 
+# Where a step is cut off at p = 0 the gap, a function of u alone, is still zero up to rounding of either sign: this
+# much, over the scale of gaps, makes the node open.
+OPEN = 1e-11
+
 
 class FullContact:
     """The inequality on the full system in one sliding direction, distributed over the ranks.
@@ -87,7 +91,7 @@ class FullContact:
         self.snes = PETSc.SNES().create(self.comm)
         self.snes.setFunction(self._residual, self._x.duplicate())
         self.snes.setJacobian(lambda snes, x, J, P: None, self._operator)
-        configure(self.snes, "fenwear_full_contact_", zero=1e-10)
+        configure(self.snes, "fenwear_full_contact_")
         self.snes.setTolerances(atol=1e-9)  # the rounding of a system with all displacements in it
         self.snes.ksp.pc.setFactorSolverType("mumps")
         self.snes.setVariableBounds(lower, upper)
@@ -118,7 +122,7 @@ class FullContact:
         contact = slice(self._free, self._free + n)
         self._offset.array[:] = self._constant
         if self.comm.rank == 0:
-            self._offset.array[contact] += gap / self._gap_scale
+            self._offset.array[contact] += gap / self._gap_scale + OPEN
             if start is None:
                 self._x.array[contact] = 1.0
         self.snes.solve(None, self._x)

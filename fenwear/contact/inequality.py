@@ -23,21 +23,14 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 ZERO_PIVOT = 71  # PETSC_ERR_MAT_LU_ZRPVT
 
 
-def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic", zero: float = 1e-12) -> None:
-    """Set what all of fenwear's inequalities share; options with `prefix` override it.
-
-    Args:
-        snes: The solver.
-        prefix: Of its options.
-        line_search: PETSc's name of one.
-        zero: What counts as at a bound: the rounding of a solution.
-    """
+def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None:
+    """Set what all of fenwear's inequalities share; options with `prefix` override it."""
     snes.setOptionsPrefix(prefix)
     snes.setType("vinewtonrsls")
     # Residuals are scaled to 1 and need few steps; a step that changes nothing ends the iteration.
     snes.setTolerances(rtol=0.0, atol=1e-11, stol=0.0, max_it=100)
     options = PETSc.Options()
-    for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", zero)):
+    for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", 1e-12)):
         if not options.hasName(f"{prefix}{name}"):
             options[f"{prefix}{name}"] = value
     snes.ksp.setType("preonly")

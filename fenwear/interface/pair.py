@@ -35,7 +35,10 @@ class ContactPair:
         normal: e_n (n, d), unit normals into the punch.
         weights: Areas of the nodes seen along e_n (n,), mm in the plane, mm² in a solid.
         transfer: Takes displacements and temperatures at the strip's trace nodes to the punch's nodes (n, N_strip).
-        material: Takes worn depths on the strip's material to the punch's nodes (n, n_strip); not negative.
+        material: Takes worn depths on the strip's material to the punch's nodes (n, n_strip), as `transfer` takes
+            the place of its nodes: a depth opens the gap as if the mesh had been made with it.
+        deposit: Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, and no
+            entry negative, so that no surface ever grows.
         initial_gap: Distance along e_n before any deformation and wear (n,), mm.
     """
 
@@ -46,18 +49,13 @@ class ContactPair:
     weights: Array
     transfer: csr_array
     material: csr_array
+    deposit: csr_array
     initial_gap: Array
 
     @property
     def x(self) -> Array:
         """Abscissae of the contact nodes (n,), mm."""
         return self.punch.x[:, 0]
-
-    @cached_property
-    def deposit(self) -> csr_array:
-        """Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, never negative."""
-        scaled = self.material.multiply(self.weights[:, None]).T / self.strip.weights[:, None]
-        return csr_array(scaled)
 
     @cached_property
     def normal_on_strip(self) -> Array:
@@ -89,16 +87,17 @@ def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HE
     common = overlap(first, second)
     _check_covered(common, first, second, placement)
     transfer = dual_transfer(first, second, common)
-    normal = wear_transfer(first, second) @ strip_outward if strip.cell == "triangle" else transfer @ strip_outward
+    material = _material(first, second, transfer)
+    normal = material @ strip_outward
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
     if placement == HERE:
         _check_facing(punch, normal, facing, axis)
     gap = np.einsum("ic,ic->i", normal, punch.spread.T @ punch.trace - transfer @ strip_trace)
     # Forces act along the common normal: a node's weight is its area seen along it.
-    return ContactPair(
-        punch, strip, placement, normal, punch.weights * facing, transfer, wear_transfer(first, second), gap
-    )
+    weights = punch.weights * facing
+    deposit = _deposit(first, second, weights, strip.weights)
+    return ContactPair(punch, strip, placement, normal, weights, transfer, material, deposit, gap)
 
 
 def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
@@ -112,8 +111,26 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     axis = _chart_axis(middle.strip)
     first = _charted(middle.punch, middle.punch.trace, axis)
     second = _charted(middle.strip, placement.points(middle.strip.trace), axis)
-    _check_covered(overlap(first, second), first, second, placement)
-    return replace(middle, placement=placement, material=wear_transfer(first, second))
+    common = overlap(first, second)
+    _check_covered(common, first, second, placement)
+    material = _material(first, second, dual_transfer(first, second, common))
+    deposit = _deposit(first, second, middle.weights, middle.strip.weights)
+    return replace(middle, placement=placement, material=material, deposit=deposit)
+
+
+def _material(first: ChartedSurface, second: ChartedSurface, transfer: csr_array) -> csr_array:
+    """Return what takes values at the strip's pressure nodes to the punch's (n, n_strip)."""
+    if len(second.nodes) == len(second.s):
+        return transfer
+    # On the vertices alone: linear on each facet.
+    vertices = np.arange(len(second.nodes))
+    linear = ChartedSurface(second.s[second.nodes], second.pressure_facets, second.cell, 1, vertices)
+    return dual_transfer(first, linear)
+
+
+def _deposit(first: ChartedSurface, second: ChartedSurface, weights: Array, strip_weights: Array) -> csr_array:
+    """Return what puts depths of the punch's nodes on the strip's by the areas that their own areas share."""
+    return csr_array(wear_transfer(first, second).multiply(weights[:, None]).T / strip_weights[:, None])
 
 
 def check_distance(pair: ContactPair) -> None:

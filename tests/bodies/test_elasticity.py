@@ -135,7 +135,7 @@ def test_a_support_at_a_point_is_the_same_as_on_its_group(assembled: Callable[..
     named = assembled("example1", "geometry.degree=2")
     placed = assembled("example1", "geometry.degree=2", "punch.supports.0={at=[30, 120], fix=['x']}")
     np.testing.assert_array_equal(placed.interface.gap_by_force, named.interface.gap_by_force)
-    assert placed.punch.pivot == named.punch.pivot == (30, 120)
+    assert tuple(placed.bodies.punch.pivot) == tuple(named.bodies.punch.pivot) == (30, 120)
 
 
 def test_a_support_off_the_body_is_refused() -> None:

@@ -124,9 +124,9 @@ def test_sliding_out_of_the_plane(assembled: Callable[..., Tribosystem]) -> None
     np.testing.assert_allclose(steady(across).pressure, steady(plain).pressure, atol=1e-9 * MEAN)
     np.testing.assert_allclose(across.friction.ratio(-1, np.full_like(across.pair.x, 0.25), across.pair)[:, 1], -0.25)
     pulled = assembled("example1", *COARSE, "motion.axis=y", "contact.transverse_friction=0.1")
-    leftward = assembled("example1", *COARSE, "contact.friction=0.1")
+    rightward = assembled("example1", *COARSE, "contact.friction=0.1")  # -mu_d e_n x e_y = mu_d e_x
     for direction in (1, -1):
-        np.testing.assert_allclose(pulled.optimum(direction).pressure, leftward.optimum(-1).pressure, rtol=1e-12)
+        np.testing.assert_allclose(pulled.optimum(direction).pressure, rightward.optimum(1).pressure, rtol=1e-12)
     both = assembled("example1", *COARSE, "motion.axis=y", "wear.strip.coefficient=3.926990816987242e-8")
     assert steady(both).velocity["lambda_F"] == pytest.approx(2 * steady(across).velocity["lambda_F"], rel=1e-9)
 

@@ -41,7 +41,7 @@ from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError, MeshQualityError
 from fenwear.heat.exchange import HeatExchange
 
-SECONDS = 60.0
+SECONDS = 60.0  # of processor time
 NAMES = tuple(bases.BASES)
 
 # Sizes of units in fenwear's own, written down here and not taken from the library that fenwear uses.

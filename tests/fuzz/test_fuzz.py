@@ -21,6 +21,7 @@ from fenwear.case.dependence import evaluate, parse_expression
 from fenwear.errors import FenwearError, Problem
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(("task", "count"), [(cases.try_case, 300), (cases.try_mesh, 20)])
 def test_sample(task: Any, count: int) -> None:
     """Mutated cases and meshes are computed or refused with words; both happens."""
@@ -69,12 +70,15 @@ def test_python_is_noticed(text: str) -> None:
     assert not cases.said(CaseError(Problem("contact.friction", f"got {text!r}"))).startswith("BAD")  # quoted only
 
 
+@pytest.mark.process
 def test_crash_and_hang_are_told() -> None:
-    """Of processes that die and that do not end."""
+    """Of processes that die, that compute for ever and that wait for ever."""
     from pool import verdicts
 
-    found = {v.seed: v.kind for v in verdicts(misbehave, range(4), workers=2, seconds=5)}
+    found = {v.seed: v.kind for v in verdicts(misbehave, range(4), workers=2, seconds=2)}
     assert found == {0: "ok", 1: "crash", 2: "hang", 3: "traceback"}
+    (waits,) = verdicts(misbehave, range(4, 5), workers=1, seconds=2, patience=2)
+    assert waits.kind == "hang"
 
 
 def misbehave(seed: int) -> tuple[str, str]:
@@ -84,7 +88,9 @@ def misbehave(seed: int) -> tuple[str, str]:
 
     if seed == 1:
         os.kill(os.getpid(), signal.SIGSEGV)
-    if seed == 2:
+    while seed == 2:
+        pass
+    while seed == 4:
         time.sleep(1000)
     if seed == 3:
         raise ZeroDivisionError
@@ -153,7 +159,7 @@ def test_expressions_compute_or_are_refused(text: str, tmp_path: Path, monkeypat
     seen: list[str] = []
     _watched.append(seen)
     nodes = {"T": np.zeros(1000), "p": np.linspace(0, 100, 1000), "v": np.asarray(10.0)}
-    begin = time.process_time()
+    begin = time.process_time()  # of the processor: the same on a busy machine
     message, shape = "", (0,)
     try:
         shape = evaluate(parse_expression(text), nodes, (1000,)).shape
@@ -162,7 +168,7 @@ def test_expressions_compute_or_are_refused(text: str, tmp_path: Path, monkeypat
     finally:
         _watched.clear()
     assert shape == (1000,) or "expected" in message or "wrong number of arguments" in message
-    assert time.process_time() - begin < 0.5
+    assert time.process_time() - begin < 10  # some take a millisecond, without limits of ours some take for ever
     assert not [
         event for event in seen if event.startswith(("open", "os.", "subprocess.", "exec", "import", "socket."))
     ]

@@ -71,11 +71,11 @@ def test_a_signal_loses_nothing(fenwear: Run, tmp_path: Path, number: signal.Sig
     command = [sys.executable, "-m", "fenwear", "run", "example1-heat", "-o", str(folder), *settings]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=environment) as process:
-        deadline = time.monotonic() + 120
-        while not (folder / "checkpoint").exists() and time.monotonic() < deadline:
+        while not (folder / "checkpoint").exists():
+            assert process.poll() is None
             time.sleep(0.05)
         process.send_signal(number)
-        _, messages = process.communicate(timeout=20)
+        _, messages = process.communicate(timeout=1800)  # ends what hangs, however busy the machine
     if number == signal.SIGKILL:
         assert process.returncode == -number
     else:

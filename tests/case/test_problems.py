@@ -32,7 +32,7 @@ def problems(*settings: str, name: str = "example1-heat") -> list[str]:
         ("punch.loads.0.force=[1]", "punch.loads.0.force.1: missing, but required"),
         ("punch.loads.0.force=[1, 2, 3]", "punch.loads.0.force: expected at most 2 entries, got 3"),
         ("punch.supports.0.fix=[]", "punch.supports.0.fix: expected at least 1 entry, got 0"),
-        ("punch.regions={}", "punch.regions: expected at least 1 entry, got 0"),
+        ("punch.regions={}", "punch.regions: missing, but required"),
         ("model.plane=stres", "model.plane: expected 'stress' or 'strain', got 'stres'; did you mean 'stress'?"),
         ("motion.profile=sinus", "motion.profile: expected 'sinusoidal', 'triangular' or 'trapezoidal', got 'sinus'; "
                                  "did you mean 'sinusoidal'?"),

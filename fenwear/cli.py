@@ -7,15 +7,19 @@ import math
 import sys
 import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from mpi4py import MPI
 
 import fenwear
-from fenwear.case import Case, builtin_cases, load_case
+from fenwear.case import Case, builtin_cases, doubts, load_case
 from fenwear.errors import CaseError, Problem
 from fenwear.parallel import on_root
+
+if TYPE_CHECKING:
+    from fenwear.assembly import Tribosystem
+    from fenwear.cycle import Steady
 
 app = typer.Typer(
     help="Thermo-mechanical sliding wear with FEniCSx. Without a command: runs the built-in Example 1.",
@@ -92,34 +96,49 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
+    from fenwear.watch import steady_warnings
 
     begin = time.perf_counter()
-    system = assemble(_load(case, settings), heat="reduced")
+    loaded = _load(case, settings)
+    system = assemble(loaded, heat="reduced")
     setup = time.perf_counter() - begin
     state = steady(system)
+    warnings = [*doubts(loaded), *steady_warnings(system, state)]
+    for warning in warnings:
+        log(f"warning: {warning}")
+    if not as_json:
+        _print_steady(case, system, state)
+    way = time.perf_counter()
     rate = growth_rate(system, state.phase_pressure)
     cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
-    if as_json:
-        pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
-        _print_json(
-            {
-                "x": system.pair.x.tolist(),
-                "pressure_plus": pressures.get(1),
-                "pressure_minus": pressures.get(-1),
-                "shape": state.shape.tolist(),
-                "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
-                "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
-                "growth_rate": rate,
-                "contact_width": state.contact_width.tolist(),
-                "wear_per_cycle": state.wear_per_cycle.tolist(),
-                **state.velocity,
-                "cycles_to_1_percent": cycles,
-                "seconds": state.seconds,
-            }
-        )
+    seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
+    if not as_json:
+        _print_way(rate, cycles, seconds, time.perf_counter() - begin)
         return
-    print(f"cyclic steady state of {case} ({state.iterations} Newton iterations, {1e3 * state.seconds:.0f} ms; "
-          f"set-up {setup:.1f} s)")  # fmt: skip
+    pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
+    _print_json(
+        {
+            "x": system.pair.x.tolist(),
+            "pressure_plus": pressures.get(1),
+            "pressure_minus": pressures.get(-1),
+            "shape": state.shape.tolist(),
+            "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
+            "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
+            "growth_rate": rate,
+            "contact_width": state.contact_width.tolist(),
+            "wear_per_cycle": state.wear_per_cycle.tolist(),
+            **state.velocity,
+            "cycles_to_1_percent": cycles,
+            "seconds": state.seconds,
+            "all_seconds": {**seconds, "in_all": time.perf_counter() - begin},
+            "warnings": warnings,
+        }
+    )
+
+
+def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
+    """Print the state as soon as it is there: the way to it may take longer."""
+    print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
         print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
               f"contact width {width:7.3f} mm")  # fmt: skip
@@ -128,12 +147,23 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     if state.heat is not None:
         punch, strip = state.heat.punch.max(), state.heat.strip.max()
         print(f"  largest temperature at the contact: punch {punch:.3f} K, strip {strip:.3f} K")
+    sys.stdout.flush()
+
+
+def _print_way(rate: float, cycles: int | None, seconds: dict[str, float], in_all: float) -> None:
+    """Print how the state is reached, and where the time went."""
     if rate > 0:
         print(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
     elif cycles is None:
         print("  pressure within 1 % of the mean pressure: not within ten million cycles from the initial shape")
     else:
         print(f"  pressure within 1 % of the mean pressure after about {cycles:,} cycles from the initial shape")
+    print(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
+          f"steady state {_duration(seconds['steady'])}, the way there {_duration(seconds['way_there'])}")  # fmt: skip
+
+
+def _duration(seconds: float) -> str:
+    return f"{1e3 * seconds:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"
 
 
 def _velocities(velocity: dict[str, float], per: str) -> str:
@@ -171,12 +201,13 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     from fenwear.assembly import assemble
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
+    from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
     system = assemble(loaded, heat="none")
     number = stability_number(system)
     system.check_touching()
-    for warning in position_warnings(system):
+    for warning in [*position_warnings(system), *doubts(loaded), *initial_warnings(system)]:
         log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "

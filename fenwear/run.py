@@ -16,7 +16,7 @@ from mpi4py import MPI
 from tqdm import tqdm
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
-from fenwear.case import Case
+from fenwear.case import Case, doubts
 from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
 from fenwear.cycle.moment import Moment, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, MeshQualityError, OutputError, Problem
@@ -34,6 +34,7 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
+from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 Log = Callable[[str], None]
@@ -96,7 +97,12 @@ def _run(
     times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
     # Who interrupts a run is in a hurry: its figures can be drawn later.
     report = system.case.output.report and not isinstance(failure, InterruptedRunError)
-    how = {"stop": run.stop(failure), **times, "warnings": run.warnings, "retries": run.remedies}
+    how = {
+        "stop": run.stop(failure),
+        **times,
+        "warnings": [*run.warnings, *run.watch.warnings()],
+        "retries": run.remedies,
+    }
     summary = run.finish(how, report=report)
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
@@ -122,6 +128,7 @@ class _Run:
     def __init__(self, system: Tribosystem, directory: Path, log: Log, *, resume: bool) -> None:
         self.directory, self.log = directory, log
         self.comm, self.case = system.comm, system.case
+        self.watch = Watch(system)
         start: Moment | None = None
         if resume:
             followed = checkpoint.followed(directory, system)
@@ -146,7 +153,7 @@ class _Run:
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
-        self.warnings += position_warnings(system)
+        self.warnings += [*position_warnings(system), *doubts(self.case)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
@@ -186,7 +193,16 @@ class _Run:
         return system.exchange
 
     def _blocks(self) -> Iterator[Block]:
-        return follow(self.system, self._integrate, self._exchange, self.start)
+        for block in follow(self.system, self._integrate, self._exchange, self.start):
+            yield block
+            if block.end.half_cycle >= self._last:  # meshes that nothing more is computed on need not follow
+                return
+
+    @property
+    def _last(self) -> int:
+        """The last half-cycle: cycle jumps take whole cycles only."""
+        strokes = self.system.motion.half_cycles if self.case.run.integration == "jump" else 1
+        return self.case.run.half_cycles // strokes * strokes
 
     def _integrate(self, system: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
         run = self.case.run
@@ -204,6 +220,8 @@ class _Run:
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
         self._tell_remedies(block)
+        for warning in self.watch.see(block):
+            self.log(f"warning: {warning}")
         self._on_history(lambda writer: writer.add(block))
         if int(block.half_cycle[-1]) in self._fields_at:
             self._write_fields(block)
@@ -242,7 +260,7 @@ class _Run:
         """Return how the half-cycles ended."""
         if failure is not None:
             return str(failure)
-        return "all half-cycles done" if self.moment.half_cycle >= self.case.run.half_cycles else "periodic"
+        return "all half-cycles done" if self.moment.half_cycle >= self._last else "periodic"
 
     def results_so_far(self, failure: Exception) -> str:
         """Say what there is after a run that ended early, and how to go on."""

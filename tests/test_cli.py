@@ -6,6 +6,7 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5netcdf
@@ -15,6 +16,7 @@ import pytest
 import fenwear as package
 from fenwear import Tribosystem, steady
 from fenwear.case import builtin_cases
+from fenwear.cli import steady_command
 
 Run = Callable[..., Any]
 MEAN = 1e4 / 600
@@ -43,6 +45,8 @@ def test_steady_json(fenwear: Run, assembled: Callable[..., Tribosystem]) -> Non
     found = json.loads(done.stdout)
     assert {"x", "pressure_plus", "pressure_minus", "shape", "temperature"} <= set(found)
     assert found["temperature"] is None
+    assert found["warnings"] == []
+    assert found["all_seconds"]["in_all"] >= found["all_seconds"]["setup"] + found["all_seconds"]["steady"]
     total = np.add(found["pressure_plus"], found["pressure_minus"])
     np.testing.assert_allclose(total, 2 * MEAN, rtol=1e-9)
     state = steady(assembled("example1"))
@@ -57,6 +61,33 @@ def test_texts(fenwear: Run) -> None:
     optimum_text = fenwear("optimum", "monotonic-lz20").stdout
     assert "lambda_F = 0.05 mm/s" in optimum_text
     assert "lambda_M = -0.00055556 rad/s" in optimum_text
+
+
+def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """A command of 196 s printed "663 ms": the state alone. The state is printed before the way to it is sought."""
+    clock, printed = [0.0], []
+
+    def slow(*_arguments: object) -> int:
+        printed.append(capsys.readouterr().out)
+        clock[0] += 196.0
+        return 7
+
+    monkeypatch.setattr("fenwear.cli.time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    monkeypatch.setattr("fenwear.cycle.cycles_to_reach", slow)
+    steady_command("example2", list(options()[1::2]))
+    assert "33.333 MPa" in printed[0]
+    rest = capsys.readouterr().out
+    assert "after about 7 cycles" in rest
+    assert "196.0 s in all: " in rest
+    assert "the way there 196.0 s" in rest
+
+
+def test_check_doubts(fenwear: Run) -> None:
+    """Values that are hardly meant are told on standard error; the case is valid and printed."""
+    done = fenwear("check", "example1", *options("materials.steel.young=210"))
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("warning: materials.steel.young: 0.21 GPa") == 1
+    assert 'young = "210.0 MPa"' in done.stdout
 
 
 def test_run(fenwear: Run, tmp_path: Path) -> None:

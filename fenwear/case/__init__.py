@@ -1,5 +1,6 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
+from fenwear.case.plausible import doubts
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
 from fenwear.case.schema import (
     Body,
@@ -43,6 +44,7 @@ __all__ = [
     "WearLaw",
     "builtin_cases",
     "changed_case",
+    "doubts",
     "load_case",
     "make_case",
 ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -11,12 +10,11 @@ from typing import Any
 
 import pydantic
 
-from fenwear.case.schema import Case, Dependence, OneWay, Reciprocating, Tabulated, part_models
+from fenwear.case.plausible import written
+from fenwear.case.problems import problems_of
+from fenwear.case.schema import Case
+from fenwear.case.units import shown
 from fenwear.errors import CaseError, Problem
-
-MOTIONS: dict[str | int, type] = {"reciprocating": Reciprocating, "one-way": OneWay, "table": Tabulated}
-
-FORMS = {*MOTIONS, "number", "dependence"}  # what pydantic puts into a path besides keys
 
 
 def builtin_cases() -> dict[str, str]:
@@ -54,13 +52,15 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
         text, folder = _read_text(path), path.parent
     try:
         data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise CaseError(Problem(source, f"not a TOML file: {error}")) from None
+    except RecursionError:
+        raise CaseError(Problem(source, "not a TOML file that can be read: it nests too deeply")) from None
     base = data.pop("base", None)
     if base is None:
         return data, folder
     if not isinstance(base, str):
-        raise CaseError(Problem("base", f"expected the name of a case, got {base!r}"))
+        raise CaseError(Problem("base", f"expected the name of a case, got {shown(base)}"))
     if base in base_of or len(base_of) > 8:
         raise CaseError(Problem("base", f"{base!r} has itself as its base"))
     if folder is not None and base.endswith(".toml"):
@@ -87,9 +87,10 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
     try:
-        return Case.model_validate(data).at(folder)
+        case = Case.model_validate(data)
     except pydantic.ValidationError as error:
-        raise CaseError([p for e in error.errors() for p in _problems(e)]) from None
+        raise CaseError([p for e in error.errors() for p in problems_of(e, data)]) from None
+    return case.at(folder, written(data, case.resolved()))
 
 
 def _read_text(path: Path) -> str:
@@ -127,46 +128,6 @@ def _step(place: Any, name: str, setting: str) -> Any:
     if isinstance(place, dict):
         return place.setdefault(name, {})
     raise CaseError(Problem("--set", f"{setting!r} reaches into {name!r}, which is not a table"))
-
-
-def _problems(error: Any) -> list[Problem]:  # noqa: PLR0911
-    """Turn one pydantic error into problems with the key's path as in the case file."""
-    key = ".".join(str(step) for step in error["loc"] if step not in FORMS)
-    message = str(error["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
-    match error["type"]:
-        case "extra_forbidden":
-            return [Problem(key, f"unknown key{_suggestion(error['loc'])}")]
-        case "missing":
-            return [Problem(key, "missing, but required")]
-        case "union_tag_not_found" | "union_tag_invalid":
-            return [Problem(f"{key}.kind", f"expected one of {', '.join(map(str, MOTIONS))}")]
-        case "value_error" if key and ": " in message and message.split(":")[0].isidentifier():
-            name, _, rest = message.partition(": ")
-            return [Problem(f"{key}.{name}", rest)]
-        case "value_error" if not key:
-            return [Problem(*line.split(": ", 1)) for line in message.splitlines()]
-        case "value_error":
-            return [Problem(key, message)]
-    got = f", got {error['input']!r}" if isinstance(error["input"], str | int | float) else ""
-    return [Problem(key, f"expected {message[:1].lower()}{message[1:]}{got}")]
-
-
-def _suggestion(location: tuple[str | int, ...]) -> str:
-    """Return "; did you mean ...?" for a misspelt key, or the keys that are known there."""
-    model: Any = Case
-    for step in location[:-1]:  # names and numbers of entries are no fields: they stay at the same table
-        field = getattr(model, "model_fields", {}).get(step)
-        if step in MOTIONS:
-            model = MOTIONS[step]
-        elif step == "dependence":
-            model = Dependence
-        elif field is not None:
-            model = next(iter(part_models(field.annotation)), None)
-    names = list(getattr(model, "model_fields", {}))
-    close = difflib.get_close_matches(str(location[-1]), names, n=1)
-    if close:
-        return f"; did you mean {close[0]!r}?"
-    return f"; known here are {', '.join(names)}" if names else ""
 
 
 def changed_case(case: Case, *settings: str) -> Case:

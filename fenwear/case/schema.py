@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -27,7 +28,7 @@ from pydantic import (
 
 from fenwear.arrays import Array
 from fenwear.case.dependence import evaluate, parse_expression, variables_of
-from fenwear.case.units import convert, quantity_text
+from fenwear.case.units import convert, quantity_text, shown
 from fenwear.errors import CaseError, Problem
 
 
@@ -47,7 +48,8 @@ Time = Annotated[float, *_quantity("s")]
 AngularFrequency = Annotated[float, *_quantity("rad/s")]
 Number = Annotated[float, *_quantity("")]
 Temperature = Annotated[float, *_quantity("K")]
-Conductance = Annotated[float, *_quantity("N/(mm*s*K)")]
+CONDUCTANCE = "N/(mm*s*K)"
+Conductance = Annotated[float, *_quantity(CONDUCTANCE)]
 Axis = Literal["x", "z"]
 
 
@@ -62,7 +64,7 @@ def _parameter(value: object) -> float:
     try:
         return convert(value, "mm")
     except ValueError:
-        raise ValueError(f"expected a number or a length such as '60 mm', got {value!r}") from None
+        raise ValueError(f"expected a number or a length such as '60 mm', got {shown(value)}") from None
 
 
 class Geometry(_Part):
@@ -422,6 +424,26 @@ class Tabulated(_ToAndFro):
         return self
 
 
+def _perfect_or_conductance(value: object) -> float | str:
+    """Convert a conductance, which may be perfect."""
+    if value == "perfect":
+        return "perfect"
+    try:
+        conductance = convert(value, CONDUCTANCE)
+    except ValueError as error:
+        raise ValueError(f"{error}; or 'perfect'") from None
+    if conductance < 0:
+        raise ValueError(f"expected greater than or equal to 0, got {shown(value)}")
+    return conductance
+
+
+PerfectOrConductance = Annotated[
+    float | Literal["perfect"],
+    BeforeValidator(_perfect_or_conductance),
+    PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
+]
+
+
 class Heat(_Part):
     """Friction heat and its conduction; without this table a case knows no temperature."""
 
@@ -429,8 +451,9 @@ class Heat(_Part):
         default=0.5, description="kappa, the punch's share of the friction heat"
     )
     debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
-    conductance: Annotated[Conductance, Field(ge=0)] | Literal["perfect"] = Field(
-        default=0.0, description="h_c between punch and strip where they touch"
+    conductance: PerfectOrConductance = Field(
+        default="perfect",
+        description="h_c between punch and strip where they touch; by default 0 where partition is given",
     )
     conductance_per_pressure: tuple[Annotated[float, *_quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
         default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
@@ -466,6 +489,15 @@ class Heat(_Part):
         default=3e-5, description="of the reduced operator's basis, relative"
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _conductance_by_default(cls, data: object) -> object:
+        """Let a partition that is given rule, and leave the sharing to conduction where none is."""
+        if not isinstance(data, Mapping) or data.get("conductance") is not None:
+            return data
+        ruled = data.get("partition") is not None or data.get("conductance_per_pressure") is not None
+        return {**data, "conductance": 0.0 if ruled else "perfect"}
+
 
 class Run(_Part):
     """How far a run goes and how it integrates the wear."""
@@ -497,6 +529,19 @@ class Output(_Part):
     )
 
 
+@dataclass(frozen=True)
+class Written:
+    """How the quantities of a case were written; no part of what the case is, so that all compare as equal.
+
+    Attributes:
+        bare: Keys of those that were numbers without a unit.
+        united: Those with a unit, as they were written.
+    """
+
+    bare: frozenset[str] = field(default=frozenset(), compare=False)
+    united: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+
 class Case(_Part):
     """A problem: the root of the case file."""
 
@@ -514,6 +559,7 @@ class Case(_Part):
     output: Output = Output()
 
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
+    _written: Written = Written()
 
     @model_validator(mode="after")
     def _materials_known(self) -> Self:
@@ -606,10 +652,16 @@ class Case(_Part):
         """The folder of the case file, None for a built-in case or one made in Python."""
         return self._folder
 
-    def at(self, folder: Path | None) -> Case:
-        """Return this case with the folder that its geometry's path starts from."""
+    @property
+    def written(self) -> Written:
+        """How its quantities were written; nothing is known of those of a case made from its parts."""
+        return self._written
+
+    def at(self, folder: Path | None, written: Written | None = None) -> Case:
+        """Return this case with the folder that its geometry's path starts from, and how it was written."""
         placed = self.model_copy()
         placed._folder = folder
+        placed._written = written or self._written
         return placed
 
     def resolved(self) -> dict[str, Any]:

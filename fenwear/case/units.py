@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -37,13 +38,13 @@ def convert(value: object, unit: str) -> float:
     """
     expected = f"expected a number or a string with a unit such as '1 {unit}'" if unit else "expected a number"
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"{expected}, got {value!r}")
+        raise ValueError(f"{expected}, got {shown(value)}")
     try:
         number = _convert_text(value, unit, expected) if isinstance(value, str) else float(value)
     except OverflowError:  # an integer of more than 308 digits
         number = math.inf
     if not math.isfinite(number):
-        raise ValueError(f"{expected} that is finite, got {value!r}")
+        raise ValueError(f"{expected} that is finite, got {shown(value)}")
     return number
 
 
@@ -67,6 +68,26 @@ def _convert_text(text: str, unit: str, expected: str) -> float:
         raise ValueError(f"{expected}, got {text!r}, which is of another kind") from error
     except Exception as error:  # pint's parser raises many types on nonsense
         raise ValueError(f"{expected}, got {text!r}, whose unit is not known") from error
+
+
+def shown(value: object) -> str:  # noqa: PLR0911
+    """Return a value as a message shows it, in the words of case files."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case str():
+            return repr(str(value))
+        case int():
+            return str(int(value)) if abs(value) < 10**300 else "a number of more than 300 digits"
+        case float():
+            return repr(float(value))
+        case Mapping():
+            return "a table"
+        case list() | tuple():
+            return "a list"
+        case None:
+            return "nothing"
+    return "something else"
 
 
 def quantity_text(value: float, unit: str) -> str | float:

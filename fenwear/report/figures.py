@@ -74,7 +74,13 @@ def nearest_half_cycles(history: xarray.Dataset, wanted: Sequence[int]) -> list[
 
 def mean_pressure(history: xarray.Dataset) -> float:
     """Return the load over the nominal contact, MPa."""
-    return float((history.pressure.isel(half_cycle=-1) * history.weight).sum() / history.weight.sum())
+    last = history.isel(half_cycle=-1)
+    return float((last.pressure * last.weight).sum() / last.weight.sum())
+
+
+def nominal_width(history: xarray.Dataset) -> float:
+    """Return the width of the nominal contact at the end, mm."""
+    return float(history.weight.isel(half_cycle=-1, missing_dims="ignore").sum())
 
 
 def directions_present(history: xarray.Dataset) -> list[int]:
@@ -186,7 +192,7 @@ def peak_figure(history: xarray.Dataset) -> Figure:
     mean = mean_pressure(history)
     reference_line(axes[0], mean, f"mean {mean:.2f}")
     reference_line(axes[0], 2 * mean, f"twice the mean {2 * mean:.2f}")
-    nominal = float(history.weight.sum())
+    nominal = nominal_width(history)
     reference_line(axes[1], nominal, f"nominal width {nominal:g}")
     for ax in axes[:2]:
         ax.set_ylim(bottom=0)

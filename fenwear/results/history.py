@@ -27,7 +27,7 @@ SECONDS_BETWEEN_WRITES = 2.0
 CHUNK = 256  # rows that a variable's storage grows by
 INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
 
-# name: (dimensions, units, long_name); a Block has an attribute of each name
+# name: (dimensions, units, long_name); a Block has an attribute of each name but the weights
 VARIABLES = {
     "half_cycle": (("half_cycle",), "1", "number of the half-cycle"),
     "time": (("half_cycle",), "s", "time at the end of the half-cycle"),
@@ -42,6 +42,7 @@ VARIABLES = {
     "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the mean pressure"),
     "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
     "retries": (("half_cycle",), "1", "solves that took a second attempt, in another way or in smaller steps"),
+    "weight": (("half_cycle", "x"), "mm", "length that each contact node stands for, on the mesh of the half-cycle"),
 }
 
 INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
@@ -68,6 +69,11 @@ HEAT_TERMS = {
 STRIP_VARIABLES = {
     "wear_strip": (("half_cycle", "x_strip"), "mm", "worn depth of the strip at the end of the half-cycle"),
     "worn_area_strip": (("half_cycle",), "mm2", "cross-section worn off the strip in the half-cycle"),
+    "weight_strip": (
+        ("half_cycle", "x_strip"),
+        "mm",
+        "length that each node stands for, on the mesh of the half-cycle",
+    ),
 }
 
 
@@ -82,19 +88,19 @@ def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
 def _coordinates(system: Tribosystem) -> dict[str, tuple[str, Array, str]]:
     """Return, by name, what does not change in a run: its dimension, values (mm) and long name."""
     pair = system.pair
-    coordinates = {
-        "x": ("x", pair.x, "position along the contact, from the centre of the geometry"),
-        "weight": ("x", pair.weights, "length that each contact node stands for"),
-    }
+    coordinates = {"x": ("x", pair.x, "position along the contact, from the centre of the geometry")}
     if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
         coordinates["x_strip"] = ("x_strip", pair.strip.x[:, 0], along)
-        coordinates["weight_strip"] = ("x_strip", pair.strip.weights, "length that each node stands for")
     return coordinates
 
 
 def _values(block: Block, name: str) -> NDArray[Any]:
     """Return the values of a variable over a block's half-cycles."""
+    if name in ("weight", "weight_strip"):  # meshes that follow the wear change them
+        pair = block.system.pair
+        weights = pair.weights if name == "weight" else pair.strip.weights
+        return np.broadcast_to(weights, (len(block), len(weights)))
     if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
         return getattr(block, name)
     if name == "heat_balance_error":
@@ -189,6 +195,9 @@ class HistoryWriter:
         try:
             with h5netcdf.File(self.path, "r") as file:
                 stored = file["half_cycle"][:]
+                missing = [n for n, (d, _, _) in self._variables.items() if file[n].ndim != len(d)]
+            if missing:
+                raise KeyError(missing[0])  # of an older version
         except (OSError, KeyError, RuntimeError):
             message = "cannot be read; remove it to go on with a new one, which begins at the checkpoint"
             raise CaseError(Problem(str(self.path), message)) from None

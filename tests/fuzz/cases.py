@@ -6,7 +6,7 @@ python3 tests/fuzz/cases.py --seed 4711  shows one case and what becomes of it
 
 Every case is made from its seed alone. It goes through validation, the assembly of a tiny geometry
 and two half-cycles. What must not happen: an exception other than fenwear's own, a crash, a hang, a
-result that is not finite or not in equilibrium, or a unit that is converted wrongly.
+result that is not finite or not in equilibrium, a unit that is converted wrongly, or a message in Python's words.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import argparse
 import copy
 import math
 import random
+import re
 import sys
 import tempfile
 import tomllib
@@ -35,6 +36,7 @@ from pool import Verdict, verdicts
 from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
 from fenwear.assembly import with_reduced_heat
 from fenwear.bodies.mesh import write_msh
+from fenwear.case import doubts
 from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError, MeshQualityError
 from fenwear.heat.exchange import HeatExchange
@@ -257,6 +259,9 @@ def compute(case: Case) -> None:
     """
     if make_case(tomllib.loads(case.to_toml()), case.folder).resolved() != case.resolved():
         raise NoResultError("the resolved case reads back as another one")
+    for text in doubts(case):
+        if PYTHON.search(own_words(text)):
+            raise NoResultError(f"a warning speaks Python: {text}")
     last = min(case.run.half_cycles, 2)
     jumps, implicit = case.run.integration == "jump", case.run.integration == "implicit"
 
@@ -286,10 +291,31 @@ def compute(case: Case) -> None:
             raise NoResultError(f"not in equilibrium: {block.equilibrium_error.max():g}")
 
 
+# Words of Python and its libraries: nobody who writes a case file has to know them.
+PYTHON = re.compile(
+    r"Traceback|functools|\blambda\b|<class|NoneType|\bNone\b|\b(?:True|False)\b|object at 0x|np\.\w+\("
+    r"|\barray\(|dtype|numpy|pydantic|validat(?:or|ion)|validate|instance of|\bdictionary\b|\b[tT]uple\b|\bstr\b"
+    r"|\bfloat\b|\bdict\b"
+    r"|function-|\w+Error\b|keyword|argument of type|__\w+__|discriminator|\btag\b"
+)
+
+
+def own_words(text: str) -> str:
+    """Return a message without what it quotes of the case."""
+    return re.sub(r"'(?:[^'\\]|\\.)*'|\"[^\"]*\"|'.*", "''", text)
+
+
 def said(error: FenwearError) -> str:
-    """Return what the error says, or a complaint if it says nothing."""
+    """Return what the error says, or a complaint if it says nothing or speaks Python."""
     text = str(error)
-    return text if text.strip() and all(len(line) < 2000 for line in text.splitlines()) else f"BAD MESSAGE {text[:500]}"
+    if not text.strip() or any(len(line) >= 2000 for line in text.splitlines()):
+        return f"BAD MESSAGE {text[:500]}"
+    for line in text.splitlines():
+        key, _, message = line.partition(": ")
+        found = PYTHON.search(own_words(line if " " in key else message))
+        if found:
+            return f"BAD MESSAGE speaks Python ({found[0]}): {line}"
+    return text
 
 
 def mutated(seed: int) -> tuple[dict[str, Any], tuple[tuple[Any, ...], float | None] | None]:

@@ -18,7 +18,7 @@ import cases
 
 from fenwear import CaseError, assemble, make_case
 from fenwear.case.dependence import evaluate, parse_expression
-from fenwear.errors import FenwearError
+from fenwear.errors import FenwearError, Problem
 
 
 @pytest.mark.process
@@ -36,6 +36,38 @@ def test_the_fuzzer_finds(monkeypatch: pytest.MonkeyPatch) -> None:
     units = [seed for seed in range(200) if (unit := cases.mutated(seed)[1]) is not None and unit[1] is not None]
     monkeypatch.setattr("fenwear.case.schema.convert", lambda value, unit: 1.0)
     assert any(cases.try_case(seed)[0] == "wrong" for seed in units)
+
+
+def test_messages_speak_no_python() -> None:
+    """Of many mutated cases, as far as their validation."""
+    said = []
+    for seed in range(2_000_000, 2_001_500):
+        try:
+            make_case(cases.mutated(seed)[0])
+        except CaseError as error:
+            said.append(cases.said(error))
+    assert len(said) > 500
+    assert not [text for text in said if text.startswith("BAD")]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("heat.conductance.function-after[functools.partial(<function f at 0x7f>)]: expected 0", "model: got None"),
+        *("x: a valid dictionary or instance of Model", "y: tuple should have 1 item", "z: np.float64(1.0)"),
+        *(
+            "a: <class 'float'>",
+            "b: Traceback (most recent call last)",
+            "c: at <object object at 0x7f>",
+            "d: KeyError: 1",
+        ),
+    ],
+)
+def test_python_is_noticed(text: str) -> None:
+    """What the test above looks for is found."""
+    key, _, message = text.partition(": ")
+    assert cases.said(CaseError(Problem(key, message))).startswith("BAD")
+    assert not cases.said(CaseError(Problem("contact.friction", f"got {text!r}"))).startswith("BAD")  # quoted only
 
 
 @pytest.mark.process

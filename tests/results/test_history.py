@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
-from fenwear.report.figures import open_history
+from fenwear.report.figures import mean_pressure, nominal_width, open_history
 from fenwear.results.history import free_directory, make_directory
 from fenwear.run import run_case
 
@@ -38,7 +38,7 @@ def test_history_is_what_was_computed(assembled: Callable[..., Tribosystem], tmp
     assert set(history.dims) == {"half_cycle", "x"}
     assert history.pressure.dims == ("half_cycle", "x")
     assert history.half_cycle[-1] == summary["half_cycles"] == 30
-    np.testing.assert_allclose(history.pressure @ history.weight, 1000, rtol=1e-8)
+    np.testing.assert_allclose((history.pressure * history.weight).sum("x"), 1000, rtol=1e-8)
     np.testing.assert_allclose(history.worn_area, 4e-7 * 1e4 * 3 / 10, rtol=1e-10)
     if integration != "jump":
         system = assembled("example1", *SMALL)
@@ -88,6 +88,43 @@ def test_summary_and_case(tmp_path: Path) -> None:
     _, folder = run_case(again, "again", tmp_path / "again", lambda message: None)
     with open_history(folder) as repeated:
         np.testing.assert_array_equal(repeated.pressure, history.pressure)
+
+
+def test_weights_follow_the_meshes(tmp_path: Path) -> None:
+    """Of each node on the worn strip: the integral of its quadratic shape function along its arc, by hand.
+
+    Records on meshes that have followed the wear had the weights of the first mesh.
+    """
+    settings = (
+        *("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=1.6"),
+        *("geometry.follow_wear=0.1", "wear.punch.coefficient=2e-5", "wear.strip.coefficient=3e-5"),
+        *("contact.friction=0", "run.half_cycles=300", "run.jump_tolerance=0.2", "motion.positions=3"),
+    )
+    _, folder = run_case(load_case("fretting", settings), "test", tmp_path / "run", lambda message: None)
+    with open_history(folder) as history:
+        history.load()
+    followed = np.flatnonzero((np.diff(history.weight_strip, axis=0) != 0).any(axis=1)) + 1
+    assert len(followed)
+    x, (points, shares) = history.x_strip.values, np.polynomial.legendre.leggauss(8)
+    for k in followed:
+        z = -history.wear_strip.values[k - 1]  # where the mesh has moved
+        expected = np.zeros_like(x)
+        for nodes in np.arange(0, len(x) - 1, 2)[:, None] + np.arange(3):
+            shape = np.array([points * (points - 1) / 2, 1 - points**2, points * (points + 1) / 2])
+            slope = np.array([points - 0.5, -2 * points, points + 0.5])
+            expected[nodes] += shape @ (shares * np.hypot(x[nodes] @ slope, z[nodes] @ slope))
+        flat, found = (history.weight_strip.values[n] for n in (0, k))
+        np.testing.assert_allclose(found, expected, rtol=1e-6)
+        assert np.abs(flat / expected - 1).max() > 30 * np.abs(found / expected - 1).max()
+    assert not np.diff(history.weight[followed[-1] :], axis=0).any()  # of one mesh they are the same
+
+
+def test_an_older_history_is_still_drawn(tmp_path: Path) -> None:
+    """Of files with the weights of one mesh the width and the mean pressure are the same."""
+    history, _ = save(tmp_path / "run", "run.half_cycles=4")
+    older = history.assign(weight=history.weight[0])
+    assert mean_pressure(older) == mean_pressure(history) == pytest.approx(1000 / 60, rel=1e-9)
+    assert nominal_width(older) == nominal_width(history) == pytest.approx(60, rel=1e-12)
 
 
 def test_periodic_stop_is_said(tmp_path: Path) -> None:

@@ -1,0 +1,104 @@
+"""What is wrong with a case, in the words of case files: keys as they are written there, tables, lists, texts."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fenwear.case.schema import Case, Dependence, OneWay, Reciprocating, Tabulated, part_models
+from fenwear.case.units import shown
+from fenwear.errors import Problem
+
+MOTIONS: dict[str | int, type] = {"reciprocating": Reciprocating, "one-way": OneWay, "table": Tabulated}
+# What was expected, by the kind of an error of pydantic: its own words are those of Python.
+EXPECTED = {
+    **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), "a table"),
+    **dict.fromkeys(("tuple_type", "list_type"), "a list"),
+    **dict.fromkeys(("string_type", "string_sub_type", "string_unicode"), "a text"),
+    **dict.fromkeys(("int_type", "int_from_float", "int_parsing", "int_parsing_size"), "a whole number"),
+    **dict.fromkeys(("bool_type", "bool_parsing"), "true or false"),
+    **dict.fromkeys(("float_type", "float_parsing"), "a number"),
+    "finite_number": "a finite number",
+}
+
+
+def problems_of(error: Any, data: Mapping[str, Any]) -> list[Problem]:  # noqa: PLR0911
+    """Turn one error of pydantic into problems with the key's path as in the case file.
+
+    Args:
+        error: One of `ValidationError.errors()`.
+        data: The tables that were validated.
+    """
+    key = _key(error["loc"], data, missing=error["type"] == "missing")
+    message = str(error["msg"]).removeprefix("Value error, ").removeprefix("Input should be ")
+    got = f", got {shown(error['input'])}"
+    match error["type"]:
+        case "extra_forbidden":
+            return [Problem(key, f"unknown key{_suggestion(error['loc'])}")]
+        case "missing":
+            return [Problem(key, "missing, but required")]
+        case "union_tag_not_found" | "union_tag_invalid":
+            return [Problem(f"{key}.kind", f"expected one of {', '.join(map(str, MOTIONS))}")]
+        case "too_short":
+            return [Problem(key, f"expected {_entries('at least', error['ctx']['min_length'], error)}")]
+        case "too_long":
+            return [Problem(key, f"expected {_entries('at most', error['ctx']['max_length'], error)}")]
+        case "literal_error":
+            return [Problem(key, f"expected {message}{got}{_nearest(error['input'], message)}")]
+        case "value_error":
+            return _own_problems(key, message)
+        case kind if kind in EXPECTED:
+            return [Problem(key, f"expected {EXPECTED[kind]}{got}")]
+    return [Problem(key, f"expected {message[:1].lower()}{message[1:]}{got}")]
+
+
+def _own_problems(key: str, message: str) -> list[Problem]:
+    """Return the problems that a check of the schema tells."""
+    if not key:
+        return [Problem(*line.split(": ", 1)) for line in message.splitlines()]
+    name, colon, rest = message.partition(": ")
+    return [Problem(f"{key}.{name}", rest) if colon and name.isidentifier() else Problem(key, message)]
+
+
+def _entries(how: str, count: int, error: Any) -> str:
+    return f"{how} {count} {'entry' if count == 1 else 'entries'}, got {error['ctx']['actual_length']}"
+
+
+def _nearest(value: object, expected: str) -> str:
+    """Return a suggestion for a misspelt word out of those expected, quoted each."""
+    close = difflib.get_close_matches(str(value), expected.split("'")[1::2], n=1) if isinstance(value, str) else []
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _key(location: Sequence[str | int], data: object, *, missing: bool) -> str:
+    """Return the path of an error: the steps that lead through the tables, not those through the types in between."""
+    steps, place = [], data
+    for number, step in enumerate(location):
+        in_list = isinstance(place, list | tuple) and isinstance(step, int) and step < len(place)
+        if in_list or (isinstance(place, Mapping) and step in place):
+            place = place[step]  # type: ignore[index]
+        elif step in getattr(type(place), "model_fields", {}):
+            place = getattr(place, str(step))
+        elif not (missing and number == len(location) - 1):
+            continue
+        steps.append(str(step))
+    return ".".join(steps)
+
+
+def _suggestion(location: tuple[str | int, ...]) -> str:
+    """Return "; did you mean ...?" for a misspelt key, or the keys that are known there."""
+    model: Any = Case
+    for step in location[:-1]:  # names and numbers of entries are no fields: they stay at the same table
+        field = getattr(model, "model_fields", {}).get(step)
+        if step in MOTIONS:
+            model = MOTIONS[step]
+        elif step == "dependence":
+            model = Dependence
+        elif field is not None:
+            model = next(iter(part_models(field.annotation)), None)
+    names = list(getattr(model, "model_fields", {}))
+    close = difflib.get_close_matches(str(location[-1]), names, n=1)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known here are {', '.join(names)}" if names else ""

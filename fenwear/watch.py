@@ -1,0 +1,129 @@
+"""What is told of states that were computed as asked but can hardly be: clipped, too hot, harder pressed than hard."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.case import Case
+from fenwear.case.plausible import HOT
+from fenwear.clipped import clipped_text, contact_ends, opened_area
+from fenwear.cycle import Block, Steady
+
+STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
+
+
+class Watch:
+    """Looks at the blocks of a run.
+
+    Args:
+        system: The assembled problem on meshes as they were made, not moved by wear; collective.
+    """
+
+    def __init__(self, system: Tribosystem) -> None:
+        self.system, self.ends = system, contact_ends(system)
+        self._texts: dict[str, str] = {}
+        self._first_clipped = 0
+
+    def see(self, block: Block) -> list[str]:
+        """Take the next block and return what is to be said of it that was not said of an earlier one."""
+        case, weights = self.system.case, block.system.pair.weights
+        found = {"clipped": self._clipped(block)}
+        found["pressed"] = pressed(case, float(mean_pressures(block.pressure, weights).max()))
+        if block.heat is not None:
+            hottest = int(np.argmax(block.heat.max_temperature))
+            when = f"in half-cycle {int(block.half_cycle[hottest]):,}"
+            found["hot"] = hot(float(block.heat.max_temperature[hottest]), when)
+        said = {kind: text for kind, text in found.items() if text}
+        new = [text for kind, text in said.items() if kind not in self._texts]
+        # The width that is needed grows with the scar; of the others the first time is what counts.
+        self._texts = {**said, **self._texts, **({"clipped": found["clipped"]} if found["clipped"] else {})}
+        return new
+
+    def warnings(self) -> list[str]:
+        """Return what is to be said of all blocks so far."""
+        return list(self._texts.values())
+
+    def _clipped(self, block: Block) -> str:
+        if self.ends is None:
+            return ""
+        ends = [0, -1]
+        held = (block.pressure[:, ends] > 0) | (block.wear[:, ends] > 0)
+        for contact in block.end.contacts:
+            if contact is not None:
+                held[-1] |= contact.pressure[0, ends] > 0
+        places = self.ends.reached((bool(held[:, 0].any()), bool(held[:, 1].any())))
+        if not places:
+            return ""
+        row = int(np.argmax((held & self.ends.goes_on).any(axis=1)))
+        self._first_clipped = self._first_clipped or int(block.half_cycle[row])
+        needed = self.ends.width_needed(
+            opened_area(self.system, block.end.worn), float(block.system.pair.weights @ block.pressure[-1])
+        )
+        text = clipped_text(self.ends, places, needed, self.system.case)
+        return f"from half-cycle {self._first_clipped:,} on {text}"
+
+
+def mean_pressures(pressure: Array, weights: Array) -> Array:
+    """Return the mean over what is in contact (k,), MPa, of pressures (k, n)."""
+    return (pressure @ weights) / np.maximum((pressure > 0) @ weights, 1e-300)
+
+
+def pressed(case: Case, pressure: float) -> str:
+    """Say that a mean pressure is more than a body can carry; "" if it is not."""
+    for body, law in (("punch", case.wear.punch), ("strip", case.wear.strip)):
+        if law is not None and law.hardness is not None and pressure > law.hardness:
+            return (
+                f"the mean pressure of the contact reaches {pressure:,.4g} MPa, more than wear.{body}.hardness, "
+                f"{law.hardness:,.4g} MPa: the surface would yield, and a linear-elastic contact does not"
+            )
+    used = {*case.punch.regions.values(), *case.strip.regions.values()}
+    softest = min(used, key=lambda name: case.materials[name].young)
+    young = case.materials[softest].young
+    if pressure > STRONGEST * young:
+        return (
+            f"the mean pressure of the contact reaches {pressure:,.4g} MPa, more than a tenth of Young's modulus of "
+            f"{softest}, {young:,.4g} MPa: no material is so strong; expected a smaller load or another unit"
+        )
+    return ""
+
+
+def hot(temperature: float, when: str) -> str:
+    """Say that a temperature is too high to be believed; "" if it is not."""
+    if not temperature > HOT:
+        return ""
+    return (
+        f"the contact surfaces reach {temperature:,.4g} K {when}, more than {HOT:,.0f} K: most metals have melted, and "
+        "no property holds; look at the units of the heat data, heat.conductance and what takes the heat away"
+    )
+
+
+def initial_warnings(system: Tribosystem) -> list[str]:
+    """Return what is to be said of the contact before any wear; collective."""
+    contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
+    pressure, weights, ends = contact.pressure[0], system.pair.weights, contact_ends(system)
+    texts = [pressed(system.case, float(mean_pressures(pressure[None], weights)[0]))]
+    places = [] if ends is None else ends.reached((bool(pressure[0] > 0), bool(pressure[-1] > 0)))
+    if ends is not None and places:
+        texts.append(clipped_text(ends, places, ends.width_needed(0.0, float(weights @ pressure)), system.case))
+    return [text for text in texts if text]
+
+
+def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
+    """Return what is to be said of a cyclic steady state; collective."""
+    weights, ends = system.pair.weights, contact_ends(system)
+    texts = [pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max()))]
+    if state.heat is not None:
+        texts.append(hot(float(max(state.heat.punch.max(), state.heat.strip.max())), "in the cyclic steady state"))
+    held = (state.phase_pressure > 0).any(axis=0) | (state.wear_per_cycle > 0)
+    places = [] if ends is None else ends.reached((bool(held[0]), bool(held[-1])))
+    if ends is not None and places:
+        where = " and ".join(f"{x:.4g}" for x in places)
+        texts.append(
+            f"contact reaches the end of the meshed contact surface at x = {where} mm, where the bodies go on "
+            f"smoothly: the scar of the cyclic steady state is as wide as what is meshed, "
+            f"{ends.ends[1] - ends.ends[0]:.4g} mm, whatever that is, and so are its pressures; a width of about "
+            f"{ends.reach:.4g} mm is needed, from edge to edge. A scar that still grows is followed by `run`"
+        )
+    return [text for text in texts if text]

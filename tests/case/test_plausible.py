@@ -1,0 +1,80 @@
+"""Values that are valid but hardly meant."""
+
+from __future__ import annotations
+
+import pytest
+
+from fenwear.case import builtin_cases, doubts, load_case, make_case
+from fenwear.case.plausible import RANGES
+
+TABLE = "contact.friction={table = [[%s, 0.2], [%s, 0.3]]}"
+
+
+@pytest.mark.parametrize("name", builtin_cases())
+def test_builtin_cases_are_beyond_doubt(name: str) -> None:
+    """Nothing is said of them."""
+    assert doubts(load_case(name)) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "key", "expected"),
+    [
+        (["materials.steel.young=210"], "materials.steel.young", "0.21 GPa as it is read without a unit is far"),
+        (["materials.steel.young=210e9"], "materials.steel.young", "0.4|1.5 to 1300 GPa"),
+        (["materials.steel.young='3 MPa'"], "materials.steel.young", "0.4 to 1300 GPa"),
+        (["materials.steel.density=7800"], "materials.steel.density", "7.8e+15 kg/m^3 as it is read without a unit"),
+        (["materials.steel.heat_capacity=460"], "materials.steel.heat_capacity", "0.00046 J/(kg K)"),
+        (["materials.steel.expansion=12"], "materials.steel.expansion", "12 1/K"),
+        (
+            ["materials.steel.conductivity=55"],
+            "materials.steel.conductivity",
+            "beside materials.steel.young = '200 GPa'",
+        ),
+        (["heat.convection=80"], "heat.convection", "8e+04 W/(m^2 K)"),
+        (["heat.initial='3000 K'"], "heat.initial", "3000 K is far outside"),
+        (["wear.punch.coefficient=4e-2"], "wear.punch.coefficient", "0.04 1/MPa"),
+        (["motion.amplitude=2"], "motion.amplitude", "read as 2.0 mm, beside motion.angular_frequency = '10 rad/s'"),
+        (["heat.initial='20 degC'", "heat.ambient=20"], "heat.ambient", "20 K without a unit, which is -253.15 degC"),
+        (["heat.initial='20 degC'"], "strip.temperatures.0.temperature", "0 K, which is -273.15 degC"),
+        (["heat.ambient=20"], "heat.ambient", "read as 20 K, beside"),
+        ([TABLE % (20, 400)], "contact.friction", "spans 20 to 400 K, which does not contain heat.initial, 0 K"),
+        (["heat.initial='20 degC'", TABLE % (20, 400)], "contact.friction", "are these degrees Celsius?"),
+    ],
+)
+def test_doubts(settings: list[str], key: str, expected: str) -> None:
+    """Told with the key and what is usual; the case is valid all the same."""
+    said = [
+        text.removeprefix(f"{key}: ") for text in doubts(load_case("example1-heat", settings)) if f"{key}: " in text
+    ]
+    assert len(said) == 1
+    assert any(part in said[0] for part in expected.split("|"))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["materials.steel.young='700 MPa'"],  # as of polyethylene: with its unit it is meant so
+        ["materials.steel.young='210000 MPa'", "materials.steel.density='7.8 g/cm^3'"],
+        ["heat.initial='20 degC'", "heat.ambient='20 degC'", "strip.temperatures=[]", TABLE % (273, 600)],
+        ["contact.friction=0", "materials.steel.expansion=0", "wear.punch.coefficient=0"],
+        ["wear.punch={coefficient='1e-9 MPa^-2', pressure_exponent=2}"],  # of another kind
+        [TABLE % (0, 400)],
+    ],
+)
+def test_no_doubts(settings: list[str]) -> None:
+    """What may well be meant."""
+    assert doubts(load_case("example1-heat", settings)) == []
+
+
+def test_how_a_case_was_written_is_no_part_of_it() -> None:
+    """The same values in other words make the same case."""
+    one, other = (load_case("example1", [f"motion.amplitude={text}"]) for text in ("2", "'0.2 cm'"))
+    assert one == other
+    assert (len(doubts(one)), len(doubts(other))) == (1, 0)
+    assert one.at(None).written.bare == {"motion.amplitude"}
+    assert doubts(make_case(one.resolved())) == []
+
+
+def test_every_range_is_one() -> None:
+    """From low to high, with a reason."""
+    assert all(r.low < r.high and r.reason and r.size > 0 for r in RANGES)

@@ -1,0 +1,167 @@
+"""What is told of states that were computed as asked but can hardly be."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import Tribosystem, assemble, load_case, make_case, steady
+from fenwear.bodies.mesh import meshes_folder
+from fenwear.clipped import contact_ends
+from fenwear.errors import MeshQualityError
+from fenwear.report.html_page import escape
+from fenwear.report.page import page
+from fenwear.run import run_case
+from fenwear.watch import hot, initial_warnings, pressed, steady_warnings
+
+Assembled = Callable[..., Tribosystem]
+FLAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+CYLINDER = ("geometry.parameters.elements_along_contact=16", "motion.positions=3", "contact.friction=0")
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("name", "settings", "goes_on", "ends", "reach"),
+    [
+        ("example1", FLAT, (False, False), 30.0, 60.0),  # the corners of a flat punch
+        ("rounded-punch", (), (False, False), 30.0, 60.0),  # its rounded edges end at the sides
+        ("fretting", CYLINDER, (True, True), 0.3, 8.0),  # up to the sides of the part that is meshed
+    ],
+)
+def test_where_bodies_go_on(
+    assembled: Assembled, name: str, settings: tuple[str, ...], goes_on: tuple[bool, bool], ends: float, reach: float
+) -> None:
+    """An edge ends a contact, an arc that was tagged too short does not."""
+    found = contact_ends(assembled(name, *settings))
+    assert found is not None
+    assert found.goes_on == goes_on
+    np.testing.assert_allclose(found.ends, (-ends, ends), rtol=1e-9)
+    assert found.reach == pytest.approx(reach, rel=1e-9)
+
+
+def test_width_by_area(assembled: Assembled) -> None:
+    """Reference: A = 4 a³ / (3 2 R) of a parabola worn flat, and Hertz's a² = 4 F R / (pi E*)."""
+    ends = contact_ends(assembled("fretting", *CYLINDER))
+    assert ends is not None
+    for a in (0.5, 0.7):
+        assert ends.width_needed(4 * a**3 / (3 * 12), 18.5) == pytest.approx(2 * a, rel=0.01)
+    modulus, load = 2e5 / (2 * (1 - 0.09)), 6000.0
+    assert ends.width_needed(0.0, load) == pytest.approx(2 * np.sqrt(4 * load * 6 / (np.pi * modulus)), rel=0.02)
+    assert ends.width_needed(1e3, 18.5) == ends.reach  # never beyond the edges
+
+
+def half_tagged(folder: Path) -> Path:
+    """Return a case of a flat punch whose left half alone is tagged as its contact."""
+    text = (meshes_folder() / "punch_on_strip.geo").read_text("utf-8")
+    old = 'Physical Curve("punch_contact") = {across[0], across[1]};'
+    assert old in text
+    new = 'Physical Curve("punch_contact") = {across[0]}; Physical Curve("punch_rest") = {across[1]};'
+    (folder / "half.geo").write_text(text.replace(old, new), "utf-8")
+    pins = "parameters = {pin_height_1 = 40, pin_height_2 = 80, pins_on_left_side = 1}"  # it can only go down
+    (folder / "half.toml").write_text(f'base = "example2"\n[geometry]\nfile = "half.geo"\n{pins}\n', "utf-8")
+    return folder / "half.toml"
+
+
+def run(folder: Path, name: str | Path, *settings: str) -> tuple[dict[str, Any], list[str]]:
+    said: list[str] = []
+    summary, _ = run_case(load_case(name, settings), "run", folder / "run", said.append)
+    assert json.loads((folder / "run" / "summary.json").read_text())["warnings"] == summary["warnings"]
+    return summary, said
+
+
+@pytest.mark.slow
+def test_clipped_contact_is_told(tmp_path: Path) -> None:
+    """A scar that outgrows its surface: in the log when it happens, in summary and report, with the width it needs."""
+    settings = (*CYLINDER, "wear.punch.coefficient=2e-6", "wear.strip.coefficient=1e-9", "run.jump_tolerance=0.2")
+    narrow, said = run(tmp_path, "fretting", *settings, "run.half_cycles=6000", "geometry.parameters.contact_width=0.4")
+    (warning,) = [text for text in narrow["warnings"] if "clipped" in text]
+    assert "x = -0.2 and 0.2 mm" in warning
+    assert "geometry.parameters.contact_width" in warning
+    assert any(text.startswith("warning: from half-cycle") and "clipped" in text for text in said)
+    assert escape(warning) in page(tmp_path / "run")
+    needed = float(warning.partition("a width of about ")[2].partition(" mm")[0])
+    (tmp_path / "wide").mkdir()
+    wide, _ = run(tmp_path / "wide", "fretting", *settings, "run.half_cycles=6000",
+                  f"geometry.parameters.contact_width={1.1 * needed}")  # fmt: skip
+    assert wide["warnings"] == []  # the width that it names is enough
+    assert wide["rightward"]["contact_width_mm"] == pytest.approx(needed, rel=0.15)  # and not far from what is used
+
+
+@pytest.mark.parametrize("name", ["example1", "example2"])
+def test_a_corner_is_no_clip(tmp_path: Path, name: str) -> None:
+    """Contact that ends at the corners of the punch."""
+    summary, _ = run(tmp_path, name, *FLAT, "run.half_cycles=2", "output.report=false")
+    assert summary["warnings"] == []
+
+
+def test_half_a_flat_is_clipped(assembled: Assembled, tmp_path: Path) -> None:
+    """The same punch whose tag ends in the middle of its flat: told before anything is computed, and by `steady`."""
+    system = assembled(half_tagged(tmp_path), *FLAT)
+    (warning,) = initial_warnings(system)
+    assert "at x = 0 mm" in warning
+    assert "about 60 mm is needed, it has 30 mm" in warning
+    (warning,) = steady_warnings(system, steady(system))
+    assert "x = 0 mm" in warning
+    assert "a width of about 60 mm" in warning
+
+
+def test_steady_scar_of_a_cylinder(assembled: Assembled) -> None:
+    """A cylinder wears for ever wider: the width of the state is that of the mesh, and is called so."""
+    tables = tomllib.loads(load_case("fretting", CYLINDER).to_toml())
+    del tables["wear"]["strip"]
+    tables["motion"]["positions"] = 1
+    system = assemble(make_case(tables))
+    state = steady(system)
+    assert state.contact_width.max() == pytest.approx(0.6, rel=1e-6)
+    (warning,) = steady_warnings(system, state)
+    assert "as wide as what is meshed, 0.6 mm" in warning
+    assert "about 8 mm" in warning
+
+
+def test_pressed_beyond_the_hardness() -> None:
+    """The mean pressure against the hardness of either body, and against a tenth of Young's modulus."""
+    tables = tomllib.loads(load_case("example1").to_toml())
+    tables["wear"]["punch"] = {"archard": 1e-5, "hardness": "1.2 GPa"}
+    case = make_case(tables)
+    assert pressed(case, 1199.0) == ""
+    assert "wear.punch.hardness, 1,200 MPa" in pressed(case, 1201.0)
+    assert pressed(load_case("example1"), 1.29e4) == ""
+    assert "Young's modulus of composite" in pressed(load_case("example1"), 1.31e4)
+
+
+def test_a_run_beyond_the_hardness(tmp_path: Path) -> None:
+    """In the summary of a run; 16.7 MPa on 10."""
+    tables = tomllib.loads(load_case("example2", [*FLAT, "run.half_cycles=2", "output.report=false"]).to_toml())
+    tables["wear"]["punch"] = {"archard": 1e-9, "hardness": "10 MPa"}
+    summary, _ = run_case(make_case(tables), "run", tmp_path / "run", lambda message: None)
+    (warning,) = summary["warnings"]
+    assert "reaches 16.67 MPa, more than wear.punch.hardness, 10 MPa" in warning
+
+
+def test_molten() -> None:
+    """16,269 K ended with status 0 and no word."""
+    assert hot(1999.0, "") == ""
+    assert "reach 1.627e+04 K in half-cycle 3" in hot(16269.0, "in half-cycle 3")
+
+
+def test_a_mesh_is_not_moved_after_the_last_half_cycle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All half-cycles done is a success, though the next one would have no elements left."""
+    monkeypatch.setattr("fenwear.bodies.shape.LEAST", 1.1)  # no motion leaves so much
+    settings = (*FLAT, "geometry.follow_wear=1e-9", "output.report=false")
+    summary, _ = run(tmp_path, "example2", *settings, "run.half_cycles=1")
+    assert summary["stop"] == "all half-cycles done"
+    with pytest.raises(MeshQualityError, match="used up the elements"):
+        run_case(load_case("example2", [*settings, "run.half_cycles=2"]), "run", tmp_path / "two", lambda message: None)
+
+
+def test_jumps_end_with_whole_cycles(tmp_path: Path) -> None:
+    """An odd number of half-cycles was said to have ended as periodic."""
+    settings = (*FLAT, "run.half_cycles=5", "run.integration=jump", "output.report=false")
+    summary, _ = run(tmp_path, "example2", *settings)
+    assert (summary["stop"], summary["half_cycles"]) == ("all half-cycles done", 4)

@@ -26,6 +26,7 @@ settings.register_profile(
     "same", derandomize=True, database=None, deadline=None, max_examples=12, suppress_health_check=list(HealthCheck)
 )
 settings.register_profile("search", settings.get_profile("same"), derandomize=False, max_examples=200)
+settings.register_profile("few", settings.get_profile("same"), max_examples=3)
 settings.load_profile("same")
 
 Edit = Callable[[dict[str, Any]], object]

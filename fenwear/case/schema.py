@@ -506,10 +506,10 @@ class Run(_Part):
     integration: Literal["explicit", "implicit", "jump"] = "explicit"
     jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=3e-3,
-        description="error of pressure in a cycle jump, root mean square over the contact and over the mean pressure",
+        description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
     )
     periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
-        default=None, description="stop when pressure repeats within this fraction of the mean pressure"
+        default=None, description="stop when pressure repeats within this fraction of its scale"
     )
 
 

@@ -8,7 +8,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, steady_exchange
-from fenwear.cycle.jump import cycle_heat
+from fenwear.cycle.coupled import cycle_heat
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 

@@ -14,8 +14,8 @@ from fenwear import ConvergenceError, Tribosystem, assemble, jump, load_case, ma
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block, growth_rate
-from fenwear.cycle.jump import cycle_heat
-from fenwear.cycle.moment import Moment
+from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.state import RunState
 from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., Tribosystem]
@@ -145,7 +145,7 @@ def test_march_tends_to_the_steady_state(assembled: Assemble, coefficient: float
     assert abs(stored) < 2e-3 * last.heat.terms[-1, 0]
 
 
-def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[Moment, Any]:
+def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]:
     """Return a moment in the cyclic steady state, its shape disturbed by a parabola (mm at the edges)."""
     state, heat = steady(system), cycle_heat(system)
     assert heat is not None
@@ -154,7 +154,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[Moment, Any]:
     modes = np.zeros((1, 2))
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.pair.x / 30) ** 2
-    return Moment(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.parts(periodic)), state
+    return RunState(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.parts(periodic)), state
 
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])

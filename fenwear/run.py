@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
-from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
+from fenwear.cycle import Block, follow, jump, march, stability_number, stationary_growth
 from fenwear.cycle.state import RunState, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, MeshQualityError, OutputError, Problem
 from fenwear.heat.exchange import HeatExchange
@@ -332,14 +332,29 @@ class _Run:
             self._write_fields(self.last)
         if self.state.half_cycle > 0:
             self._save()
-        contacts = joined(self.state.contacts)
-        if self.last.heat is not None and contacts is not None and not self.system.track_deepens:
-            self.extremes["growth_rate_per_s"] = growth_rate(self.system, contacts.pressure)
+        reason = self._note_growth(self.last)
+        if reason:
+            how = {**how, "no_growth_rate": reason}
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
+
+    def _note_growth(self, last: Block) -> str:
+        """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""
+        contacts, motion = joined(self.state.contacts), self.system.motion
+        if last.heat is None or contacts is None or self.system.track_deepens:
+            return ""
+        surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
+        phase = self.state.half_cycle % motion.half_cycles * motion.positions
+        change = float(last.periodicity[-motion.half_cycles :].max())
+        rate, reason = stationary_growth(self.system, contacts.pressure, surfaces, phase, change)
+        if rate is not None:
+            self.extremes["growth_rate_per_s"] = rate
+        else:
+            self.log(f"no growth rate of disturbances: {reason}")
+        return reason
 
 
 class _Signals:

@@ -466,6 +466,11 @@ class Heat(_Part):
     )
     convecting_faces: bool = True
     ambient: Temperature = 0.0
+    inflow: Temperature | None = Field(
+        default=None,
+        description="of the strip's material that enters through free ends; by default, sliding one way, the "
+        "ambient, and to and fro what has left comes back as it was",
+    )
     initial: Temperature = 0.0
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
     coupling: Literal["implicit", "split"] = "implicit"

@@ -81,7 +81,7 @@ def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> I
                 yield recorder.take(state)
             if isinstance(error, InterruptedRunError):
                 raise
-            raise ConvergenceError(f"half-cycle {state.half_cycle + 1}: {error}") from error
+            raise type(error)(f"half-cycle {state.half_cycle + 1}: {error}") from error
         periodic = state.periodic_phases
         for one in recorded:
             change = recorder.add(one.number, one.phases, one.worn, one.heat)

@@ -210,7 +210,9 @@ def _stability(summary: dict[str, Any], history: xarray.Dataset) -> str:
     rate = summary.get("growth_rate_per_s")
     if rate is None or not math.isfinite(rate):
         known = "max_temperature" in history
-        return "<p>Not computed for this run.</p>" if known else "<p>Computed with heat only.</p>"
+        reason = escape(str(summary.get("no_growth_rate", "")))
+        why = f"<p>No growth rate: {reason}.</p>" if reason else "<p>Not computed for this run.</p>"
+        return why if known else "<p>Computed with heat only.</p>"
     if rate > 0:
         text = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / rate:.3g} s"
     else:

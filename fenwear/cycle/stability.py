@@ -10,7 +10,7 @@ import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, steady_exchange
+from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.exchange import State

@@ -1,0 +1,156 @@
+"""Square matrices as an active-set method needs them: a product, and factors of some of their rows and columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+
+Indices = NDArray[np.int32]
+Solve = Callable[[Array], Array]
+SINGULAR = 1e-14  # of the largest entry: a pivot that is rounding
+DENSE = 400  # unknowns up to which one elimination of the whole beats one for each block
+
+
+class Operator(Protocol):
+    """A square matrix."""
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x."""
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`, ascending.
+
+        Raises:
+            LinAlgError: they are singular.
+        """
+
+
+class Dense:
+    """A matrix of numbers (size, size)."""
+
+    def __init__(self, matrix: Array) -> None:
+        self.matrix = matrix
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x."""
+        return self.matrix @ x
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`."""
+        if len(kept) == len(self.matrix):
+            return eliminate(self.matrix)
+        return eliminate(self.matrix[np.ix_(kept, kept)])
+
+
+def eliminate(matrix: Array) -> Solve:
+    """Return the solution operator of a matrix, for one right-hand side or columns of them.
+
+    Raises:
+        LinAlgError: it is singular.
+    """
+    if not len(matrix):
+        return np.zeros_like
+    lu, pivots, _ = dgetrf(matrix)
+    if not np.abs(np.diagonal(lu)).min() > SINGULAR * np.abs(matrix).max():
+        raise np.linalg.LinAlgError("singular matrix")
+
+    def solve(b: Array) -> Array:
+        x: Array = dgetrs(lu, pivots, b)[0]
+        return x
+
+    return solve
+
+
+class Phases:
+    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + L_k R_j.
+
+    Args:
+        blocks: A_k (m, size, size).
+        coupling: C (m, n, m, n) on the first n unknowns of each block; None where there is none.
+        border: L (m, n, q) and R (m, q, n), on the same; None where there is none.
+    """
+
+    def __init__(self, blocks: Array, coupling: Array | None = None, border: tuple[Array, Array] | None = None) -> None:
+        m, size, _ = blocks.shape
+        self.blocks, self.border = blocks, border
+        self._whole: Dense | None = None
+        if m == 1 and coupling is None and border is None:
+            self._whole = Dense(blocks[0])
+        elif m == 1 or coupling is not None or m * size <= DENSE:
+            self._whole = Dense(_whole(blocks, coupling, border))
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x (m size,)."""
+        if self._whole is not None:
+            return self._whole.multiply(x)
+        parts = x.reshape(len(self.blocks), -1)
+        result = np.matmul(self.blocks, parts[:, :, None])[:, :, 0]
+        if self.border is not None:
+            left, right = self.border
+            n = left.shape[1]
+            result[:, :n] += left @ np.einsum("kqn,kn->q", right, parts[:, :n])
+        return result.ravel()
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`.
+
+        With z_k = A_k^-1 b_k and Y_k = A_k^-1 L_k the quantities y between the blocks follow from
+        (I + sum of R_k Y_k) y = sum of R_k z_k, and x_k = z_k - Y_k y: the work grows with the number of
+        blocks, where an elimination of the whole would grow with its cube.
+        """
+        if self._whole is not None:
+            return self._whole.factor(kept)
+        m, size, _ = self.blocks.shape
+        cuts = list(np.searchsorted(kept, np.arange(m + 1) * size))
+        own: list[Indices] = [kept[cuts[k] : cuts[k + 1]] - k * size for k in range(m)]
+        solves = [eliminate(block[np.ix_(rows, rows)]) for block, rows in zip(self.blocks, own, strict=True)]
+        if self.border is None:
+            return lambda b: np.concatenate([solve(b[cuts[k] : cuts[k + 1]]) for k, solve in enumerate(solves)])
+        left, right = self.border
+        n, q = left.shape[1:]
+        columns: list[Array] = []
+        rights: list[Array] = []
+        schur: Array = np.eye(q)
+        for k, (solve_block, rows) in enumerate(zip(solves, own, strict=True)):
+            nodes = rows[rows < n]
+            by_between = np.zeros((len(rows), q))
+            by_between[: len(nodes)] = left[k][nodes]
+            columns.append(solve_block(by_between))
+            rights.append(right[k][:, nodes])
+            schur = schur + rights[k] @ columns[k][: len(nodes)]
+        solve_schur = eliminate(schur)
+
+        def solve(b: Array) -> Array:
+            parts = [solve_block(b[cuts[k] : cuts[k + 1]]) for k, solve_block in enumerate(solves)]
+            between = np.zeros(q)
+            for at, part in zip(rights, parts, strict=True):
+                between += at @ part[: at.shape[1]]
+            y = solve_schur(between)
+            return np.concatenate([part - by @ y for part, by in zip(parts, columns, strict=True)])
+
+        return solve
+
+
+def _whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None) -> Array:
+    """Return the matrix as one (m size, m size)."""
+    m, size, _ = blocks.shape
+    matrix: Array = blocks[0].copy() if m == 1 else scipy.linalg.block_diag(*blocks)
+    view = matrix.reshape(m, size, m, size)
+    if coupling is not None:
+        n = coupling.shape[1]
+        view[:, :n, :, :n] += coupling
+    if border is not None:
+        lefts, right = [csr_array(left) for left in border[0]], border[1]  # next to diagonal
+        n = right.shape[2]
+        for k, left in enumerate(lefts):
+            for j in range(m):
+                view[k, :n, j, :n] += left @ right[j]
+    return matrix

@@ -22,12 +22,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linprog
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Dense
+from fenwear.contact.operators import WornShape
 from fenwear.cycle.coupled import Coupled
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
@@ -151,16 +152,17 @@ class _SteadyInequality:
         f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
         return f
 
-    def _jacobian(self, x: Array) -> Dense:
+    def _jacobian(self, x: Array) -> WornShape:
         m, n = self.m, self.n
         jacobian = self.matrix.copy()
         left, right = self.wear.border(x[: m * n].reshape(m, n) * self.p_scale)
+        opens = csr_array(left[0])
         for k in range(m):
-            jacobian[self.omega, k * n : (k + 1) * n] -= (left[0] @ right[k]) * (self.p_scale / self.wear_scale)
+            jacobian[self.omega, k * n : (k + 1) * n] -= opens @ right[k] * (self.p_scale / self.wear_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
         opened = m * n + np.flatnonzero(x[: m * n].reshape(m, n).max(axis=0) <= 0)
         jacobian[opened, opened] += DRIVE
-        return Dense(jacobian)
+        return WornShape(jacobian, m, n)
 
     def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
         """Return the contact of all phases, starting from the last solution.

@@ -204,7 +204,7 @@ class CondensedContact:
         failure: ConvergenceError | None = None
         for guess, line_search, name in self._ways(start):
             try:
-                x = self.inequality.solve(guess.ravel(), line_search=line_search)
+                x = self.inequality.solve(guess.ravel(), near=not name and start is not None, line_search=line_search)
             except ConvergenceError as error:
                 failure = failure or error  # the usual way's says most
                 continue

@@ -5,9 +5,8 @@ F_i <= 0 where it is at its upper bound: reduced-space active-set Newton (vinewt
 systems are piecewise linear or nearly so, hence full steps, without line search unless asked for.
 
 SNES decides which unknowns are at their bounds. Solves that follow one another mostly end with the
-same ones: the factor of the last set is kept, and a start with that set is first taken one Newton step
-on, the one that SNES would take. Where the result fulfils all conditions it is the solution, to the
-last bit that of SNES; where it does not, SNES starts.
+same ones: a start that is near is first taken on by Newton's method with its own set, whose factor is
+kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
-STEPS = 2  # of a set that is kept, before SNES looks for another one
+STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 
 
 def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None:
@@ -62,15 +61,13 @@ class _Kept:
 
     Attributes:
         operator: What is factored.
-        kept: The free ones.
-        key: The free ones among all, as bytes.
-        free: They again, as a slice where all are free.
+        key: Which of all are free, as bytes.
+        free: Their numbers; a slice where all are free.
         bounded: The others.
         solve: The solution operator.
     """
 
     operator: Operator
-    kept: Indices
     key: bytes
     free: Indices | slice
     bounded: Indices
@@ -146,53 +143,64 @@ class Inequality:
         return self._operator.multiply(x)
 
     def factor(self, kept: Indices) -> Solve:
-        """Return the solution operator of these rows and columns of the present derivative; the last one is kept.
+        """Return the solution operator of these rows and columns of the present derivative.
 
         Raises:
             LinAlgError: they are singular.
         """
         if self._operator is None:
             raise ConvergenceError(f"{self.name} has no derivative yet")
-        last = self._kept
-        if last is None or last.operator is not self._operator or not np.array_equal(last.kept, kept):
-            self._kept = None
-            free = np.zeros(len(self._lower), dtype=bool)
-            free[kept] = True
-            bounded = np.flatnonzero(~free).astype(np.int32)
-            rows = kept if len(bounded) else slice(None)
-            solve = self._operator.factor(kept)
-            last = self._kept = _Kept(self._operator, kept, free.tobytes(), rows, bounded, solve)
-        return last.solve
+        free = np.zeros(len(self._lower), dtype=bool)
+        free[kept] = True
+        return self._factor(self._operator, free.tobytes()).solve
 
-    def solve(self, start: Array, *, line_search: bool = False) -> Array:
+    def _factor(self, operator: Operator, key: bytes) -> _Kept:
+        """Return the factor of an operator's free rows and columns; the last one is kept."""
+        last = self._kept
+        if last is None or last.operator is not operator or last.key != key:
+            self._kept = None
+            free = np.frombuffer(key, dtype=bool)
+            kept, bounded = (np.flatnonzero(one).astype(np.int32) for one in (free, ~free))
+            rows = kept if len(bounded) else slice(None)
+            last = self._kept = _Kept(operator, key, rows, bounded, operator.factor(kept))
+        return last
+
+    def solve(self, start: Array, *, near: bool = False, line_search: bool = False) -> Array:
         """Return the solution (size,).
 
         Args:
             start: Where Newton starts (size,).
+            near: Whether the solution may well have the unknowns of the start at their bounds, and no others.
             line_search: Whether steps are cut to where the residual is least: slower, but it ends where
                 full steps go to and fro between two sets of unknowns at their bounds.
 
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        x = None if line_search else self._on_kept_set(start)
+        x = self._on_set(start) if near else None
         return self._by_snes(start, line_search) if x is None else x
 
-    def _on_kept_set(self, start: Array) -> Array | None:
-        """Return the solution where it has the free unknowns of the start, whose factor is kept; else None."""
-        kept = self._kept
-        if kept is None or self._free(start) != kept.key:
+    def _on_set(self, start: Array) -> Array | None:
+        """Return the solution where it has the same free unknowns as the start, else None."""
+        key, x = self._free(start), start.copy()
+        try:
+            # Whatever is kept: what a solution is found with does not depend on what was solved before.
+            kept = self._factor(self._jacobian(x), key)
+            for iteration in range(STEPS + 1):
+                f = self._function(x)
+                rest = f[kept.free]
+                if rest @ rest < TOLERANCE**2:
+                    break
+                if iteration == STEPS or (iteration and self._free(x) != key):
+                    return None
+                if iteration:
+                    kept = self._factor(self._jacobian(x), key)
+                x[kept.free] -= kept.solve(rest)
+        except np.linalg.LinAlgError:
             return None
-        x: Array = start.copy()
-        for iteration in range(STEPS + 1):
-            f = self._function(x)
-            rest = f[kept.free]
-            if rest @ rest < TOLERANCE**2:
-                break
-            if iteration == STEPS or self._jacobian(x) is not kept.operator:
-                return None
-            x[kept.free] -= kept.solve(rest)
-        if self._free(x) != kept.key or not self._holds(x, f, kept.bounded):
+        if self._free(x) != key:
+            return None
+        if not self._holds(x, f, kept.bounded):
             return None
         self.iterations, self.residual = iteration, f
         return x

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ from fenwear.arrays import Array
 Indices = NDArray[np.int32]
 Solve = Callable[[Array], Array]
 SINGULAR = 1e-14  # of the largest entry: a pivot that is rounding
+LARGE = 300  # unknowns above which a factor follows its set; below it a new one costs as little
+UPDATES = 0.1  # of the unknowns of a factor: what may have come and gone before a new one is made
 DENSE = 400  # unknowns up to which one elimination of the whole beats one for each block
 
 
@@ -33,11 +36,97 @@ class Operator(Protocol):
         """
 
 
+@dataclass(frozen=True)
+class _Base:
+    """A set that was eliminated, and where each of its unknowns stands in it (size,), -1 for the others."""
+
+    kept: Indices
+    place: NDArray[np.int64]
+    solve: Solve
+
+
+class Updating:
+    """Factors of sets that differ by a few unknowns from one that was eliminated.
+
+    With K the set that was eliminated, i what has come since and o what has gone, the rows and columns
+    kept now are solved by the bordered system
+
+        A_KK x + A_Ki y + E_o z = b_K,    A_iK x + A_ii y = b_i,    E_o^T x = 0,
+
+    whose Schur complement has as many rows as unknowns have come and gone. Columns once solved for are kept.
+
+    Args:
+        entries: Returns the numbers of some rows and columns.
+
+    Attributes:
+        base: What was eliminated last.
+    """
+
+    def __init__(self, entries: Callable[[Indices, Indices], Array]) -> None:
+        self._entries = entries
+        self.base: _Base | None = None
+        self._columns: dict[int, Array] = {}  # solutions by the base of what has come or gone
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`.
+
+        Raises:
+            LinAlgError: they are singular.
+        """
+        base = self.base
+        if base is not None:
+            into = np.setdiff1d(kept, base.kept, assume_unique=True)
+            out = np.setdiff1d(base.kept, kept, assume_unique=True)
+            if not len(into) + len(out):
+                return base.solve
+            if len(into) + len(out) <= UPDATES * len(base.kept):
+                return self._updated(base, kept, into, out)
+        self.base, self._columns = None, {}
+        solve = eliminate(self._entries(kept, kept))
+        place = np.full(int(kept.max(initial=0)) + 1, -1)
+        place[kept] = np.arange(len(kept))
+        self.base = _Base(kept, place, solve)
+        return solve
+
+    def _updated(self, base: _Base, kept: Indices, into: Indices, out: Indices) -> Solve:
+        size, come = len(base.kept), len(into)
+        gone = base.place[out]
+        come_new = [i for i in map(int, into) if i not in self._columns]
+        gone_new = [i for i in map(int, out) if i not in self._columns]
+        if come_new or gone_new:
+            right = np.zeros((size, len(come_new) + len(gone_new)), order="F")
+            right[:, : len(come_new)] = self._entries(base.kept, np.array(come_new, dtype=np.int32))
+            right[base.place[gone_new], len(come_new) + np.arange(len(gone_new))] = 1.0
+            self._columns.update(zip((*come_new, *gone_new), base.solve(right).T, strict=True))
+        columns = np.array([self._columns[int(i)] for i in np.concatenate([into, out])]).T
+        rows = self._entries(into, base.kept)
+        schur = np.zeros((come + len(out), come + len(out)))
+        schur[:come, :come] = self._entries(into, into)
+        schur[:come] -= rows @ columns
+        schur[come:] -= columns[gone]
+        solve_schur = eliminate(schur)
+        from_base = np.searchsorted(kept, np.delete(base.kept, gone))
+        stayed, from_new = np.delete(np.arange(size), gone), np.searchsorted(kept, into)
+
+        def solve(b: Array) -> Array:
+            first: Array = np.zeros(size)
+            first[stayed] = b[from_base]
+            first = base.solve(first)
+            y = solve_schur(np.concatenate([b[from_new] - rows @ first, -first[gone]]))
+            x = np.empty_like(b)
+            x[from_base] = (first - columns @ y)[stayed]
+            x[from_new] = y[:come]
+            return x
+
+        return solve
+
+
 class Dense:
     """A matrix of numbers (size, size)."""
 
     def __init__(self, matrix: Array) -> None:
         self.matrix = matrix
+        self._updating = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)])
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
@@ -45,8 +134,8 @@ class Dense:
 
     def factor(self, kept: Indices) -> Solve:
         """Return the solution operator of the rows and columns `kept`."""
-        if len(kept) == len(self.matrix):
-            return eliminate(self.matrix)
+        if len(kept) > LARGE:
+            return self._updating.factor(kept)
         return eliminate(self.matrix[np.ix_(kept, kept)])
 
 

@@ -121,11 +121,11 @@ def test_contact_by_another_way(assembled: Assemble, monkeypatch: pytest.MonkeyP
     usual = run(system, 6)
     original, closed = Inequality.solve, [0]
 
-    def solve(self: Inequality, start: Any, *, line_search: bool = False) -> Any:
+    def solve(self: Inequality, start: Any, *, near: bool = False, line_search: bool = False) -> Any:
         if closed[0] < ways:
             closed[0] += 1
             raise ConvergenceError("closed")
-        return original(self, start, line_search=line_search)
+        return original(self, start, near=near, line_search=line_search)
 
     monkeypatch.setattr(Inequality, "solve", solve)
     contact = system.contact((1,))

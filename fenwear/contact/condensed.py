@@ -129,7 +129,7 @@ class CondensedContact:
         self._blocks[k, n:, :n] = balance * (self._pressure_scale / self._resultant_scale[:, None])
 
     def slide(self, ratios: Sequence[Array]) -> None:
-        """Set tau of each phase, (n,) each."""
+        """Set tau of each phase, (n, d) each."""
         for k, (ratio, before) in enumerate(zip(ratios, self._ratios, strict=True)):
             if ratio is not before and not np.array_equal(ratio, before):
                 self._fill_friction(k, ratio)

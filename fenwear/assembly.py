@@ -28,7 +28,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh, build_meshes
 from fenwear.bodies.shape import element_height, follow_wear
-from fenwear.case import Body, Case, Heat, OneWay, WearLaw, changed_case
+from fenwear.case import Body, Case, Heat, OneWay, Oscillation, Rotation, WearLaw, changed_case
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
 from fenwear.contact.full import FullContact
 from fenwear.errors import CaseError, Problem
@@ -107,7 +107,7 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
         CaseError: what only the geometry can tell is wrong, such as a missing group.
         MeshQualityError: an element does not survive the motion.
     """
-    meshes = build_meshes(case.geometry, case.folder, comm)
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
     return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
@@ -126,7 +126,7 @@ def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tupl
 
 def elastic_body(case: Case, mesh: BodyMesh, description: Body) -> ElasticBody:
     """Assemble the elasticity of one body of a case under the mean of its loads; collective."""
-    law = isotropic(mesh, description.regions, case.materials, case.model.plane)
+    law = isotropic(mesh, description.regions, case.materials, case.model.law)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
     return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)
 
@@ -169,17 +169,31 @@ class Sliding:
 
 def make_sliding(case: Case, parts: int = 1) -> Sliding:
     """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
-    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None).in_parts(parts)
-    sliding_field = ALONG_X if case.motion.axis == "x" else ALONG_Y
-    one_way = isinstance(case.motion, OneWay)
+    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None and case.passes).in_parts(parts)
+    sliding_field = _sliding_field(case)
+    one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(
         motion,
         sliding_field,
         Friction(case.contact, sliding_field),
         (case.wear.punch, case.wear.strip),
         case.motion.track if isinstance(case.motion, OneWay) else None,
-        case.motion.axis == "x" and not one_way,
+        case.passes and not one_way,
     )
+
+
+def _sliding_field(case: Case) -> SlidingField:
+    motion = case.motion
+    if isinstance(motion, Oscillation | Rotation):
+        return SlidingField(turn=_unit(motion.axis), centre=motion.centre)
+    if motion.along is not None:
+        return SlidingField(shift=_unit(motion.along))
+    return ALONG_X if motion.axis == "x" else ALONG_Y
+
+
+def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (np.array(vector) / np.linalg.norm(vector)).tolist()
+    return x, y, z
 
 
 # ---------------------------------------------------------------------------- the surfaces

@@ -196,7 +196,7 @@ def mesh_command(
     loaded = _load(case, settings)
     if output.suffix != ".msh":
         raise CaseError(Problem("-o", f"expected a file ending in .msh, got {str(output)!r}"))
-    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output))
+    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output, loaded.model.law))
     log(f"mesh in {output}")
 
 

@@ -22,9 +22,9 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
 from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor
-from fenwear.bodies.material import ElasticLaw, Kind
+from fenwear.bodies.material import ElasticLaw
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Body, Load, Support
+from fenwear.case import Body, Kind, Load, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.parallel import total
 

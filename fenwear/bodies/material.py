@@ -7,17 +7,15 @@ and surfaces of a plane model are per thickness, those of an axisymmetric one ar
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Material
+from fenwear.case import Kind, Material
 from fenwear.errors import CaseError, Problem
-
-Kind = Literal["stress", "strain", "axisymmetric", "solid"]
 
 
 def strain(u: Any) -> Any:

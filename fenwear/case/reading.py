@@ -11,10 +11,25 @@ from typing import Any
 
 import pydantic
 
-from fenwear.case.schema import Case, Dependence, OneWay, Reciprocating, Tabulated, part_models
+from fenwear.case.schema import (
+    Case,
+    Dependence,
+    OneWay,
+    Oscillation,
+    Reciprocating,
+    Rotation,
+    Tabulated,
+    part_models,
+)
 from fenwear.errors import CaseError, Problem
 
-MOTIONS: dict[str | int, type] = {"reciprocating": Reciprocating, "one-way": OneWay, "table": Tabulated}
+MOTIONS: dict[str | int, type] = {
+    "reciprocating": Reciprocating,
+    "one-way": OneWay,
+    "table": Tabulated,
+    "rotation": Rotation,
+    "oscillation": Oscillation,
+}
 
 FORMS = {*MOTIONS, "number", "dependence"}  # what pydantic puts into a path besides keys
 

@@ -419,7 +419,8 @@ def place(
     Raises:
         CaseError: the surfaces do not face each other, or no pressure balances the loads.
     """
-    middle = pair(bodies.punch.surface, bodies.strip.surface)
+    rings = bodies.punch.law.kind == "axisymmetric"
+    middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings)
     if bodies.followed is None:
         check_distance(middle)
     whole = heat is None

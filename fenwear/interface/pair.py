@@ -73,8 +73,15 @@ class ContactPair:
         return interpolation(self.x, self.punch.degree, np.atleast_1d(x)) @ values
 
 
-def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE) -> ContactPair:
+def pair(
+    punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE, *, axisymmetric: bool = False
+) -> ContactPair:
     """Bring the punch's nodes opposite the strip's surface, moved to its place.
+
+    Args:
+        punch, strip: The surfaces as they were meshed.
+        placement: Of the strip.
+        axisymmetric: Whether they are rings, x being the radius.
 
     Raises:
         CaseError: the surfaces do not face each other, or the strip's does not reach below the whole punch.
@@ -88,17 +95,17 @@ def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HE
                 _not_facing(f"{surface.body}_contact folds back on itself seen along {'xyz'[axis]}")
     common = overlap(first, second)
     _check_covered(common, first, second, placement)
-    transfer = dual_transfer(first, second, common)
-    normal = wear_transfer(first, second) @ strip_outward if strip.cell == "triangle" else transfer @ strip_outward
+    transfer = dual_transfer(first, second, _around(common, first, punch) if axisymmetric else common)
+    material = wear_transfer(first, second)
+    everywhere = len(strip.nodes) == len(strip.trace)  # normals are known at the nodes that carry pressure
+    normal = (transfer if everywhere else material) @ strip_outward
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
     if placement == HERE:
         _check_facing(punch, normal, facing, axis)
     gap = np.einsum("ic,ic->i", normal, punch.spread.T @ punch.trace - transfer @ strip_trace)
     # Forces act along the common normal: a node's weight is its area seen along it.
-    return ContactPair(
-        punch, strip, placement, normal, punch.weights * facing, transfer, wear_transfer(first, second), gap
-    )
+    return ContactPair(punch, strip, placement, normal, punch.weights * facing, transfer, material, gap)
 
 
 def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
@@ -135,6 +142,13 @@ def _chart_axis(strip: ContactSurface) -> int:
 
 def _charted(surface: ContactSurface, trace: Array, axis: int) -> ChartedSurface:
     return ChartedSurface(np.delete(trace, axis, axis=1), surface.facets, surface.cell, surface.degree, surface.nodes)
+
+
+def _around(common: Overlap, first: ChartedSurface, punch: ContactSurface) -> Overlap:
+    """Return the overlap of rings, each point with its circumference 2 pi r."""
+    radius = punch.trace[first.facets[common.facet1], 0]
+    around = 2 * np.pi * np.einsum("qk,qk->q", first.shape_functions(common.points1), radius)
+    return replace(common, weights=common.weights * around)
 
 
 def _folds(surface: ContactSurface, axis: int) -> bool:

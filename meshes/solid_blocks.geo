@@ -8,15 +8,15 @@ DefineConstant[
   depth = 1,              // along y
   punch_height = 1,
   strip_height = 1,
-  margin = 0,             // by which the strip is wider and deeper on each side
-  core = 0,               // width and depth of the evenly divided middle; 0: all of it
-  across_x = 2,           // elements over the core along x
+  margin_x = 0,           // by which the strip is wider on each side
+  margin_y = 0,           // by which it is deeper
+  quarter = 0,            // 1: only x >= 0 and y >= 0, with the planes of symmetry as groups
+  across_x = 2,           // elements over the width, or over its half of a quarter
   across_y = 2,
   strip_across_x = 0,     // of the strip where it has others than the punch; 0: the same
   strip_across_y = 0,
-  outer = 1,              // elements on each side of the core
-  spread = 1,             // of such an element's width over that of its neighbour towards the core
-  margin_elements = 1,    // elements over the margin
+  margin_elements = 2,    // over each margin
+  spread = 1,             // of such an element's width over that of its neighbour towards the contact
   punch_layers = 2,       // elements over the height
   strip_layers = 2,
   growth = 1,             // of an element's height over that of its neighbour towards the contact
@@ -24,14 +24,11 @@ DefineConstant[
   strip_tetrahedra = 0
 ];
 
-If(width <= 0 || depth <= 0 || punch_height <= 0 || strip_height <= 0 || margin < 0)
-  Error("width, depth, punch_height and strip_height must be positive, margin not negative");
+If(width <= 0 || depth <= 0 || punch_height <= 0 || strip_height <= 0 || margin_x < 0 || margin_y < 0)
+  Error("width, depth, punch_height and strip_height must be positive, margin_x and margin_y not negative");
 EndIf
-If(core < 0 || core > width || core > depth)
-  Error("core must lie between 0 and width and depth");
-EndIf
-If(across_x < 1 || across_y < 1 || outer < 1 || margin_elements < 1 || punch_layers < 1 || strip_layers < 1)
-  Error("across_x, across_y, outer, margin_elements, punch_layers and strip_layers must be at least 1");
+If(across_x < 1 || across_y < 1 || margin_elements < 1 || punch_layers < 1 || strip_layers < 1)
+  Error("across_x, across_y, margin_elements, punch_layers and strip_layers must be at least 1");
 EndIf
 If(growth <= 0 || spread <= 0)
   Error("growth and spread must be positive");
@@ -45,32 +42,19 @@ tetrahedra[] = {punch_tetrahedra, strip_tetrahedra};
 For body In {0 : 1}
   // Lines of the grid along x and y, the elements between them and the ratio of their sizes.
   x[] = {}; y[] = {}; nx[] = {}; ny[] = {}; grade_x[] = {}; grade_y[] = {};
-  If(body == 1 && margin > 0)
-    x[] += {-width / 2 - margin}; y[] += {-depth / 2 - margin};
-    nx[] += margin_elements; ny[] += margin_elements; grade_x[] += 1; grade_y[] += 1;
+  If(body == 1 && margin_x > 0 && !quarter)
+    x[] += {-width / 2 - margin_x}; nx[] += margin_elements; grade_x[] += 1 / spread;
   EndIf
-  If(core > 0)
-    If(core < width)
-      x[] += {-width / 2}; nx[] += outer; grade_x[] += 1 / spread;
-    EndIf
-    If(core < depth)
-      y[] += {-depth / 2}; ny[] += outer; grade_y[] += 1 / spread;
-    EndIf
-    x[] += {-core / 2, core / 2}; y[] += {-core / 2, core / 2};
-    nx[] += across_x[body]; ny[] += across_y[body]; grade_x[] += 1; grade_y[] += 1;
-    If(core < width)
-      x[] += {width / 2}; nx[] += outer; grade_x[] += spread;
-    EndIf
-    If(core < depth)
-      y[] += {depth / 2}; ny[] += outer; grade_y[] += spread;
-    EndIf
-  Else
-    x[] += {-width / 2, width / 2}; y[] += {-depth / 2, depth / 2};
-    nx[] += across_x[body]; ny[] += across_y[body]; grade_x[] += 1; grade_y[] += 1;
+  x[] += {quarter ? 0 : -width / 2, width / 2}; nx[] += across_x[body]; grade_x[] += 1;
+  If(body == 1 && margin_x > 0)
+    x[] += {width / 2 + margin_x}; nx[] += margin_elements; grade_x[] += spread;
   EndIf
-  If(body == 1 && margin > 0)
-    x[] += {width / 2 + margin}; y[] += {depth / 2 + margin};
-    nx[] += margin_elements; ny[] += margin_elements; grade_x[] += 1; grade_y[] += 1;
+  If(body == 1 && margin_y > 0 && !quarter)
+    y[] += {-depth / 2 - margin_y}; ny[] += margin_elements; grade_y[] += 1 / spread;
+  EndIf
+  y[] += {quarter ? 0 : -depth / 2, depth / 2}; ny[] += across_y[body]; grade_y[] += 1;
+  If(body == 1 && margin_y > 0)
+    y[] += {depth / 2 + margin_y}; ny[] += margin_elements; grade_y[] += spread;
   EndIf
   mx = #x[]; my = #y[];
 
@@ -151,13 +135,16 @@ For body In {0 : 1}
   cells = (mx - 1) * (my - 1);
   contact~{body}[] = {fz[{0 : cells - 1}]};
   far~{body}[] = {fz[{cells : 2 * cells - 1}]};
-  sides~{body}[] = {}; ends~{body}[] = {};
+  sides~{body}[] = {}; ends~{body}[] = {}; middle_x~{body}[] = {}; middle_y~{body}[] = {};
   For i In {0 : mx - 2}
-    ends~{body}[] += {fy[i], fy[i + (mx - 1) * (my - 1)]};
+    middle_y~{body}[] += fy[i]; ends~{body}[] += fy[i + (mx - 1) * (my - 1)];
   EndFor
   For j In {0 : my - 2}
-    sides~{body}[] += {fx[mx * j], fx[mx - 1 + mx * j]};
+    middle_x~{body}[] += fx[mx * j]; sides~{body}[] += fx[mx - 1 + mx * j];
   EndFor
+  If(!quarter)
+    sides~{body}[] += middle_x~{body}[]; ends~{body}[] += middle_y~{body}[];
+  EndIf
 EndFor
 
 Physical Volume("punch_body") = volumes_0[];
@@ -170,3 +157,9 @@ Physical Surface("strip_contact") = contact_1[];
 Physical Surface("strip_far") = far_1[];
 Physical Surface("strip_sides") = sides_1[];
 Physical Surface("strip_ends") = ends_1[];
+If(quarter)
+  Physical Surface("punch_middle_x") = middle_x_0[];    // x = 0
+  Physical Surface("punch_middle_y") = middle_y_0[];
+  Physical Surface("strip_middle_x") = middle_x_1[];
+  Physical Surface("strip_middle_y") = middle_y_1[];
+EndIf

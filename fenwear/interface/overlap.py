@@ -170,7 +170,7 @@ def node_areas(surface: ChartedSurface) -> NodeAreas:
     corners = surface.corners
     polygons = tabulate(surface.cell, 1, reference.reshape(-1, flat)) @ corners
     polygons = polygons.reshape(-1, count, flat)
-    node = surface.pressure_facets.ravel()
+    node: Indices = surface.pressure_facets.ravel()
     polygons, node = polygons[node >= 0], node[node >= 0]
     sizes: Array = np.zeros(len(surface.nodes))
     np.add.at(sizes, node, np.abs(_sizes(polygons)))

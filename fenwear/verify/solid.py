@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -52,6 +52,11 @@ def solve(
     return assemble(make_case(case))
 
 
+def middles(body: str) -> list[dict[str, Any]]:
+    """Return the supports of the planes of symmetry of a quarter of solid_blocks.geo."""
+    return [{"on": f"{body}_middle_{axis}", "fix": [axis]} for axis in "xy"]
+
+
 # ------------------------------------------------------------------------------- transfer
 
 
@@ -78,19 +83,13 @@ def patch() -> Result:
             "punch_tetrahedra": int(punch == "tetrahedra"),
             "strip_tetrahedra": int(strip == "tetrahedra"),
         }
-        symmetric = [{"on": f"{{}}_middle_{axis}", "fix": [axis]} for axis in "xy"]
         system = solve(
             {"file": "solid_blocks.geo", "degree": degree, "parameters": sizes},
             {
-                "supports": [{**s, "on": s["on"].format("punch")} for s in symmetric],
+                "supports": middles("punch"),
                 "loads": [{"on": "punch_far", "traction": [0, 0, -100]}],
             },
-            {
-                "supports": [
-                    *({**s, "on": s["on"].format("strip")} for s in symmetric),
-                    {"on": "strip_far", "fix": ["z"]},
-                ]
-            },
+            {"supports": [*middles("strip"), {"on": "strip_far", "fix": ["z"]}]},
         )
         pair = system.pair
         p = system.contact((1,)).solve(pair.initial_gap).pressure[0]
@@ -139,13 +138,15 @@ def slice_of_plane_strain() -> Result:
     )
     node = np.searchsorted(flat.pair.x, solid.pair.x - 1e-9)
     rows: list[Row] = []
-    for name, exact, found in (
-        ("contact, rightward", *(s.contact((1,)).solve(s.pair.initial_gap).pressure[0] for s in (flat, solid))),
-        ("after 20 half-cycles", *(list(march(s, 20))[-1].pressure[-1] for s in (flat, solid))),
-        ("cyclic steady state", *(steady(s).pressure[0] for s in (flat, solid))),
-        ("optimum", *(s.optimum(1).pressure for s in (flat, solid))),
-    ):
-        rows.append(profile(f"{name}: pressure (MPa)", exact[node], found, 1e-9, scale=exact.max()))
+    compared: dict[str, Callable[[Tribosystem], Array]] = {
+        "contact, rightward": lambda s: s.contact((1,)).solve(s.pair.initial_gap).pressure[0],
+        "after 20 half-cycles": lambda s: list(march(s, 20))[-1].pressure[-1],
+        "cyclic steady state": lambda s: steady(s).pressure[0],
+        "optimum": lambda s: s.optimum(1).pressure,
+    }
+    for name, pressure in compared.items():
+        exact = pressure(flat)
+        rows.append(profile(f"{name}: pressure (MPa)", exact[node], pressure(solid), 1e-9, scale=exact.max()))
     rates = [growth_rate(s, steady(s).phase_pressure) for s in (flat, solid)]
     rows.append(number("rate of the slowest disturbance (1/s)", rates[0], rates[1], 1e-8))
     return Result(rows)
@@ -179,8 +180,8 @@ def quarter(elements: int, degree: int, *, tetrahedra: bool = False) -> Tribosys
     symmetric = {body: [{"on": f"{body}_middle_{axis}", "fix": [axis]} for axis in "xy"] for body in ("punch", "strip")}
     return solve(
         {"file": "solid_blocks.geo", "degree": degree, "parameters": sizes},
-        {"supports": symmetric["punch"], "loads": [{"on": "punch_far", "force": [0, 0, -1]}]},
-        {"supports": [*symmetric["strip"], {"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        {"supports": middles("punch"), "loads": [{"on": "punch_far", "force": [0, 0, -1]}]},
+        {"supports": [*middles("strip"), {"on": "strip_far", "fix": ["x", "y", "z"]}]},
         materials=(RIGID, STEEL),
     )
 

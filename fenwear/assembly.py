@@ -45,7 +45,7 @@ from fenwear.interface import (
     pass_material,
     rigid_equilibrium,
 )
-from fenwear.interface.placement import in_model
+from fenwear.interface.placement import in_model, in_space
 from fenwear.optimum import Optimum, check_equilibrium, optimum
 from fenwear.remedies import Remedies
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
@@ -55,6 +55,7 @@ from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
+OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
 
 # ------------------------------------------------------------------------------ the bodies
 
@@ -385,7 +386,14 @@ class Placed:
         Args:
             direction: Sliding direction d.
             zone: Nodes in contact (n,) bool; by default all.
+
+        Raises:
+            CaseError: a node of the contact lies on the axis of rotation.
         """
+        slides = self.sliding.field.rate(self.pair.punch.x)
+        if not (slides > ROUNDING * slides.max()).all():
+            message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
+            raise CaseError(Problem("motion.centre", message))
         wear = self.phases_wear
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
@@ -423,6 +431,7 @@ def place(
     middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings)
     if bodies.followed is None:
         check_distance(middle)
+    _check_axis(middle, sliding)
     whole = heat is None
     pairs = {
         offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -451,6 +460,18 @@ def place(
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         check_equilibrium(one, phase.direction, ratio)
     return placed
+
+
+def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
+    """Raise where a strip that turns in place is no body of revolution about the axis."""
+    if not any(sliding.field.turn) or sliding.motion.reach > 0:
+        return
+    velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)
+    out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
+    if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
+        raise CaseError(
+            Problem("motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there")
+        )
 
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:

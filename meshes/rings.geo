@@ -1,6 +1,7 @@
 // Two rings on each other, as their cross-section: x is the radius, z up from the contact. Structured quadrilaterals.
 //
-// Lengths in mm. An inner radius of 0 makes a disc. The strip may be wider than the punch on each side.
+// Lengths in mm. An inner radius of 0 makes a disc. The strip may be wider than the punch on each side; its
+// contact surface is the part below the punch, which alone wears.
 // Physical groups: every name starts with the body it belongs to, punch_ or strip_.
 
 DefineConstant[
@@ -45,7 +46,7 @@ For body In {0 : 1}
   If(body == 1 && margin_outside > 0)
     r[] += {outer_radius + margin_outside}; n[] += margin_elements; side[] += 1;
   EndIf
-  contact~{body}[] = {}; ends~{body}[] = {}; uprights~{body}[] = {}; parts~{body}[] = {};
+  contact~{body}[] = {}; free~{body}[] = {}; ends~{body}[] = {}; uprights~{body}[] = {}; parts~{body}[] = {};
   p[] = {}; q[] = {};
   For i In {0 : #r[] - 1}
     a = newp; Point(a) = {r[i], 0, 0};
@@ -66,7 +67,12 @@ For body In {0 : 1}
     EndIf
     c = newll; Curve Loop(c) = {l, uprights~{body}[i + 1], -m, -uprights~{body}[i]};
     s = news; Plane Surface(s) = {c};
-    contact~{body}[] += l; ends~{body}[] += m; parts~{body}[] += s;
+    If(side[i] == 0)
+      contact~{body}[] += l;
+    Else
+      free~{body}[] += l;
+    EndIf
+    ends~{body}[] += m; parts~{body}[] += s;
   EndFor
 EndFor
 
@@ -80,6 +86,9 @@ Physical Curve("punch_inside") = uprights_0[0];
 Physical Curve("punch_outside") = uprights_0[#uprights_0[] - 1];
 Physical Surface("strip_body") = parts_1[];
 Physical Curve("strip_contact") = contact_1[];
+If(#free_1[] > 0)
+  Physical Curve("strip_free") = free_1[];
+EndIf
 Physical Curve("strip_far") = ends_1[];
 Physical Curve("strip_inside") = uprights_1[0];
 Physical Curve("strip_outside") = uprights_1[#uprights_1[] - 1];

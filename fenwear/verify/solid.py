@@ -360,6 +360,8 @@ def rotation() -> Result:
         profile("ring, marched: volume in each half-cycle (mm³)", rate * torque[1:] / 0.2, depth, 1e-9,
                 scale=rate * torque[-1] / 0.2),
     ]  # fmt: skip
+    both = system.vary(f"wear.strip.coefficient={0.01 / MODULUS!r}")
+    rows.append(profile("ring, both wear: pressure (MPa)", exact, steady(both).pressure[0], 1e-9, scale=exact))
     for b, inside, outside in ((1.0, 1.9894368, 1.1936621), (2.0, 1.7274554, 1.3380812)):
         turning = pad(b)
         x = turning.pair.punch.x

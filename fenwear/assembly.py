@@ -470,7 +470,9 @@ def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
     out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
     if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
         raise CaseError(
-            Problem("motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there")
+            Problem(
+                "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
+            )
         )
 
 

@@ -226,6 +226,8 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
             problems.append(f"{path.name} has no physical {region} named {body}_...")
         if f"{body}_contact" not in _groups(gmsh, whole - 1):
             problems.append(f"{path.name} has no physical {facet} named {body}_contact")
+    if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
+        problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
     for dim in (whole, whole - 1):
         names = _groups(gmsh, dim)
         types = {name: _element_types(gmsh, dim, tag) for name, tag in names.items()}

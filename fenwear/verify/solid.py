@@ -177,7 +177,6 @@ def quarter(elements: int, degree: int, *, tetrahedra: bool = False) -> Tribosys
         "punch_tetrahedra": int(tetrahedra),
         "strip_tetrahedra": int(tetrahedra),
     }
-    symmetric = {body: [{"on": f"{body}_middle_{axis}", "fix": [axis]} for axis in "xy"] for body in ("punch", "strip")}
     return solve(
         {"file": "solid_blocks.geo", "degree": degree, "parameters": sizes},
         {"supports": middles("punch"), "loads": [{"on": "punch_far", "force": [0, 0, -1]}]},
@@ -343,7 +342,7 @@ def round_punch() -> Result:
     "p r = constant where all wears evenly; volume rate = beta~ omega torque / mu",
 )
 def rotation() -> Result:
-    """p = F / (2 pi (r2 - r1) r) of a ring, from the optimum and from a march; a pad of 60 degrees with b = 1 and 2."""
+    """P = F / (2 pi (r2 - r1) r) of a ring, from the optimum and from a march; a pad of 60 degrees with b = 1 and 2."""
     system = ring(0.5, friction=0.2)
     r, weights = system.pair.x, system.pair.weights
     exact = 1000 / (2 * np.pi * 0.5 * r)

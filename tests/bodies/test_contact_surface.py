@@ -106,8 +106,9 @@ def test_no_pressure_on_the_axis() -> None:
     from fenwear.assembly import place_case
 
     for degree in (1, 2, 3):
-        case = load_case("ring-on-ring", ["geometry.parameters.inner_radius=0", "geometry.parameters.margin_inside=0",
-                                          f"geometry.degree={degree}", "geometry.parameters.strip_across=9"])  # fmt: skip
+        sizes = ("inner_radius=0", "margin_inside=0", "strip_across=9")
+        settings = [f"geometry.degree={degree}", *(f"geometry.parameters.{size}" for size in sizes)]
+        case = load_case("ring-on-ring", settings)
         placed = place_case(case)
         pair = placed.pair
         assert len(pair.weights) == 12 * degree + (degree == 1)

@@ -119,8 +119,9 @@ class ElasticBody:
     @cached_property
     def rigid_motion(self) -> Array:
         """Displacement of the contact surface's trace nodes by each rigid mode (N, d, modes); collective."""
-        modes = np.array(self.rigid_modes).reshape(len(self.rigid_modes), -1).T
-        return self.trace.pick(modes) if self.rigid_modes else np.zeros((*self.surface.trace.shape, 0))
+        if not self.rigid_modes:
+            return np.zeros((*self.surface.trace.shape, 0))
+        return self.trace.pick(np.array(self.rigid_modes).T)
 
     @property
     def factor(self) -> Factor:

@@ -285,17 +285,17 @@ def _result(
 
 def _steady_heat(heat: CycleHeat, state: Array, pressure: Array, middle: slice) -> SteadyHeat:
     """Follow the temperatures through one cycle of the steady state."""
-    exchange, parts = heat.exchange, heat.parts(state)
+    exchange = heat.exchange
+    now = exchange.at(state)
     punch, strip, means = [], [], np.zeros_like(state)
     for phase in range(len(pressure)):
-        parts, _ = exchange.half_cycle(parts, phase, pressure[phase], exchange.conductance(pressure[phase]))
-        temperatures = exchange.contact_temperatures(parts)
+        now, _ = exchange.half_cycle(now, phase, pressure[phase], exchange.conductance(pressure[phase]))
+        temperatures = exchange.contact_temperatures(now)
         punch.append(temperatures[0])
         strip.append(temperatures[1])
-        means += np.concatenate(parts) / len(pressure)
-    fields = [side.field.temperature(s) for side, s in zip(exchange.sides, heat.parts(means), strict=True)]
+        means += now.values / len(pressure)
     ends = slice(middle.step - 1, None, middle.step)  # the last phase of each half-cycle
-    return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends], (fields[0], fields[1]))
+    return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends], exchange.at(means).temperatures())
 
 
 def _uniform_wear_exists(system: Tribosystem) -> bool:

@@ -250,20 +250,34 @@ class _Flow:
 
     Attributes:
         velocity: v, a vector of UFL with the components of the model.
+        turns: Whether it is a rotation.
     """
 
     def __init__(self, body: HeatBody, sliding: SlidingField) -> None:
         self.body = body
+        self.turns = sliding.turn != ZERO
         self.velocity = _velocity(sliding, body.body.mesh)
 
     @cached_property
     def is_open(self) -> bool:
-        """Whether the material moves through a free boundary, rounding apart; collective."""
+        """Whether the material moves through a free boundary, rounding apart; collective.
+
+        A turning body keeps its place: what enters and leaves through one facet of a round boundary, whose
+        facets are chords, is no flow.
+        """
         body, v, normal = self.body, self.velocity, ufl.FacetNormal(self.body.body.mesh)
-        forms = (body._ds(abs(ufl.dot(v, normal)), FREE), body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))
-        comm = body.body.mesh.comm
-        through, along = (comm.allreduce(fem.assemble_scalar(fem.form(form))) for form in forms)
-        return bool(through > 1e-9 * along)
+        comm, through = body.body.mesh.comm, ufl.dot(v, normal)
+        if self.turns:
+            means = body._vector(body._ds(through * ufl.TestFunction(self._constants), FREE))
+            flow = comm.allreduce(float(np.abs(means.array_r).sum()))
+        else:
+            flow = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(abs(through), FREE))))
+        along = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))))
+        return bool(flow > 1e-9 * along)
+
+    @cached_property
+    def _constants(self) -> fem.FunctionSpace:
+        return fem.functionspace(self.body.body.mesh, ("DG", 0))
 
     @cached_property
     def carried(self) -> Array:
@@ -321,7 +335,7 @@ class _Flow:
         speeds = np.linalg.norm(along, axis=1, keepdims=True)
         along = np.where(speeds > 0, along, np.eye(dim)[0]) / np.where(speeds > 0, speeds, 1.0)  # on an axis: any
         x = np.einsum("kic,kc->ki", domain.geometry.x[compat.geometry_dofmap(domain)[:count], :dim], along)
-        lengths = fem.Function(fem.functionspace(domain, ("DG", 0)))
+        lengths = fem.Function(self._constants)
         lengths.x.array[:count] = x.max(axis=1) - x.min(axis=1)
         return lengths
 
@@ -398,11 +412,19 @@ class HeatStep:
         self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
         self._pivoted, self._solved = duration == np.inf, 0
 
-    def advance(self, theta: Array) -> Array:
-        """Return the temperature at the end without any flux through the contact (owned,); collective."""
+    def advance(self, theta: Array, *, sources: bool = True) -> Array:
+        """Return the temperature at the end without any flux through the contact; collective.
+
+        Args:
+            theta: At its start (owned,), or without sources several fields (owned, k).
+            sources: False for what becomes of changes of temperature, A^-1 B.
+        """
+        if theta.ndim == 2:
+            return self._solve_many(theta, self.b.matMult)
         self._solution.array[:] = theta
         self.b.mult(self._solution, self._rhs)
-        self._rhs.array[:] += self.source
+        if sources:
+            self._rhs.array[:] += self.source
         self._factor.solve(self._rhs, self._solution)
         self._solved += 1
         if self._solved % CHECK_EVERY == 1 and not self._is_exact(self._rhs, self._solution):
@@ -422,10 +444,6 @@ class HeatStep:
     def _pivot(self) -> None:
         """Factor again, with pivoting; collective."""
         self._factor, self._pivoted = Factor(self.a, PREFIX, "lu"), True
-
-    def advance_linear(self, thetas: Array) -> Array:
-        """Return A^-1 B of several fields (owned, k), without the sources; collective."""
-        return self._solve_many(thetas, self.b.matMult)
 
     def respond(self, load: Array) -> Array:
         """Return A^-1 of several loads (owned, k), mW/mm; collective."""

@@ -119,8 +119,8 @@ def _reduced(
         HeatError: none does.
     """
     while True:
-        lift, basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
-        field = ReducedField(body, steps, inflow, lift, basis)
+        basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
+        field = ReducedField(steps, inflow, basis)
         growth = field.spectral_radius(cycle)
         if growth <= 1 + NEUTRAL:
             return field
@@ -137,6 +137,8 @@ def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, r
     """Return what a body meets beyond its mesh: the strip new material, and beside the punch the surroundings."""
     if body.body.name == "punch":
         return Surroundings()
+    flow = body.flow(sliding)
+    renewed = renewed and (flow.is_open or not flow.turns)  # what turns in its place comes back
     areas = body.surface.spread @ body.surface.weights
     covered = pair.transfer.T @ pair.weights
     bare = np.maximum(areas - covered, 0.0)  # unlike meshes leave less than nothing beside an edge
@@ -172,7 +174,7 @@ def _side(
     pair: ContactPair,
     gap_rows: Array,
 ) -> Side:
-    body = field.body
+    body = field.basis.body
     onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
     contact_rows = onto_nodes @ body.trace.rows
     convected = body.convected
@@ -184,16 +186,12 @@ def _side(
     rows = np.array(balance_rows)
     comm, moves = body.body.mesh.comm, body.body.name == "strip"
     initial = total(comm, gap_rows @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
-    gap = field.observe(gap_rows)
     capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
     return Side(
         field,
         field.observe(contact_rows),
-        lambda state: gap(state) - initial,
+        field.observe(gap_rows).less(initial),
         field.observe(rows),
-        field.observe_change(contact_rows),
-        field.observe_change(gap_rows),
-        field.observe_change(rows),
         [step.held_source for step in steps],
         [step.brought for step in steps],
         body.heat.ambient * ambient_loss,

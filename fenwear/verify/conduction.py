@@ -13,6 +13,7 @@ from scipy.special import k0e
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, Surroundings
+from fenwear.heat.field import HeatState
 from fenwear.results.fields import body_fields
 from fenwear.verify.bodies import builtin, clamped, two_blocks
 from fenwear.verify.manufactured import (
@@ -295,8 +296,8 @@ def bimetal() -> Result:
         )
         assert system.bodies.heat is not None
         assert system.exchange is not None
-        warm = (np.full(system.bodies.heat[0].owned, warming), np.zeros(system.bodies.heat[1].owned))
-        x, deflection = system.pair.x, system.exchange.gap(system.exchange.state(warm))
+        warm = [np.full(body.owned, value) for body, value in zip(system.bodies.heat, (warming, 0.0), strict=True)]
+        x, deflection = system.pair.x, system.exchange.gap(HeatState.nodal(system.bodies.heat, warm))
         middle = np.abs(x) < 1
         curvature = 2 * np.polyfit(x[middle], deflection[middle], 2)[0]
         bending = 3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))

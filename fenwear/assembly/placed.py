@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Heat, OneWay, WearLaw
+from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, Problem
 from fenwear.interface import (
     ContactPair,
@@ -22,13 +22,16 @@ from fenwear.interface import (
     pass_material,
     rigid_equilibrium,
 )
-from fenwear.interface.placement import in_model
+from fenwear.interface.placement import in_model, in_space
 from fenwear.optimum import Optimum, check_equilibrium, optimum
 from fenwear.remedies import Remedies
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import PhasesWear, Wear, Worn
+
+ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
+OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
 
 
 @dataclass(frozen=True)
@@ -54,17 +57,31 @@ class Sliding:
 
 def make_sliding(case: Case, parts: int = 1) -> Sliding:
     """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
-    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None).in_parts(parts)
-    sliding_field = ALONG_X if case.motion.axis == "x" else ALONG_Y
-    one_way = isinstance(case.motion, OneWay)
+    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None and case.passes).in_parts(parts)
+    sliding_field = _sliding_field(case)
+    one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(
         motion,
         sliding_field,
         Friction(case.contact, sliding_field),
         (case.wear.punch, case.wear.strip),
         case.motion.track if isinstance(case.motion, OneWay) else None,
-        case.motion.axis == "x" and not one_way,
+        case.passes and not one_way,
     )
+
+
+def _sliding_field(case: Case) -> SlidingField:
+    motion = case.motion
+    if isinstance(motion, Oscillation | Rotation):
+        return SlidingField(turn=_unit(motion.axis), centre=motion.centre)
+    if motion.along is not None:
+        return SlidingField(shift=_unit(motion.along))
+    return ALONG_X if motion.axis == "x" else ALONG_Y
+
+
+def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (np.array(vector) / np.linalg.norm(vector)).tolist()
+    return x, y, z
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -140,13 +157,18 @@ class Placed:
         return self.sliding.wear[1] is not None
 
     @cached_property
+    def slid(self) -> Array:
+        """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
+        found = {id(pair): self.sliding.field.rate(pair.punch.x, pair.normal) for pair in self.pairs}
+        return np.array([found[id(pair)] for pair in self.pairs])
+
+    @cached_property
     def wear(self) -> Wear:
         """The wear rule of both bodies over the phases of the motion."""
-        rate = self.sliding.field.rate(self.pair.punch.x)
         slid = []
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
-            slid.append(self.motion.sliding(exponent)[:, None] * rate**exponent)
+            slid.append(self.motion.sliding(exponent)[:, None] * self.slid**exponent)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.sliding.track)
 
     @property
@@ -201,30 +223,34 @@ class Placed:
         return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
     def conditions(
-        self, phase: int, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
+        self, phase: int | None, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
         Args:
-            phase: Its number.
+            phase: Its number; None for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
+        if phase is None:
+            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
+        else:
+            speed = self.motion.phases[phase].speed * self.slid[phase]
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
-            self.motion.phases[phase].speed * self.sliding.field.rate(self.pair.punch.x),
+            speed,
             (initial, initial) if temperatures is None else temperatures,
         )
 
     def friction_ratio(self, direction: int) -> Array:
-        """Return tau (n, d) in the middle position at the mean pressure.
+        """Return tau (n, d) in the middle position at the mean pressure and speed.
 
         Args:
             direction: d, the sign of the sliding.
         """
-        mu = self.friction.values(self.conditions(0))
+        mu = self.friction.values(self.conditions(None))
         return in_model(self.friction.ratio(direction, mu, self.pair), self.pair.punch.dim)
 
     def phase_friction(self, phase: int, mu: Array) -> Array:
@@ -258,7 +284,14 @@ class Placed:
         Args:
             direction: Sliding direction d.
             zone: Nodes in contact (n,) bool; by default all.
+
+        Raises:
+            CaseError: a node of the contact lies on the axis of rotation.
         """
+        slides = self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
+        if not (slides > ROUNDING * slides.max()).all():
+            message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
+            raise CaseError(Problem("motion.centre", message))
         wear = self.phases_wear
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
@@ -292,9 +325,11 @@ def place(
     Raises:
         CaseError: the surfaces do not face each other, or no pressure balances the loads.
     """
-    middle = pair(bodies.punch.surface, bodies.strip.surface)
+    rings = bodies.punch.law.kind == "axisymmetric"
+    middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings)
     if bodies.followed is None:
         check_distance(middle)
+    _check_axis(middle, sliding)
     whole = heat is None
     pairs = {
         offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -304,12 +339,15 @@ def place(
     pairs[0.0] = middle
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
+    made = {0.0: rigid}  # phases there and back share theirs
     rigids: list[RigidEquilibrium] = []
     for phase, own in zip(sliding.motion.phases, loaded, strict=True):
-        if phase.offset == 0.0 and own is bodies:
-            rigids.append(rigid)
-        else:
+        if own is not bodies:
             rigids.append(rigid_equilibrium(pairs[phase.offset], own.punch, own.strip))
+            continue
+        if phase.offset not in made:
+            made[phase.offset] = rigid_equilibrium(pairs[phase.offset], bodies.punch, bodies.strip)
+        rigids.append(made[phase.offset])
     placed = Placed(
         bodies=bodies,
         sliding=sliding,
@@ -323,6 +361,20 @@ def place(
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         check_equilibrium(one, phase.direction, ratio)
     return placed
+
+
+def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
+    """Raise where a strip that turns in place is no body of revolution about the axis."""
+    if not any(sliding.field.turn) or sliding.motion.reach > 0:
+        return
+    velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)
+    out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
+    if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
+        raise CaseError(
+            Problem(
+                "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
+            )
+        )
 
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:

@@ -35,8 +35,8 @@ from fenwear.bodies.assembly import assembled
 from fenwear.bodies.contact_surface import contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import Factor
-from fenwear.bodies.material import Kind, measure
-from fenwear.case import Body, Heat
+from fenwear.bodies.material import measure
+from fenwear.case import Body, Heat, Kind
 from fenwear.errors import CaseError, Problem
 from fenwear.heat.material import ConductionLaw
 from fenwear.interface.placement import ZERO

@@ -25,8 +25,7 @@ TURNING = SlidingField(turn=(0.0, 0.0, 1.0))
 
 def conducting(mesh: Any, kind: Kind, groups: dict[str, Callable[[Any], Any]], *held: str) -> HeatBody:
     """Return conduction in a strip whose bottom holds it in place."""
-    every = ("x", "y", "z") if mesh.geometry.dim == 3 else ("x", "z")
-    support = Support.model_construct(on="bottom", fix=every)  # not checked: case files may not know y
+    support = Support(on="bottom", fix=("x", "y", "z") if mesh.geometry.dim == 3 else ("x", "z"))
     description = Body(supports=(support,), temperatures=tuple({"on": name} for name in held))
     elastic = ElasticBody(own_mesh("strip", mesh, groups), description, Isotropic(kind, lame(1.0, 0.3, kind)), degree=2)
     return HeatBody(elastic, description, ConductionLaw(K, RHO_C), Heat())

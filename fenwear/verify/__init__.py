@@ -19,6 +19,7 @@ __all__ = [
     "registered",
     "run_cases",
     "solid",
+    "solid_heat",
     "thermal",
     "wear",
 ]

@@ -21,7 +21,6 @@ from fenwear.case import Case, doubts
 from fenwear.cycle import Block, follow, jump, march, stability_number, stationary_growth
 from fenwear.cycle.state import RunState, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, MeshQualityError, OutputError, Problem
-from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
 from fenwear.report.page import try_report
 from fenwear.results import checkpoint
@@ -146,7 +145,7 @@ class _Run:
             followed = checkpoint.followed(directory, system)
             if followed is not None:
                 system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case))
-            start = checkpoint.load(directory, system, self._exchange(system))
+            start = checkpoint.load(directory, system)
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
                 raise CaseError(Problem("run.half_cycles", message))
@@ -234,12 +233,8 @@ class _Run:
             self._progress.working(self.state.half_cycle)
         return bool(interrupted)
 
-    def _exchange(self, system: Tribosystem) -> HeatExchange | None:
-        """Return the heat exchange that the run integrates."""
-        return system.exchange
-
     def _blocks(self) -> Iterator[Block]:
-        for block in follow(self.system, self._integrate, self._exchange, self.start):
+        for block in follow(self.system, self._integrate, self.start):
             yield block
             if block.end.half_cycle >= self._last:  # meshes that nothing more is computed on need not follow
                 return
@@ -294,10 +289,7 @@ class _Run:
 
     def _write_fields(self, block: Block) -> None:
         temperature = block.end.temperature
-        temperatures = None
-        exchange = self._exchange(self.system)
-        if exchange is not None and temperature is not None:
-            temperatures = exchange.temperatures(temperature)
+        temperatures = None if temperature is None else temperature.temperatures()
         half_cycle, motion = int(block.half_cycle[-1]), self.system.motion
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
@@ -307,7 +299,7 @@ class _Run:
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
         self._on_history(HistoryWriter.flush)
-        checkpoint.save(self.directory, self.system, self._exchange(self.system), self.state)
+        checkpoint.save(self.directory, self.system, self.state)
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
 
     def stop(self, failure: Exception | None) -> str:

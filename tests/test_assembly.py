@@ -13,17 +13,24 @@ import ufl
 from dolfinx.mesh import CellType, create_rectangle
 from mpi4py import MPI
 
-from fenwear import CaseError, Tribosystem, assemble, vary
+from fenwear import CaseError, Tribosystem, assemble, march, vary
+from fenwear.assembly import Bodies, Sliding, elastic, place, with_exchange
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import OwnLaw, lame, strain, stress
 from fenwear.bodies.mesh import own_mesh
-from fenwear.case import Body, Support
+from fenwear.case import Body, Contact, Heat, Load, Reciprocating, Support, WearLaw
+from fenwear.heat.conduction import HeatBody
+from fenwear.heat.material import ConductionLaw
+from fenwear.sliding.field import SlidingField
+from fenwear.sliding.friction import Friction
+from fenwear.sliding.motion import make_motion
 
 DEMO = Path(__file__).parents[1] / "demos" / "own_materials.py"
 GROUPS: dict[str, Callable[[Any], Any]] = {
     "punch_contact": lambda x: np.isclose(x[1], 0),
     "top": lambda x: np.isclose(x[1], 1),
 }
+HEAT = Heat(partition=0.5, conductance=0)
 HELD = Body(supports=(Support(on="top", fix=("x", "z")),))
 
 
@@ -55,6 +62,66 @@ def test_the_fibres_matter() -> None:
     response = names["system"].condensed.punch.response[:, :, :, 0]
     sideways, down = np.abs(response[:, 0]).max(), np.abs(response[:, 1]).max()
     assert 0.01 < sideways / down < 1  # pressed fibres at 30 degrees give way sideways, too
+
+
+def test_anisotropic_conductivity() -> None:
+    """theta = a x + b z under the flux that it drives through the contact: exact with any tensor."""
+    tensor, slope = np.array([[5.0, 2.0], [2.0, 3.0]]), np.array([7.0, -4.0])
+    elastic_body = block({**GROUPS, "sides": lambda x: np.isclose(x[0] * (1 - x[0]), 0)}, OwnLaw("stress", isotropic))
+    held = Body(supports=HELD.supports, temperatures=({"on": "sides"}, {"on": "top"}))
+    body = HeatBody(elastic_body, held, ConductionLaw(ufl.as_matrix(tensor.tolist()), 2.0), Heat())
+    exact = body.space.tabulate_dof_coordinates()[: body.owned, :2] @ slope
+    body.held_values = exact[body.held]
+    n = len(elastic_body.surface.weights)
+    step = body.step(0.0, np.inf)
+    found = step.advance(body.initial()) + step.respond(body.load(np.full(n, -(tensor @ slope)[1]))[:, None])[:, 0]
+    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(body.contact(found), elastic_body.surface.x @ slope, rtol=0, atol=1e-11)
+
+
+def hand_made(conductivity: Any) -> Tribosystem:
+    """Return a pad on a strip, both made in Python, with heat; the pad's conductivity is any tensor."""
+    made = []
+    for name, corners, cells, law in (
+        ("punch", [(-2, 0), (2, 3)], (8, 6), ConductionLaw(conductivity, 0.5)),
+        ("strip", [(-6, -3), (6, 0)], (24, 6), ConductionLaw(50.0, 3.6)),
+    ):
+        mesh = create_rectangle(MPI.COMM_WORLD, corners, cells, CellType.quadrilateral)
+        height = 3 if name == "punch" else -3
+        groups = {f"{name}_contact": GROUPS["punch_contact"], "far": lambda x, height=height: np.isclose(x[1], height)}
+        supports = (Support(on="far", fix=("x",) if name == "punch" else ("x", "z")),)
+        loads = (Load(on="far", force=(0, -20)),) if name == "punch" else ()
+        description = Body(supports=supports, loads=loads, temperatures=({"on": "far"},))
+        elastic_body = ElasticBody(
+            own_mesh(name, mesh, groups), description, OwnLaw("stress", isotropic, expansion), degree=2
+        )
+        made.append((elastic_body, HeatBody(elastic_body, description, law, HEAT)))
+    (pad, pad_heat), (strip, strip_heat) = made
+    field = SlidingField(shift=(1.0, 0.0, 0.0))
+    motion = make_motion(Reciprocating(kind="reciprocating", amplitude=1.0, period=0.5))
+    sliding = Sliding(motion, field, Friction(Contact(friction=0.3), field), (WearLaw(coefficient=1e-8), None))
+    return with_exchange(elastic(place(Bodies(pad, strip, (pad_heat, strip_heat)), sliding, HEAT)))
+
+
+def expansion(theta: Any) -> Any:
+    return 2e5 / 0.7 * 1e-6 * theta * ufl.Identity(2)
+
+
+def test_heat_of_bodies_made_in_python() -> None:
+    """Friction heat is balanced in every half-cycle; a tensor k I is k, and tilted fibres tilt the temperature."""
+    scalar, equal, tilted = (
+        hand_made(k) for k in (2.0, 2.0 * ufl.Identity(2), ufl.as_matrix([[6.0, 3.0], [3.0, 2.0]]))
+    )
+    found = []
+    for system in (scalar, equal, tilted):
+        (block,) = march(system, 20, block=20)
+        assert block.heat is not None
+        assert block.heat.balance_error.max() < 1e-9
+        found.append((block.heat.temperature_punch[-2:].mean(axis=0), block.pressure[-1]))
+    for one, other in zip(found[0], found[1], strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+    asymmetry = [np.abs(t - t[::-1]).max() / t.max() for t, _ in found]
+    assert asymmetry[2] > 3 * asymmetry[0]
 
 
 def test_a_stress_that_is_not_linear_is_named() -> None:

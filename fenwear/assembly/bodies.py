@@ -13,6 +13,7 @@ from fenwear.bodies.mesh import BodyMesh, build_meshes
 from fenwear.bodies.shape import follow_wear
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
+from fenwear.heat.material import isotropic_conduction
 from fenwear.sliding.wear import Worn
 
 
@@ -75,7 +76,9 @@ def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tupl
     if case.heat is None:
         return None
     of_punch, of_strip = (
-        HeatBody(elastic.body, description, case.materials, case.model, case.heat, case.geometry.degree)
+        HeatBody(
+            elastic, description, isotropic_conduction(elastic.body, description.regions, case.materials), case.heat
+        )
         for elastic, description in ((punch, case.punch), (strip, case.strip))
     )
     return of_punch, of_strip

@@ -703,8 +703,8 @@ class Case(_Part):
             problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
-        if kind != "plane" and self.heat is not None:
-            problems.append(f"heat: expected a plane model: heat is not followed in a {kind} model yet")
+        if kind == "axisymmetric" and self.heat is not None:
+            problems.append("heat: expected a plane model or a solid: heat is not followed in rings yet")
         if kind != "plane" and self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' but in plane models")
         return problems

@@ -116,7 +116,7 @@ class Coupled:
         if heat is None:
             return np.zeros((0, 2, pressure.shape[1]))
         starts = self.through(state, pressure)[:-1]
-        return np.array([heat.exchange.contact_temperatures(heat.parts(one)) for one in starts])
+        return np.array([heat.exchange.contact_temperatures(heat.exchange.at(one)) for one in starts])
 
     def through(self, state: Array, pressure: Array) -> list[Array]:
         """Return the temperatures (dim,) before, between and after the phases of a cycle at these pressures."""

@@ -21,22 +21,18 @@ from fenwear.assembly import Tribosystem, assemble, preparation
 from fenwear.compat import interpolation_points
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
-from fenwear.heat.exchange import HeatExchange, State
+from fenwear.heat.field import HeatState
 
 # Runs a system from a state, or the beginning, and leaves at the first state for which it is told to.
 Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
-Exchange = Callable[[Tribosystem], HeatExchange | None]
 
 
-def follow(
-    system: Tribosystem, integrate: Integrate, exchange: Exchange, start: RunState | None = None
-) -> Iterator[Block]:
+def follow(system: Tribosystem, integrate: Integrate, start: RunState | None = None) -> Iterator[Block]:
     """Yield the blocks of a run whose meshes follow large wear; collective. Each block knows its system.
 
     Args:
         system: The assembled problem.
         integrate: Yields the blocks on one system, such as `march` with its arguments.
-        exchange: The heat exchange whose state the moments hold.
         start: Where to go on from; by default the beginning.
 
     Raises:
@@ -47,7 +43,7 @@ def follow(
     while True:
         if state is not None and system.outworn(state.worn):  # a run may also go on from just there
             moved = assemble(system.case, system.comm, state.worn, heat=preparation(system))
-            state = replace(state, temperature=_carried(state.temperature, (system, moved), exchange))
+            state = replace(state, temperature=_carried(state.temperature, moved))
             system = moved
         for block in integrate(system, state, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
             yield block
@@ -56,22 +52,17 @@ def follow(
             return
 
 
-def _carried(state: State | None, systems: tuple[Tribosystem, Tribosystem], exchange: Exchange) -> State | None:
-    """Return the state of the same temperatures on the moved meshes."""
-    before, after = (exchange(system) for system in systems)
-    if state is None or before is None or after is None:
+def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:
+    """Return the state of the same temperatures on the moved meshes; collective."""
+    bodies = moved.bodies.heat
+    if state is None or bodies is None:
         return None
-    temperatures = before.temperatures(state)
-    bodies = [system.bodies.heat or () for system in systems]
-    first, second = (
-        _in_place(old.function(theta), new.function(theta))
-        for theta, old, new in zip(temperatures, *bodies, strict=True)
-    )
-    return after.state((first, second))
+    pairs = zip(state.functions(), bodies, strict=True)
+    return HeatState.nodal(bodies, [_in_place(old, body.function(body.initial())) for old, body in pairs])
 
 
 def _in_place(old: fem.Function, new: fem.Function) -> Array:
-    """Return theta + grad theta . s on this rank's own nodes, s how far they have moved."""
+    """Return theta + grad theta . s on this rank's own nodes, s how far those of the new function have moved."""
     space, mesh = old.function_space, old.function_space.mesh
     shift = new.function_space.tabulate_dof_coordinates() - space.tabulate_dof_coordinates()
     largest = mesh.comm.allreduce(float(np.abs(shift).max(initial=0.0)), MPI.MAX)

@@ -203,14 +203,16 @@ class _Stepper:
         """Return the state `cycles` cycles later, by the two stages of one step."""
         share = GAMMA * cycles
         rest = cycles - share
-        temperature = None if state.temperature is None else np.concatenate(state.temperature)
+        heat, temperature = self.coupled.heat, None
+        if heat is not None and state.temperature is not None:
+            temperature = heat.exchange.own(state.temperature).values
         first = self._stage(state.worn, temperature, joined(state.contacts), share)
         between = None if temperature is None else temperature + rest * first.heated
         worn = state.worn + first.worn.times(rest)
         second = self._stage(worn, between, first.contact, share)
         end = None
-        if self.coupled.heat is not None and between is not None:
-            end = self.coupled.heat.parts(between + share * second.heated)
+        if heat is not None and between is not None:
+            end = heat.exchange.at(between + share * second.heated)
             self._heated = second.heated
         return RunState(state.half_cycle, worn + second.worn.times(share), parted(second.contact), end)
 
@@ -285,7 +287,7 @@ class _Stepper:
             return [None] * len(state.contacts)
         heats: list[HalfCycleHeat | None] = []
         exchange = self.coupled.heat.exchange
-        temperature = self.coupled.heat.parts(np.concatenate(state.temperature) - self._heated)
+        temperature = exchange.at(exchange.own(state.temperature).values - self._heated)
         for phase, contact in enumerate(state.contacts):
             pressure = _present(contact).pressure[0]
             conductance = exchange.conductance(pressure)

@@ -14,7 +14,7 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
 from fenwear.errors import ConvergenceError
-from fenwear.heat.exchange import State
+from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -22,7 +22,7 @@ COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"
 )
-_Solved = tuple[ContactState, State | None, HalfCycleHeat | None, PhasesWear]
+_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, PhasesWear]
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class PhaseEnd:
     """The end of a phase: its record, temperature and heat (None without), and the depths worn in it."""
 
     record: PhaseRecord
-    temperature: State | None
+    temperature: HeatState | None
     heat: HalfCycleHeat | None
     worn: Worn
 
@@ -55,7 +55,7 @@ class PhaseStep:
         self._friction_ratio = system.phase_friction(phase, system.friction.values(conditions))
         self._wear = system.wear.phases([conditions], [phase])
 
-    def solve(self, temperature: State | None, worn: Worn, before: ContactState | None) -> PhaseEnd:
+    def solve(self, temperature: HeatState | None, worn: Worn, before: ContactState | None) -> PhaseEnd:
         """Return the end of the phase.
 
         Args:
@@ -67,6 +67,8 @@ class PhaseStep:
             ConvergenceError: contact, heat or the coefficients did not converge.
         """
         temperature = temperature or self._initial
+        if self._thermal is not None and temperature is not None:
+            temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn)
         if self._constant:
             return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
@@ -92,7 +94,7 @@ class PhaseStep:
         )
         return self._end(contact, after, heat, before, wear)
 
-    def _update(self, pressure: Array | None, temperature: State | None) -> PhasesWear:
+    def _update(self, pressure: Array | None, temperature: HeatState | None) -> PhasesWear:
         """Take friction and wear at this pressure and at the temperature at the start of the phase."""
         system = self.system
         surfaces = None
@@ -108,8 +110,8 @@ class PhaseStep:
         return system.wear.phases([conditions], [self.phase])
 
     def _solve(
-        self, temperature: State | None, gap: Array, start: ContactState | None, wear: PhasesWear
-    ) -> tuple[ContactState, State | None, HalfCycleHeat | None]:
+        self, temperature: HeatState | None, gap: Array, start: ContactState | None, wear: PhasesWear
+    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
         layer = WornLayer(wear) if self.implicit else None
         if self._thermal is None or temperature is None:
             return self._contact.solve(gap, start, layer), None, None
@@ -118,7 +120,7 @@ class PhaseStep:
     def _end(
         self,
         contact: ContactState,
-        temperature: State | None,
+        temperature: HeatState | None,
         heat: HalfCycleHeat | None,
         before: ContactState | None,
         wear: PhasesWear,

@@ -16,7 +16,7 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.state import RunState
 from fenwear.errors import ConvergenceError
-from fenwear.heat.exchange import State
+from fenwear.heat.field import HeatState
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.wear import Worn
 
@@ -33,7 +33,7 @@ class SmallerSteps:
 
     def __init__(self, system: Tribosystem, *, implicit: bool) -> None:
         self.system, self.implicit = system, implicit
-        self._steps: dict[int, tuple[Tribosystem, list[PhaseStep]]] = {}
+        self._steps: dict[int, list[PhaseStep]] = {}
 
     def half_cycle(self, state: RunState, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle.
@@ -56,9 +56,8 @@ class SmallerSteps:
         raise error
 
     def _in_parts(self, state: RunState, phases: range, parts: int) -> list[PhaseEnd]:
-        system, steps = self._prepared(parts)
-        temperature = _carried(state.temperature, self.system, system)
-        worn, ends = state.worn, []
+        steps = self._prepared(parts)
+        temperature, worn, ends = state.temperature, state.worn, []
         for phase in phases:
             before = state.contacts[phase]
             contact, own = before, []
@@ -66,18 +65,18 @@ class SmallerSteps:
                 end = step.solve(temperature, worn, contact)
                 contact, temperature, worn = end.record.contact, end.temperature, worn + end.worn
                 own.append(end)
-            ends.append(_joined(own, phase, before, _carried(temperature, system, self.system)))
+            ends.append(_joined(own, phase, before, temperature))
         return ends
 
-    def _prepared(self, parts: int) -> tuple[Tribosystem, list[PhaseStep]]:
+    def _prepared(self, parts: int) -> list[PhaseStep]:
         if parts not in self._steps:
             system = in_parts(self.system, parts)
             phases = range(len(system.motion.phases))
-            self._steps[parts] = (system, [PhaseStep(system, phase, implicit=self.implicit) for phase in phases])
+            self._steps[parts] = [PhaseStep(system, phase, implicit=self.implicit) for phase in phases]
         return self._steps[parts]
 
 
-def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: State | None) -> PhaseEnd:
+def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: HeatState | None) -> PhaseEnd:
     """Return the parts of a phase as one: the contact in its middle, and all that it wears and heats."""
     middle = ends[len(ends) // 2].record
     punch, strip = np.sum([end.record.areas for end in ends], axis=0).tolist()
@@ -89,10 +88,3 @@ def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, tempe
         reduce(HalfCycleHeat.then, heats) if heats else None,
         reduce(Worn.__add__, [end.worn for end in ends]),
     )
-
-
-def _carried(state: State | None, before: Tribosystem, after: Tribosystem) -> State | None:
-    """Return the state of the same temperatures on the other system's basis."""
-    if state is None or before.exchange is None or after.exchange is None:
-        return None
-    return after.exchange.state(before.exchange.temperatures(state))

@@ -13,7 +13,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.errors import CaseError, ConvergenceError
-from fenwear.heat.exchange import State
+from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import PhasesWear
@@ -133,7 +133,7 @@ def stationary_growth(
     return rate, ""
 
 
-def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleHeat | None, list[State]]:
+def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleHeat | None, list[HeatState]]:
     """Return the heat of cycles and the temperatures that repeat at these pressures, before each phase; collective.
 
     None where no law and no conductance depends on the state: then any temperatures do.
@@ -159,7 +159,7 @@ def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleH
             end = heat.jump(heat.initial(), np.inf, conductances)
         except scipy.linalg.LinAlgError:
             raise ConvergenceError("no temperatures repeat: the bodies lose heat nowhere") from None
-        states = [heat.parts(end.state(pressure))]
+        states = [exchange.at(end.state(pressure))]
         for phase in range(len(pressure) - 1):
             states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])
         surfaces = [exchange.contact_temperatures(state) for state in states]
@@ -195,7 +195,7 @@ class _Laws:
     worn_s: Array
 
 
-def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None, state: State | None) -> _Laws:
+def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None, state: HeatState | None) -> _Laws:
     n, conditions = len(pressure), system.conditions(phase, pressure)
     speed, surfaces = conditions.speed, conditions.temperatures
     if heat is not None and state is not None:
@@ -224,7 +224,7 @@ def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | No
 
 
 def phase_tangent(
-    system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None = None, state: State | None = None
+    system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None = None, state: HeatState | None = None
 ) -> Array:
     """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
 
@@ -276,17 +276,17 @@ def phase_tangent(
     return change
 
 
-def _heated(heat: CycleHeat, phase: int, pressure: Array, state: State | None, laws: _Laws) -> tuple[Array, Array]:
+def _heated(heat: CycleHeat, phase: int, pressure: Array, state: HeatState | None, laws: _Laws) -> tuple[Array, Array]:
     """Return the changes of the state at the end of a phase by those at its start, and by its pressure."""
     exchange = heat.exchange
     conductance = exchange.conductance(pressure)
     unit = exchange.with_friction(np.tile(laws.rate, (len(exchange.friction), 1)))
-    by_power: Array = np.concatenate(unit.response(phase, conductance)[0])
-    by_state: Array = np.concatenate(exchange.propagate(phase, heat.parts(np.eye(heat.gap_rows.shape[1])), conductance))
+    by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
+    by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.gap_rows.shape[1]))
     by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
     if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
         rise = np.divide(exchange.conductance(pressure), pressure, out=np.zeros_like(pressure), where=pressure > 0)
-        by_pressure += np.concatenate(exchange.by_conductance(phase, state, pressure, conductance)) * rise
+        by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
     return by_state + by_power @ (pressure[:, None] * laws.mu_s), by_pressure
 
 
@@ -294,11 +294,7 @@ def _picked(heat: CycleHeat | None, n: int) -> Array:
     """Return the rows that pick the temperatures of the punch's and the strip's surface (2, n, dim)."""
     if heat is None:
         return np.zeros((2, n, 0))
-    dim = heat.gap_rows.shape[1]
-    rows = np.zeros((2, n, dim))
-    for body, (side, part) in enumerate(zip(heat.exchange.sides, heat.parts(np.eye(dim)), strict=True)):
-        rows[body] = side.contact_change(part)
-    return rows
+    return np.array(heat.exchange.contact_changes(np.eye(heat.gap_rows.shape[1])))
 
 
 def _opened(wear: PhasesWear, slope: Array) -> Array:
@@ -372,7 +368,7 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
     for _ in range(50):  # the strip's temperature depends on its speed
         exchange = steady_exchange(system, [direction * speed])
         uniform = np.full(n, system.rigid.mean_pressure)
-        states, _terms = exchange.response(0, exchange.conductance(uniform))
+        states, _terms = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
         thermal = exchange.gap_change(states) / speed
         values = np.linalg.eigvals(-stiffness @ thermal)
         growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]

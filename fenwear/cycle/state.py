@@ -9,7 +9,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
-from fenwear.heat.exchange import State
+from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import Worn
 
 
@@ -21,7 +21,7 @@ class RunState:
         half_cycle: Its number; 0 before the first.
         worn: Worn depths of both bodies.
         contacts: The last contact of each phase; None where there was none yet.
-        temperature: State of the heat exchange; None without heat.
+        temperature: Of both bodies; None without heat.
         jump_length: Cycles that the next jump tries.
         periodic_phases: Half-cycles in a row that repeated.
     """
@@ -29,12 +29,12 @@ class RunState:
     half_cycle: int
     worn: Worn
     contacts: tuple[ContactState | None, ...]
-    temperature: State | None
+    temperature: HeatState | None
     jump_length: int = 1
     periodic_phases: int = 0
 
 
-def beginning(system: Tribosystem, temperature: State | None) -> RunState:
+def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:
     """Return the unworn bodies at their initial temperature."""
     return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature)
 

@@ -300,11 +300,11 @@ def _result(
 
 def _steady_heat(heat: CycleHeat, state: Array, pressure: Array, middle: slice) -> SteadyHeat:
     """Follow the temperatures through one cycle of the steady state."""
-    exchange, parts = heat.exchange, heat.parts(state)
+    exchange, now = heat.exchange, heat.exchange.at(state)
     punch, strip = [], []
     for phase in range(len(pressure)):
-        parts, _ = exchange.half_cycle(parts, phase, pressure[phase], exchange.conductance(pressure[phase]))
-        temperatures = exchange.contact_temperatures(parts)
+        now, _ = exchange.half_cycle(now, phase, pressure[phase], exchange.conductance(pressure[phase]))
+        temperatures = exchange.contact_temperatures(now)
         punch.append(temperatures[0])
         strip.append(temperatures[1])
     ends = slice(middle.step - 1, None, middle.step)  # the last phase of each half-cycle

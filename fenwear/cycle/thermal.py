@@ -18,7 +18,8 @@ from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactSolver, ContactState, Layer
 from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
-from fenwear.heat.exchange import HeatExchange, State
+from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.field import HeatState
 
 MAX_ITERATIONS = 200
 SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
@@ -31,7 +32,7 @@ class _Response:
     """What unit pressures of a half-cycle do by its end, for given conductances."""
 
     conductance: Array
-    state: State
+    state: Array
     terms: Array
     gap: Array
 
@@ -60,12 +61,12 @@ class ThermalContact:
             self.exchange, self._response = self.exchange.with_friction(friction), None
 
     def solve(
-        self, temperature: State, gap: Array, start: ContactState | None, layer: Layer | None
-    ) -> tuple[ContactState, State, HalfCycleHeat]:
+        self, temperature: HeatState, gap: Array, start: ContactState | None, layer: Layer | None
+    ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
         """Return contact, temperature at the end of the half-cycle, and its heat.
 
         Args:
-            temperature: State at the start.
+            temperature: At the start.
             gap: Of the unloaded bodies at the initial temperature, worn depth included (n,), mm.
             start: The same phase one cycle ago.
             layer: Wear of this half-cycle where its step is implicit.
@@ -81,8 +82,8 @@ class ThermalContact:
         return self._implicit(temperature, gap, start, layer)
 
     def _implicit(
-        self, temperature: State, gap: Array, start: ContactState, layer: Layer | None
-    ) -> tuple[ContactState, State, HalfCycleHeat]:
+        self, temperature: HeatState, gap: Array, start: ContactState, layer: Layer | None
+    ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
         exchange, contact = self.exchange, start
         mean = self.system.rigid.mean_pressure
         relaxed = 1.0
@@ -98,8 +99,7 @@ class ThermalContact:
             if np.abs(change).max() < CLOSE * mean:
                 return contact, after, self._heat(after, terms, iteration)
             if exact and np.array_equal(exchange.conductance(contact.pressure[0]), conductance, equal_nan=True):
-                ends = (s + r @ change for s, r in zip(after, response.state, strict=True))
-                after = (next(ends), next(ends))
+                after = exchange.at(after.values + response.state @ change)
                 return contact, after, self._heat(after, terms + response.terms @ change, iteration)
             if iteration > 20:  # nodes that open and close in turn: go half way
                 relaxed = 0.5
@@ -118,13 +118,13 @@ class ThermalContact:
         costly = heat is not None and (heat.operator == "full" or heat.conductance_per_pressure is not None)
         if known is not None and (known.conductance.tobytes() == key or (costly and self._repeats < WORTH_IT)):
             return known
-        state, terms = self.exchange.response(self.phase, conductance)
+        state, terms = self.exchange.change(self.phase, conductance, pressure=np.eye(len(conductance)))
         self._response = _Response(conductance, state, terms, self.exchange.gap_change(state))
         return self._response
 
     def _split(
-        self, temperature: State, gap: Array, start: ContactState, layer: Layer | None
-    ) -> tuple[ContactState, State, HalfCycleHeat]:
+        self, temperature: HeatState, gap: Array, start: ContactState, layer: Layer | None
+    ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
         exchange, heat = self.exchange, self.system.heat
         relaxation, tolerance = (heat.relaxation, heat.split_tolerance) if heat else (1.0, 1e-4)
         contact, pressure, volume = start, start.pressure[0], np.inf
@@ -146,7 +146,7 @@ class ThermalContact:
             f"the operator split of heat and contact did not converge in {iteration} iterations: {SPLIT_ADVICE}"
         )
 
-    def _heat(self, state: State, terms: Array, iterations: int) -> HalfCycleHeat:
+    def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:
         punch, strip = self.exchange.contact_temperatures(state)
         return HalfCycleHeat(punch, strip, terms, iterations)
 

@@ -1,4 +1,4 @@
-"""Heat conduction in one body in UFL: steady, transient, with the strip's material moving.
+"""Heat conduction in one body in UFL, of any dimension: steady, transient, with the strip's material moving.
 
     rho c (d theta/dt + v . grad theta) = div(k grad theta) - (2 h / t) (theta - theta_a)
 
@@ -28,16 +28,19 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import csr_array
 
 from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
+from fenwear.bodies.contact_surface import contact_tag, trace_of
+from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import Factor
-from fenwear.bodies.material import region_field
-from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Body, Heat, Material, Model
+from fenwear.bodies.material import measure
+from fenwear.case import Body, Heat, Kind
 from fenwear.errors import CaseError, Problem
+from fenwear.heat.material import ConductionLaw
+from fenwear.interface.placement import ZERO
+from fenwear.sliding.field import ALONG_X, SlidingField
 
 PREFIX = "fenwear_heat_"
 FREE, CONTACT, HELD = 1, 2, 3
@@ -47,59 +50,56 @@ LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made a
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What a body meets beyond its mesh.
+    """What a body meets beyond its mesh, and how its material moves through it.
 
     Attributes:
         renewed: Whether material that enters is new, at theta_in; else what has left comes back as it was.
         exposed: Part of the contact surface that lies opposite nothing and convects, as loads of a
             unit flux there (owned,), mm; None for none.
+        sliding: The motion of the material for a unit speed; what of it lies out of the model moves nothing.
     """
 
     renewed: bool = False
     exposed: Array | None = None
+    sliding: SlidingField = ALONG_X
 
 
 ALONE = Surroundings()
 
 
 class HeatBody:
-    """Conduction in one body, per thickness: A theta = B theta_before + f + C q.
+    """Conduction in one body, per thickness (of a whole ring or solid): A theta = B theta_before + f + C q.
 
     Attributes:
         space: Scalar Lagrange space on the nodes of the displacement, K.
-        flow: Velocity of the material at unit speed, a vector field of UFL; by default along x.
+        surface: The contact surface, which the body shares with its elasticity.
+        trace: That surface among the degrees of freedom of `space`.
         inflow: theta_in, K.
-        nodes: Global numbers of the contact nodes (n,), in order along the contact.
-        weights: Quadrature weights of these nodes (n,), mm.
     """
 
-    def __init__(
-        self,
-        body: BodyMesh,
-        description: Body,
-        materials: dict[str, Material],
-        model: Model,
-        heat: Heat,
-        degree: int,
-        flow: Any = None,
-    ) -> None:
-        """Prepare the forms; collective.
+    def __init__(self, elastic: ElasticBody, description: Body, law: ConductionLaw, heat: Heat) -> None:
+        """Prepare the forms on the mesh of an elastic body; collective.
+
+        Args:
+            elastic: It gives the mesh, the model, the nodes and the contact surface.
+            description: Its held temperatures.
+            law: Its material.
+            heat: Convection, and the temperatures of the surroundings and of the start.
 
         Raises:
             CaseError: an unknown group.
         """
-        self.body, self.heat = body, heat
-        along_x = np.eye(body.mesh.geometry.dim)[0]
-        self.flow = fem.Constant(body.mesh, along_x.astype(PETSc.ScalarType)) if flow is None else flow
+        body = self.body = elastic.body
+        self.law, self.heat, self.kind = law, heat, elastic.law.kind
         self.inflow = heat.ambient if heat.inflow is None else heat.inflow
+        degree = elastic.space.ufl_element().degree
         self.space = fem.functionspace(body.mesh, basix.ufl.element("Lagrange", body.mesh.basix_cell(), degree))
-        of_region = {region: materials[name] for region, name in description.regions.items()}
-        self.conductivity = region_field(body, {r: m.conductivity or 0.0 for r, m in of_region.items()})
-        capacity = {r: (m.density or 0.0) * (m.heat_capacity or 0.0) for r, m in of_region.items()}
-        self.capacity = region_field(body, capacity)
-        self.face_loss = 2 * heat.convection / model.thickness if heat.convecting_faces else 0.0
+        self.surface, self.trace = elastic.surface, trace_of(elastic.trace, elastic.space, self.space)
+        faces = heat.convecting_faces and self.kind in ("stress", "strain")  # rings and solids have none
+        self.face_loss = 2 * heat.convection / elastic.thickness if faces else 0.0
+        self._measure = measure(body.mesh, self.kind)
+        self._flows: dict[SlidingField, _Flow] = {}
         self._tag_boundary(description)
-        self._find_contact_nodes()
 
     def _tag_boundary(self, description: Body) -> None:
         """Mark every exterior facet as convecting, in contact, or held at a temperature."""
@@ -109,7 +109,7 @@ class HeatBody:
         facets = mesh.exterior_facet_indices(domain.topology)
         marker = np.zeros(domain.topology.index_map(dim).size_local + domain.topology.index_map(dim).num_ghosts)
         marker[facets] = FREE
-        marker[body.facet_tags.find(body.curves[f"{body.name}_contact"])] = CONTACT
+        marker[body.facet_tags.find(contact_tag(body))] = CONTACT
         held = fem.Function(self.space)
         held.x.array[:] = np.nan
         for number, prescribed in enumerate(description.temperatures):
@@ -126,83 +126,28 @@ class HeatBody:
         self.held = np.flatnonzero(~np.isnan(held.x.array[: self.owned])).astype(np.int32)
         self.held_values = held.x.array[self.held]
 
-    def _find_contact_nodes(self) -> None:
-        body, index_map = self.body, self.space.dofmap.index_map
-        tag = body.curves[f"{body.name}_contact"]
-        own = fem.locate_dofs_topological(self.space, body.mesh.topology.dim - 1, body.facet_tags.find(tag))
-        own = own[own < index_map.size_local]
-        weights = self._vector(ufl.TestFunction(self.space) * self._ds(CONTACT)).array_r[own]
-        part = (self.space.tabulate_dof_coordinates()[own, 0], index_map.local_to_global(own), weights)
-        x, nodes, weights = (np.concatenate(a) for a in zip(*body.mesh.comm.allgather(part), strict=True))
-        order = np.argsort(x, kind="stable")
-        self.nodes, self.weights = nodes[order].astype(np.int64), weights[order]
-        start = index_map.local_range[0]
-        mine = (self.nodes >= start) & (self.nodes < start + self.owned)
-        self._mine, self._mine_local = np.flatnonzero(mine), (self.nodes[mine] - start).astype(np.int64)
+    def _ds(self, integrand: Any, tag: int) -> Any:
+        return self._measure * integrand * ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.boundary)(tag)
 
-    def _ds(self, tag: int) -> Any:
-        return ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.boundary)(tag)
+    def _dx(self, integrand: Any) -> Any:
+        return self._measure * integrand * ufl.dx(self.body.mesh)
 
     def _vector(self, form: Any) -> PETSc.Vec:
         vector = fem.petsc.assemble_vector(form if isinstance(form, fem.Form) else fem.form(form))
         vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
         return vector
 
-    @cached_property
-    def _step_forms(self) -> _StepForms:
-        domain = self.body.mesh
-        theta, w = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        rate, speed, renewed = (fem.Constant(domain, PETSc.ScalarType(0)) for _ in range(3))
-        v = speed * self.flow
-        k, rho_c, h = self.conductivity, self.capacity, self.heat.convection
-        degree = self.space.ufl_element().degree
-        dx = ufl.dx(domain, metadata={"quadrature_degree": 2 * degree + 1})  # tau is constant in an element
-        ambient = fem.Constant(domain, PETSc.ScalarType(self.heat.ambient))
-        faces = fem.Constant(domain, PETSc.ScalarType(self.face_loss))
-        edges = fem.Constant(domain, PETSc.ScalarType(h))
-        tau = self._supg_time(rate, v)
-        upwind = tau * ufl.dot(v, ufl.grad(w))
-        advected = ufl.dot(v, ufl.grad(theta))
-        entering = rho_c * renewed * ufl.max_value(-ufl.dot(v, ufl.FacetNormal(domain)), 0)  # heat capacity a second
-        residual = rho_c * (rate * theta + advected) - ufl.div(k * ufl.grad(theta)) + faces * theta
-        a = rho_c * (rate * theta + advected) * w * dx + ufl.inner(k * ufl.grad(theta), ufl.grad(w)) * dx
-        a += faces * theta * w * dx + (edges + entering) * theta * w * self._ds(FREE) + upwind * residual * dx
-        b = rho_c * rate * theta * (w + upwind) * dx
-        f = faces * ambient * (w + upwind) * dx + (edges * ambient + entering * self.inflow) * w * self._ds(FREE)
-        a_form, b_form, f_form, brought = (fem.form(form) for form in (a, b, f, entering * w * self._ds(FREE)))
-        return _StepForms(a_form, b_form, f_form, brought, rate, speed, renewed)
-
-    def _supg_time(self, rate: Any, v: Any) -> Any:
-        """Return the stabilisation time tau: 1 / sqrt((2/dt)^2 + (2 |v| p / l)^2 + (4 p^2 a / l^2)^2).
-
-        l is the element's length along v, p the degree, a = k / (rho c) the diffusivity
-        (Shakib, Hughes and Johan 1991, with the node spacing l / p for the length).
-        """
-        length = self._lengths_along_flow() / self.space.ufl_element().degree
-        diffusivity = self.conductivity / self.capacity
-        squares = (2 * rate) ** 2 + 4 * ufl.dot(v, v) / length**2 + (4 * diffusivity / length**2) ** 2
-        return 1 / ufl.sqrt(squares)
-
-    def _lengths_along_flow(self) -> fem.Function:
-        domain = self.body.mesh
-        cells, dim = domain.topology.index_map(domain.topology.dim), domain.geometry.dim
-        count = cells.size_local + cells.num_ghosts
-        vectors = fem.functionspace(domain, ("DG", 0, (dim,)))
-        flow = fem.Function(vectors)
-        flow.interpolate(fem.Expression(self.flow, compat.interpolation_points(vectors)))
-        along = flow.x.array.reshape(-1, dim)[:count]
-        speeds = np.linalg.norm(along, axis=1, keepdims=True)
-        along = np.where(speeds > 0, along, np.eye(dim)[0]) / np.where(speeds > 0, speeds, 1.0)  # on an axis: any
-        x = np.einsum("kic,kc->ki", domain.geometry.x[compat.geometry_dofmap(domain)[:count], :dim], along)
-        lengths = fem.Function(fem.functionspace(domain, ("DG", 0)))
-        lengths.x.array[:count] = x.max(axis=1) - x.min(axis=1)
-        return lengths
+    def flow(self, sliding: SlidingField) -> _Flow:
+        """Return what depends on how the material moves; made once for each motion; collective."""
+        if sliding not in self._flows:
+            self._flows[sliding] = _Flow(self, sliding)
+        return self._flows[sliding]
 
     def step(self, speed: float, duration: float, surroundings: Surroundings = ALONE) -> HeatStep:
         """Assemble and factor one implicit Euler step, or for an infinite duration the steady state; collective.
 
         Args:
-            speed: Of the material, mm/s: its velocity is speed times `flow`.
+            speed: Of the material, mm/s, or rad/s where it turns.
             duration: Of the step, s.
             surroundings: What lies beyond the mesh.
 
@@ -211,7 +156,8 @@ class HeatBody:
         """
         if math.isinf(duration):
             self.check_heat_sink(speed, surroundings)
-        forms = self._step_forms
+        flow = self.flow(surroundings.sliding)
+        forms = flow.forms
         forms.rate.value = 0.0 if math.isinf(duration) else 1 / duration
         forms.speed.value, forms.renewed.value = speed, float(surroundings.renewed)
         a, b, f, entering = assembled(forms.a), assembled(forms.b), self._vector(forms.f), self._vector(forms.entering)
@@ -220,7 +166,7 @@ class HeatBody:
             loss.array[:] = self.heat.convection * surroundings.exposed
             a.setDiagonal(loss, addv=PETSc.InsertMode.ADD)
             f.axpy(self.heat.ambient, loss)
-        carried = speed * self.carried + entering.array_r
+        carried = speed * flow.carried + entering.array_r
         brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.array_r.sum()))
         return HeatStep(self, a, b, f, duration, carried, brought)
 
@@ -229,17 +175,8 @@ class HeatBody:
         return (
             self.heat.convection > 0
             or self.body.mesh.comm.allreduce(len(self.held)) > 0
-            or (surroundings.renewed and speed != 0 and self.is_open)
+            or (surroundings.renewed and speed != 0 and self.flow(surroundings.sliding).is_open)
         )
-
-    @cached_property
-    def is_open(self) -> bool:
-        """Whether the material moves through a free boundary, rounding apart; collective."""
-        flow, normal = self.flow, ufl.FacetNormal(self.body.mesh)
-        forms = (abs(ufl.dot(flow, normal)) * self._ds(FREE), ufl.sqrt(ufl.dot(flow, flow)) * self._ds(FREE))
-        comm = self.body.mesh.comm
-        through, along = (comm.allreduce(fem.assemble_scalar(fem.form(form))) for form in forms)
-        return bool(through > 1e-9 * along)
 
     def extremes(self, surroundings: Surroundings) -> tuple[float, float]:
         """Return the coldest and the hottest that the body is at first, is held at, or meets, K; collective."""
@@ -271,22 +208,22 @@ class HeatBody:
         theta[self.held] = self.held_values
         return theta
 
-    def place(self, load: Array) -> Array:
-        """Return loads at the contact nodes (n,) or (n, k) on the owned degrees of freedom."""
-        placed = np.zeros((self.owned, *load.shape[1:]))
-        placed[self._mine_local] = load[self._mine]
-        return placed
+    def load(self, flux: Array) -> Array:
+        """Return the loads of fluxes at the contact's pressure nodes (n,) or (n, k), as (owned,) or (owned, k)."""
+        return self.place(self.surface.spread @ (self.surface.weights * flux.T).T)
 
-    @cached_property
-    def contact_rows(self) -> csr_array:
-        """The matrix that picks the temperatures at the contact nodes (n, owned): this rank's columns."""
-        places = (self._mine, self._mine_local)
-        return csr_array((np.ones(len(self._mine)), places), shape=(len(self.nodes), self.owned))
+    def place(self, loads: Array) -> Array:
+        """Return loads at the contact's trace nodes (N,) or (N, k) on the owned degrees of freedom."""
+        return self.trace.place(loads.reshape(len(loads), 1, -1)).reshape(self.owned, *loads.shape[1:])
+
+    def contact(self, theta: Array) -> Array:
+        """Return the temperature at the contact's pressure nodes (n,), equal on every rank; collective."""
+        return self.surface.spread.T @ self.trace.pick(theta[:, None])[:, 0, 0]
 
     @cached_property
     def _capacity_matrix(self) -> PETSc.Mat:
         theta, w = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        return assembled(self.capacity * theta * w * ufl.dx)
+        return assembled(self._dx(self.law.capacity * theta * w))
 
     def store(self, theta: Array) -> Array:
         """Return the heat capacity matrix times fields (owned,) or (owned, k); collective."""
@@ -297,13 +234,7 @@ class HeatBody:
     @cached_property
     def storage(self) -> Array:
         """Heat stored for each degree of freedom's kelvin, per thickness (owned,), mJ/(mm K)."""
-        return self._vector(self.capacity * ufl.TestFunction(self.space) * ufl.dx(self.body.mesh)).array_r.copy()
-
-    @cached_property
-    def carried(self) -> Array:
-        """Heat carried out by material moving at unit speed, for each kelvin (owned,), mJ/(mm² K)."""
-        w = ufl.TestFunction(self.space)
-        return self._vector(self.capacity * ufl.dot(self.flow, ufl.grad(w)) * ufl.dx(self.body.mesh)).array_r.copy()
+        return self._vector(self._dx(self.law.capacity * ufl.TestFunction(self.space))).array_r.copy()
 
     @cached_property
     def convected(self) -> Array:
@@ -311,7 +242,122 @@ class HeatBody:
         w = ufl.TestFunction(self.space)
         faces = fem.Constant(self.body.mesh, PETSc.ScalarType(self.face_loss))
         edges = fem.Constant(self.body.mesh, PETSc.ScalarType(self.heat.convection))
-        return self._vector(faces * w * ufl.dx(self.body.mesh) + edges * w * self._ds(FREE)).array_r.copy()
+        return self._vector(self._dx(faces * w) + self._ds(edges * w, FREE)).array_r.copy()
+
+
+class _Flow:
+    """What of a body's conduction depends on how its material moves, v for a unit speed.
+
+    Attributes:
+        velocity: v, a vector of UFL with the components of the model.
+        turns: Whether it is a rotation.
+    """
+
+    def __init__(self, body: HeatBody, sliding: SlidingField) -> None:
+        self.body = body
+        self.turns = sliding.turn != ZERO
+        self.velocity = _velocity(sliding, body.body.mesh)
+
+    @cached_property
+    def is_open(self) -> bool:
+        """Whether the material moves through a free boundary, rounding apart; collective.
+
+        A turning body keeps its place: what enters and leaves through one facet of a round boundary, whose
+        facets are chords, is no flow.
+        """
+        body, v, normal = self.body, self.velocity, ufl.FacetNormal(self.body.body.mesh)
+        comm, through = body.body.mesh.comm, ufl.dot(v, normal)
+        if self.turns:
+            means = body._vector(body._ds(through * ufl.TestFunction(self._constants), FREE))
+            flow = comm.allreduce(float(np.abs(means.array_r).sum()))
+        else:
+            flow = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(abs(through), FREE))))
+        along = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))))
+        return bool(flow > 1e-9 * along)
+
+    @cached_property
+    def _constants(self) -> fem.FunctionSpace:
+        return fem.functionspace(self.body.body.mesh, ("DG", 0))
+
+    @cached_property
+    def carried(self) -> Array:
+        """Heat carried out by material moving at unit speed, for each kelvin (owned,), mJ/(mm² K); collective."""
+        body, w = self.body, ufl.TestFunction(self.body.space)
+        return body._vector(body._dx(body.law.capacity * ufl.dot(self.velocity, ufl.grad(w)))).array_r.copy()
+
+    @cached_property
+    def forms(self) -> _StepForms:
+        """The forms of a step."""
+        body, law = self.body, self.body.law
+        domain, h = body.body.mesh, self.body.heat.convection
+        theta, w = ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
+        rate, speed, renewed = (fem.Constant(domain, PETSc.ScalarType(0)) for _ in range(3))
+        v = speed * self.velocity
+        rho_c, r = law.capacity, body._measure
+        degree = body.space.ufl_element().degree
+        dx = ufl.dx(domain, metadata={"quadrature_degree": 2 * degree + 1})  # tau is constant in an element
+        ambient = fem.Constant(domain, PETSc.ScalarType(body.heat.ambient))
+        faces = fem.Constant(domain, PETSc.ScalarType(body.face_loss))
+        edges = fem.Constant(domain, PETSc.ScalarType(h))
+        tau = self._supg_time(rate, v)
+        upwind = tau * ufl.dot(v, ufl.grad(w))
+        advected = ufl.dot(v, ufl.grad(theta))
+        entering = rho_c * renewed * ufl.max_value(-ufl.dot(v, ufl.FacetNormal(domain)), 0)  # heat capacity a second
+        conducted = law.flux(theta)
+        residual = rho_c * (rate * theta + advected) + _divergence(conducted, body.kind) + faces * theta
+        a = r * (rho_c * (rate * theta + advected) * w - ufl.inner(conducted, ufl.grad(w))) * dx
+        a += r * (faces * theta * w + upwind * residual) * dx + body._ds((edges + entering) * theta * w, FREE)
+        b = r * rho_c * rate * theta * (w + upwind) * dx
+        f = r * faces * ambient * (w + upwind) * dx
+        f += body._ds((edges * ambient + entering * body.inflow) * w, FREE)
+        a_form, b_form, f_form, brought = (fem.form(form) for form in (a, b, f, body._ds(entering * w, FREE)))
+        return _StepForms(a_form, b_form, f_form, brought, rate, speed, renewed)
+
+    def _supg_time(self, rate: Any, v: Any) -> Any:
+        """Return the stabilisation time tau: 1 / sqrt((2/dt)^2 + (2 |v| p / l)^2 + (4 p^2 a / l^2)^2).
+
+        l is the element's length along v, p the degree, a = k / (rho c) the diffusivity
+        (Shakib, Hughes and Johan 1991, with the node spacing l / p for the length).
+        """
+        length = self._lengths() / self.body.space.ufl_element().degree
+        squares = (2 * rate) ** 2 + 4 * ufl.dot(v, v) / length**2 + (4 * self.body.law.diffusivity / length**2) ** 2
+        return 1 / ufl.sqrt(squares)
+
+    def _lengths(self) -> fem.Function:
+        """Return the lengths of the elements along v."""
+        domain = self.body.body.mesh
+        cells, dim = domain.topology.index_map(domain.topology.dim), domain.geometry.dim
+        count = cells.size_local + cells.num_ghosts
+        vectors = fem.functionspace(domain, ("DG", 0, (dim,)))
+        flow = fem.Function(vectors)
+        flow.interpolate(fem.Expression(self.velocity, compat.interpolation_points(vectors)))
+        along = flow.x.array.reshape(-1, dim)[:count]
+        speeds = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.where(speeds > 0, along, np.eye(dim)[0]) / np.where(speeds > 0, speeds, 1.0)  # on an axis: any
+        x = np.einsum("kic,kc->ki", domain.geometry.x[compat.geometry_dofmap(domain)[:count], :dim], along)
+        lengths = fem.Function(self._constants)
+        lengths.x.array[:count] = x.max(axis=1) - x.min(axis=1)
+        return lengths
+
+
+def _velocity(sliding: SlidingField, domain: mesh.Mesh) -> Any:
+    """Return V + omega x (x - c) in the components of a model, of UFL: around an axis of symmetry it is zero."""
+    dim = domain.geometry.dim
+    components = [0, 1, 2] if dim == 3 else [0, 2]
+    if sliding.turn == ZERO:
+        return fem.Constant(domain, np.array(sliding.shift)[components].astype(PETSc.ScalarType))
+    x = ufl.SpatialCoordinate(domain)
+    place = x if dim == 3 else ufl.as_vector((x[0], 0.0, x[1]))
+    v = ufl.as_vector(sliding.shift) + ufl.cross(ufl.as_vector(sliding.turn), place - ufl.as_vector(sliding.centre))
+    return ufl.as_vector([v[c] for c in components])
+
+
+def _divergence(flux: Any, kind: Kind) -> Any:
+    """Return div q, in an axisymmetric model with q_r / r."""
+    if kind != "axisymmetric":
+        return ufl.div(flux)
+    r = ufl.SpatialCoordinate(ufl.domain.extract_unique_domain(flux))[0]
+    return ufl.div(flux) + flux[0] / r
 
 
 @dataclass(frozen=True)
@@ -366,11 +412,19 @@ class HeatStep:
         self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
         self._pivoted, self._solved = duration == np.inf, 0
 
-    def advance(self, theta: Array) -> Array:
-        """Return the temperature at the end without any flux through the contact (owned,); collective."""
+    def advance(self, theta: Array, *, sources: bool = True) -> Array:
+        """Return the temperature at the end without any flux through the contact; collective.
+
+        Args:
+            theta: At its start (owned,), or without sources several fields (owned, k).
+            sources: False for what becomes of changes of temperature, A^-1 B.
+        """
+        if theta.ndim == 2:
+            return self._solve_many(theta, self.b.matMult)
         self._solution.array[:] = theta
         self.b.mult(self._solution, self._rhs)
-        self._rhs.array[:] += self.source
+        if sources:
+            self._rhs.array[:] += self.source
         self._factor.solve(self._rhs, self._solution)
         self._solved += 1
         if self._solved % CHECK_EVERY == 1 and not self._is_exact(self._rhs, self._solution):
@@ -390,10 +444,6 @@ class HeatStep:
     def _pivot(self) -> None:
         """Factor again, with pivoting; collective."""
         self._factor, self._pivoted = Factor(self.a, PREFIX, "lu"), True
-
-    def advance_linear(self, thetas: Array) -> Array:
-        """Return A^-1 B of several fields (owned, k), without the sources; collective."""
-        return self._solve_many(thetas, self.b.matMult)
 
     def respond(self, load: Array) -> Array:
         """Return A^-1 of several loads (owned, k), mW/mm; collective."""

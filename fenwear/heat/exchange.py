@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,26 +24,24 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.errors import HeatError
-from fenwear.heat.field import Field, Functional, ReducedField
+from fenwear.heat.field import Basis, Field, Functional, HeatState, ReducedBasis
 
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 # What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
 OVERSHOOT, DRIFT = 0.1, 1e-3
-State = tuple[Array, Array]  # of the punch and of the strip
 
 
 @dataclass(frozen=True)
 class Side:
-    """One body as the exchange sees it: its field and functionals of its state.
+    """One body as the exchange sees it: its field and functionals of its coordinates.
 
     Attributes:
-        field: The state and its steps.
+        field: The coordinates and their steps.
         contact: Temperature at the interface nodes (n,), K.
         gap: Gap that its thermal expansion opens (n,), mm.
         balance: Heat stored, heat convected per second, and for every prepared step what enters per
             second at held temperatures by the end and by the start state, and what the moving
             material carries out; per thickness.
-        contact_change, gap_change, balance_change: The same of changes of the state (dim, k).
         held_source: Constant part of what enters at held temperatures, per prepared step, mW/mm.
         brought: Heat that new material brings, per prepared step, mW/mm.
         ambient_loss: Constant part of the convected heat, mW/mm.
@@ -55,9 +54,6 @@ class Side:
     contact: Functional
     gap: Functional
     balance: Functional
-    contact_change: Functional
-    gap_change: Functional
-    balance_change: Functional
     held_source: list[float]
     brought: list[float]
     ambient_loss: float
@@ -121,13 +117,13 @@ class HeatExchange:
         self.heat, self.sides, self.plans = heat, sides, plans
         self.duration, self.friction, self.weights, self.thickness = duration, friction, weights, thickness
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
-        self._contact_responses = [[side.contact_change(r) for r in side.field.responses] for side in sides]
+        self._contact_responses = [[side.contact.of_changes(r) for r in side.field.responses] for side in sides]
         self._flux_maps: dict[tuple[int, int, bytes], _FluxMap] = {}
 
     @property
     def reduced(self) -> bool:
         """Whether both bodies' temperatures live on a small basis, equal on every rank."""
-        return all(isinstance(side.field, ReducedField) for side in self.sides)
+        return all(isinstance(basis, ReducedBasis) for basis in self.bases)
 
     def with_friction(self, friction: Array) -> HeatExchange:
         """Return the exchange at another mu (phases, n) with all else the same."""
@@ -141,29 +137,48 @@ class HeatExchange:
         other.heat, other.friction, other._flux_maps = heat, friction, {}
         return other
 
-    def initial(self) -> State:
-        """Return the initial state."""
-        return self.sides[0].field.initial(), self.sides[1].field.initial()
+    @cached_property
+    def bases(self) -> tuple[Basis, Basis]:
+        """The bases of the coordinates of punch and strip."""
+        return self.sides[0].field.basis, self.sides[1].field.basis
 
-    def temperatures(self, state: State) -> State:
-        """Return the temperature of the owned nodes of both bodies, K."""
-        return self.sides[0].field.temperature(state[0]), self.sides[1].field.temperature(state[1])
+    def initial(self) -> HeatState:
+        """Return the initial state; collective."""
+        bodies = (self.bases[0].body, self.bases[1].body)
+        return self.own(HeatState.nodal(bodies, [body.initial() for body in bodies]))
 
-    def state(self, temperatures: State) -> State:
-        """Return the state of these temperatures; collective."""
-        return self.sides[0].field.state(temperatures[0]), self.sides[1].field.state(temperatures[1])
+    def own(self, state: HeatState) -> HeatState:
+        """Return the state on this exchange's bases; collective where it is on others."""
+        return state.on(self.bases)
 
-    def gap(self, state: State) -> Array:
+    def at(self, values: Array) -> HeatState:
+        """Return the state of coordinates (dim,) on this exchange's bases."""
+        return HeatState(self.bases, values)
+
+    def gap(self, state: HeatState) -> Array:
         """Return the gap that thermal expansion opens (n,), mm."""
-        return self.sides[0].gap(state[0]) + self.sides[1].gap(state[1])
+        punch, strip = self._parts(self.own(state).values)
+        return self.sides[0].gap(punch) + self.sides[1].gap(strip)
 
-    def gap_change(self, states: State) -> Array:
-        """Return the thermal gap of changes of the state (n, k), mm."""
-        return self.sides[0].gap_change(states[0]) + self.sides[1].gap_change(states[1])
+    def gap_change(self, changes: Array) -> Array:
+        """Return the thermal gap of changes of the coordinates (dim, k), mm."""
+        punch, strip = self._parts(changes)
+        return self.sides[0].gap.of_changes(punch) + self.sides[1].gap.of_changes(strip)
 
-    def contact_temperatures(self, state: State) -> tuple[Array, Array]:
+    def contact_temperatures(self, state: HeatState) -> tuple[Array, Array]:
         """Return the temperatures of the two contact surfaces at the interface nodes (n,), K."""
-        return self.sides[0].contact(state[0]), self.sides[1].contact(state[1])
+        punch, strip = self._parts(self.own(state).values)
+        return self.sides[0].contact(punch), self.sides[1].contact(strip)
+
+    def contact_changes(self, changes: Array) -> tuple[Array, Array]:
+        """Return the changes of both contact temperatures by changes of the coordinates (dim, k), (n, k) each."""
+        punch, strip = self._parts(changes)
+        return self.sides[0].contact.of_changes(punch), self.sides[1].contact.of_changes(strip)
+
+    def _parts(self, values: Array) -> tuple[Array, Array]:
+        """Return the coordinates of punch and strip."""
+        split = len(self.bases[0])
+        return values[:split], values[split:]
 
     def conductance(self, pressure: Array) -> Array:
         """Return h_c of each node (n,), N/(mm s K): infinite for perfect contact, NaN where none conducts."""
@@ -178,7 +193,7 @@ class HeatExchange:
             value[pressure <= 0] = np.nan
         return value
 
-    def half_cycle(self, state: State, phase: int, pressure: Array, conductance: Array) -> tuple[State, Array]:
+    def half_cycle(self, state: HeatState, phase: int, pressure: Array, conductance: Array) -> tuple[HeatState, Array]:
         """Conduct over a half-cycle at constant pressure; return the state at its end and its heat terms.
 
         Args:
@@ -190,21 +205,88 @@ class HeatExchange:
         Raises:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
-        terms = np.zeros(len(TERMS))
-        before = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
-        stored = before[0][0] + before[1][0]
+        values, terms, stored = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
+        self._check_bounds(*stored, terms[0] - terms[1])
+        return self.at(values), terms * self.thickness
+
+    def change(
+        self, phase: int, conductance: Array, changes: Array | None = None, pressure: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Return the changes of the coordinates at the end of a half-cycle, (dim, k), and of its heat terms.
+
+        Args:
+            phase: Which of the motion's phases.
+            conductance: Of each node.
+            changes: Of the coordinates at its start (dim, k); by default none.
+            pressure: Changes of the pressure (n, k), MPa; by default none.
+        """
+        columns = next((a.shape[1] for a in (changes, pressure) if a is not None), 0)
+        if changes is None:
+            changes = np.zeros((sum(len(basis) for basis in self.bases), columns))
+        if pressure is None:
+            pressure = np.zeros((len(conductance), columns))
+        values, terms, _ = self._conduct(changes, phase, pressure, conductance, sources=False)
+        return values, terms * self.thickness
+
+    def _conduct(
+        self, values: Array, phase: int, pressure: Array, conductance: Array, *, sources: bool
+    ) -> tuple[Array, Array, tuple[float, float]]:
+        """Return the coordinates at the end, the heat terms, and the heat stored at the start and at the end.
+
+        Args:
+            values: Coordinates at the start (dim,), or without sources their changes (dim, k).
+            pressure: (n,), or its changes (n, k).
+            sources: Whether there is more than changes.
+        """
+        terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
+        before = start = self._balances(values, sources=sources)
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
-            free = [side.field.advance(k, s) for side, k, s in zip(self.sides, kinds, state, strict=True)]
-            bare = [side.contact(f) for side, f in zip(self.sides, free, strict=True)]
-            heat = self.friction[phase] * plan.speed * pressure
-            fluxes = self._fluxes(kinds, bare, heat, conductance, self.heat.ambient)
-            state = self._with_fluxes(kinds, free, fluxes)
-            after = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
-            terms += self._account(kinds, heat, fluxes, before, after, sources=True)
+            heat = (self.friction[phase] * plan.speed * pressure.T).T
+            values, fluxes = self._step(kinds, values, heat, conductance, sources=sources)
+            after = self._balances(values, sources=sources)
+            terms += self._account(kinds, heat, fluxes, before, after, sources=sources)
             before = after
-        self._check_bounds(stored, before[0][0] + before[1][0], terms[0] - terms[1])
-        return state, terms * self.thickness
+        return values, terms, (start[0][0] + start[1][0], before[0][0] + before[1][0])
+
+    def _step(
+        self,
+        kinds: tuple[int, int],
+        values: Array,
+        heat: Array,
+        conductance: Array,
+        *,
+        sources: bool,
+        further: Array | None = None,
+    ) -> tuple[Array, list[Array]]:
+        """Return the coordinates at the end of a step, and the fluxes q_1 and q_2 into the bodies.
+
+        Args:
+            further: What else flows into both (2 n, k).
+        """
+        free = [
+            side.field.advance(kind, part, sources=sources)
+            for side, kind, part in zip(self.sides, kinds, self._parts(values), strict=True)
+        ]
+        bare = [
+            side.contact(part) if sources else side.contact.of_changes(part)
+            for side, part in zip(self.sides, free, strict=True)
+        ]
+        fluxes = self._fluxes(kinds, bare, heat, conductance, self.heat.ambient if sources else 0.0)
+        if further is not None:
+            fluxes = [q + part for q, part in zip(fluxes, np.split(further, 2), strict=True)]
+        ends = [
+            part + side.field.responses[kind] @ q
+            for part, side, kind, q in zip(free, self.sides, kinds, fluxes, strict=True)
+        ]
+        return np.concatenate(ends), fluxes
+
+    def _balances(self, values: Array, *, sources: bool) -> list[Array]:
+        """Return what enters the balance of both bodies."""
+        return [
+            side.balance(part) if sources else side.balance.of_changes(part)
+            for side, part in zip(self.sides, self._parts(values), strict=True)
+        ]
 
     def _check_bounds(self, start: float, end: float, friction: float) -> None:
         """Hold the heat of the bodies against what can have entered them, all per thickness.
@@ -230,64 +312,27 @@ class HeatExchange:
             f'and {hottest:.4g} K; set heat.operator = "full", lower heat.reduction_tolerance, or take more heat.steps'
         )
 
-    def response(self, phase: int, conductance: Array) -> tuple[State, Array]:
-        """Return the changes at the end of a half-cycle from unit pressures (dim, n), and of the heat terms."""
-        n = len(conductance)
-        zero = tuple(np.zeros((side.field.responses[0].shape[0], n)) for side in self.sides)
-        return self._linear_half_cycle(phase, zero, np.eye(n), conductance)  # type: ignore[arg-type]
-
-    def by_conductance(self, phase: int, state: State, pressure: Array, conductance: Array) -> State:
-        """Return the change at the end of a half-cycle for each node's change of conductance (dim, n) each.
+    def by_conductance(self, phase: int, state: HeatState, pressure: Array, conductance: Array) -> Array:
+        """Return the change at the end of a half-cycle for each node's change of conductance (dim, n).
 
         The rate of kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2): where h_c changes by one unit,
         theta_1 - theta_2 is missing in q_1.
 
         Args:
-            state, pressure, conductance: As of `half_cycle`.
+            phase, state, pressure, conductance: As of `half_cycle`.
         """
-        n = len(conductance)
+        n, values = len(conductance), self.own(state).values
         conducts = np.isfinite(conductance)
-        changes: State = (np.zeros((len(state[0]), n)), np.zeros((len(state[1]), n)))
+        changes: Array = np.zeros((len(values), n))
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             heat = self.friction[phase] * plan.speed * pressure
-            free = [side.field.advance(k, s) for side, k, s in zip(self.sides, kinds, state, strict=True)]
-            bare = [side.contact(f) for side, f in zip(self.sides, free, strict=True)]
-            state = self._with_fluxes(kinds, free, self._fluxes(kinds, bare, heat, conductance, self.heat.ambient))
-            first, second = self.contact_temperatures(state)
-            free = [side.field.advance_linear(k, c) for side, k, c in zip(self.sides, kinds, changes, strict=True)]
-            bare = [side.contact_change(f) for side, f in zip(self.sides, free, strict=True)]
-            fluxes = np.concatenate(self._fluxes(kinds, bare, np.zeros((n, n)), conductance, 0.0))
+            values, _ = self._step(kinds, values, heat, conductance, sources=True)
+            first, second = self.contact_temperatures(self.at(values))
             missing = np.where(conducts, second - first, 0.0)
-            fluxes += scipy.linalg.inv(self._flux_matrix(kinds, conductance))[:, :n] * missing
-            changes = self._with_fluxes(kinds, free, [fluxes[:n], fluxes[n:]])
+            further = scipy.linalg.inv(self._flux_matrix(kinds, conductance))[:, :n] * missing
+            changes, _ = self._step(kinds, changes, np.zeros((n, n)), conductance, sources=False, further=further)
         return changes
-
-    def propagate(self, phase: int, changes: State, conductance: Array) -> State:
-        """Return what changes of the state at the start (dim, k) become at the end of a half-cycle."""
-        none = np.zeros((len(conductance), changes[0].shape[1]))
-        return self._linear_half_cycle(phase, changes, none, conductance)[0]
-
-    def _linear_half_cycle(self, phase: int, states: State, pressure: Array, conductance: Array) -> tuple[State, Array]:
-        terms = np.zeros((len(TERMS), pressure.shape[1]))
-        before = [side.balance_change(s) for side, s in zip(self.sides, states, strict=True)]
-        for plan in self.plans[phase]:
-            kinds = (plan.punch, plan.strip)
-            free = [side.field.advance_linear(k, s) for side, k, s in zip(self.sides, kinds, states, strict=True)]
-            bare = [side.contact_change(f) for side, f in zip(self.sides, free, strict=True)]
-            heat = (self.friction[phase] * plan.speed * pressure.T).T  # pressure (n, k)
-            fluxes = self._fluxes(kinds, bare, heat, conductance, 0.0)
-            states = self._with_fluxes(kinds, free, fluxes)
-            after = [side.balance_change(s) for side, s in zip(self.sides, states, strict=True)]
-            terms += self._account(kinds, heat, fluxes, before, after, sources=False)
-            before = after
-        return states, terms * self.thickness
-
-    def _with_fluxes(self, kinds: tuple[int, int], free: list[Array], fluxes: list[Array]) -> State:
-        first, second = (
-            f + side.field.responses[k] @ q for f, side, k, q in zip(free, self.sides, kinds, fluxes, strict=True)
-        )
-        return first, second
 
     def _account(
         self,

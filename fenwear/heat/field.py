@@ -1,57 +1,165 @@
-"""The temperature of one body as a state that steps advance: the full field, or a reduced one.
+"""The temperature of one body as coordinates that steps advance: of all nodes, or of a reduced basis.
 
-Both answer the same questions: the state at the end of a step without flux through the contact,
-its response to the fluxes there, and any linear functional of the temperature.
+Both answer the same questions: the coordinates at the end of a step without flux through the contact,
+its response to the fluxes there, and any linear functional of the temperature. All these are affine,
+s' = P s + b; without their sources, b = 0, they are what becomes of changes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Protocol
 
 import numpy as np
 import scipy.linalg
+from dolfinx import fem
+from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, HeatStep
 from fenwear.parallel import total
 
-Functional = Callable[[Array], Array]
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """What coordinates of a body's temperature mean: by themselves, the temperatures of this rank's own nodes.
+
+    Attributes:
+        body: The body.
+    """
+
+    body: HeatBody
+
+    def __len__(self) -> int:
+        """Return the number of coordinates on this rank."""
+        return self.body.owned
+
+    def temperature(self, coordinates: Array) -> Array:
+        """Return the temperature of this rank's own nodes (owned,), K."""
+        return coordinates
+
+    def coordinates(self, temperature: Array) -> Array:
+        """Return the coordinates of a temperature (owned,), or of the nearest there is; collective."""
+        return temperature
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedBasis(Basis):
+    """A small basis, theta = lift + V s, with the same coordinates s on every rank.
+
+    Attributes:
+        lift: A temperature with the held values (owned,).
+        columns: V (owned, dim), orthonormal in the heat capacity, zero where temperatures are held.
+    """
+
+    lift: Array
+    columns: Array
+
+    def __len__(self) -> int:
+        """Return dim."""
+        return self.columns.shape[1]
+
+    def temperature(self, coordinates: Array) -> Array:
+        """Return lift + V s."""
+        return self.lift + self.columns @ coordinates
+
+    def coordinates(self, temperature: Array) -> Array:
+        """Return the projection in the norm of the heat capacity; collective."""
+        return total(self.body.body.mesh.comm, self.columns.T @ self.body.store(temperature - self.lift))
+
+
+@dataclass(frozen=True, eq=False)
+class HeatState:
+    """The temperatures of both bodies, with what gives them meaning.
+
+    Attributes:
+        bases: Of the punch and of the strip.
+        values: Coordinates on the punch's and then on the strip's basis.
+    """
+
+    bases: tuple[Basis, Basis]
+    values: Array
+
+    @classmethod
+    def nodal(cls, bodies: tuple[HeatBody, HeatBody], temperatures: Sequence[Array]) -> HeatState:
+        """Return the state of these temperatures of this rank's own nodes of both bodies."""
+        return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)))
+
+    def temperatures(self) -> tuple[Array, Array]:
+        """Return the temperatures of this rank's own nodes of punch and strip (owned,), K."""
+        punch, strip = np.split(self.values, [len(self.bases[0])])
+        return self.bases[0].temperature(punch), self.bases[1].temperature(strip)
+
+    def functions(self) -> tuple[fem.Function, fem.Function]:
+        """Return the temperatures as functions on the meshes; collective."""
+        punch, strip = (basis.body.function(t) for basis, t in zip(self.bases, self.temperatures(), strict=True))
+        return punch, strip
+
+    def on(self, bases: tuple[Basis, Basis]) -> HeatState:
+        """Return the same temperatures, or the nearest there are, on other bases; collective."""
+        if all(one is other for one, other in zip(self.bases, bases, strict=True)):
+            return self
+        parts = [basis.coordinates(t) for basis, t in zip(bases, self.temperatures(), strict=True)]
+        return HeatState(bases, np.concatenate(parts))
+
+
+@dataclass(frozen=True)
+class Functional:
+    """An affine functional of coordinates, equal on every rank: collective to call where `comm` is one.
+
+    Attributes:
+        rows: Of the coordinates on this rank (j, dim).
+        constant: Its value where they are zero (j,).
+        comm: The ranks that the coordinates are spread over; None where each has all of them.
+    """
+
+    rows: Array | csr_array
+    constant: Array
+    comm: MPI.Comm | None = None
+
+    def __call__(self, coordinates: Array) -> Array:
+        """Return the value at coordinates (dim,)."""
+        return self.of_changes(coordinates) + self.constant
+
+    def of_changes(self, changes: Array) -> Array:
+        """Return how the value changes by changes of the coordinates (dim,) or (dim, k)."""
+        product: Array = self.rows @ changes
+        return product if self.comm is None else total(self.comm, product)
+
+    def less(self, value: Array) -> Functional:
+        """Return the functional less a constant value (j,)."""
+        return replace(self, constant=self.constant - value)
 
 
 class Field(Protocol):
     """A body's temperature, with the steps that advance it numbered as they were given."""
 
     @property
+    def basis(self) -> Basis:
+        """What the coordinates mean."""
+
+    @property
     def responses(self) -> Sequence[Array]:
-        """State from unit fluxes at the interface nodes in each step, each (dim, n)."""
+        """Coordinates from unit fluxes at the interface nodes in each step, each (dim, n)."""
 
-    def initial(self) -> Array:
-        """Return the initial state (dim,)."""
+    def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
+        """Return what a step without flux through the contact makes of coordinates.
 
-    def advance(self, step: int, state: Array) -> Array:
-        """Return the state after a step without flux through the contact (dim,)."""
-
-    def advance_linear(self, step: int, states: Array) -> Array:
-        """Return what a step makes of changes of the state (dim, k), without its sources."""
+        Args:
+            step: Its number.
+            coordinates: (dim,), or without sources (dim,) or (dim, k).
+            sources: False for what it makes of changes.
+        """
 
     def observe(self, rows: Array | csr_array) -> Functional:
-        """Return the functional rows . theta of a state.
+        """Return the functional rows . theta; collective.
 
         Args:
             rows: (j, owned), over the full field's owned degrees of freedom; dense or sparse.
         """
-
-    def observe_change(self, rows: Array | csr_array) -> Functional:
-        """Return the same functional of changes of the state, (dim,) or (dim, k)."""
-
-    def temperature(self, state: Array) -> Array:
-        """Return the temperature of the owned degrees of freedom (owned,), K."""
-
-    def state(self, temperature: Array) -> Array:
-        """Return the state of a temperature (owned,), or the nearest there is."""
 
 
 class FullField:
@@ -65,98 +173,56 @@ class FullField:
             steps: Its factored steps.
             inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
         """
-        self.body, self.steps = body, list(steps)
+        self.steps, self.basis = list(steps), Basis(body)
         self.responses: Sequence[Array] = [step.respond(inflow) for step in self.steps]
 
-    def initial(self) -> Array:
-        """Return the initial temperature."""
-        return self.body.initial()
-
-    def advance(self, step: int, state: Array) -> Array:
+    def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Solve one step."""
-        return self.steps[step].advance(state)
-
-    def advance_linear(self, step: int, states: Array) -> Array:
-        """Solve one step for several changes."""
-        return self.steps[step].advance_linear(states)
+        return self.steps[step].advance(coordinates, sources=sources)
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional, summed over the ranks."""
-        comm = self.body.body.mesh.comm
-
-        return lambda state: total(comm, rows @ state)
-
-    observe_change = observe
-
-    def temperature(self, state: Array) -> Array:
-        """Return the state itself."""
-        return state
-
-    def state(self, temperature: Array) -> Array:
-        """Return the temperature itself."""
-        return temperature
+        return Functional(rows, np.zeros(rows.shape[0]), self.basis.body.body.mesh.comm)
 
 
 class ReducedField:
-    """Galerkin projection theta = lift + V a onto a basis V, the same state a on every rank."""
+    """Galerkin projection theta = lift + V s onto a basis V, the same coordinates s on every rank."""
 
-    def __init__(self, body: HeatBody, steps: Sequence[HeatStep], inflow: Array, lift: Array, basis: Array) -> None:
+    def __init__(self, steps: Sequence[HeatStep], inflow: Array, basis: ReducedBasis) -> None:
         """Project the steps; collective.
 
         Args:
-            body: The body.
-            steps: Its factored steps.
+            steps: Factored steps of the body.
             inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
-            lift: A temperature with the held values (owned,).
-            basis: V (owned, dim), orthonormal in the heat capacity, zero where temperatures are held.
+            basis: V with its lift.
         """
-        self.body, self.lift, self.basis = body, lift, basis
+        self.basis = basis
         self._propagators: list[Array] = []
         self._sources: list[Array] = []
         self.responses: list[Array] = []
+        lift, columns = basis.lift, basis.columns
         for step in steps:
-            a_basis, b_basis = step.apply(basis)
+            a_basis, b_basis = step.apply(columns)
             a_lift, b_lift = step.apply(lift[:, None])
-            a = self._sum(basis.T @ a_basis)
-            self._propagators.append(scipy.linalg.solve(a, self._sum(basis.T @ b_basis)))
-            source = basis.T @ (step.source + (b_lift - a_lift)[:, 0])
+            a = self._sum(columns.T @ a_basis)
+            self._propagators.append(scipy.linalg.solve(a, self._sum(columns.T @ b_basis)))
+            source = columns.T @ (step.source + (b_lift - a_lift)[:, 0])
             self._sources.append(scipy.linalg.solve(a, self._sum(source)))
-            self.responses.append(scipy.linalg.solve(a, self._sum(basis.T @ inflow)))
+            self.responses.append(scipy.linalg.solve(a, self._sum(columns.T @ inflow)))
 
     def spectral_radius(self, cycle: Sequence[int]) -> float:
         """Return the factor by which some temperature changes in every cycle of these steps, the largest in size."""
-        product = reduce(lambda through, step: self._propagators[step] @ through, cycle, np.eye(len(self.basis[0])))
+        product = reduce(lambda through, step: self._propagators[step] @ through, cycle, np.eye(len(self.basis)))
         return float(np.abs(np.linalg.eigvals(product)).max(initial=0.0))
 
     def _sum(self, partial: Array) -> Array:
-        return total(self.body.body.mesh.comm, partial)
+        return total(self.basis.body.body.mesh.comm, partial)
 
-    def initial(self) -> Array:
-        """Return the projection of the initial temperature; collective."""
-        return self.state(self.body.initial())
-
-    def advance(self, step: int, state: Array) -> Array:
+    def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Apply the dense step."""
-        return self._propagators[step] @ state + self._sources[step]
-
-    def advance_linear(self, step: int, states: Array) -> Array:
-        """Apply the dense step to changes."""
-        return self._propagators[step] @ states
+        moved: Array = self._propagators[step] @ coordinates
+        return moved + self._sources[step] if sources else moved
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional; collective to make, not to call."""
-        matrix, constant = self._sum(rows @ self.basis), self._sum(rows @ self.lift)
-        return lambda state: matrix @ state + constant
-
-    def observe_change(self, rows: Array | csr_array) -> Functional:
-        """Return the projected functional of changes; collective to make, not to call."""
-        matrix = self._sum(rows @ self.basis)
-        return lambda states: matrix @ states
-
-    def temperature(self, state: Array) -> Array:
-        """Return lift + V a."""
-        return self.lift + self.basis @ state
-
-    def state(self, temperature: Array) -> Array:
-        """Return the projection in the norm of the heat capacity; collective."""
-        return self._sum(self.basis.T @ self.body.store(temperature - self.lift))
+        return Functional(self._sum(rows @ self.basis.columns), self._sum(rows @ self.basis.lift))

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.heat.exchange import HeatExchange, State
+from fenwear.heat.exchange import HeatExchange
 
 
 @dataclass(frozen=True)
@@ -48,24 +48,18 @@ class CycleJump:
 
 
 class CycleHeat:
-    """The maps of a cycle on the concatenated, reduced state of both bodies."""
+    """The maps of a cycle on the reduced state of both bodies."""
 
     def __init__(self, exchange: HeatExchange) -> None:
         self.exchange = exchange
-        initial = exchange.initial()
-        self._split = len(initial[0])
-        dim = sum(len(s) for s in initial)
-        self.gap_rows = exchange.gap_change(self.parts(np.eye(dim)))
-        self._gap_constant = exchange.gap(self.parts(np.zeros(dim)))
+        dim = sum(len(basis) for basis in exchange.bases)
+        self.gap_rows = exchange.gap_change(np.eye(dim))
+        self._gap_constant = exchange.gap(exchange.at(np.zeros(dim)))
         self._maps: dict[bytes, list[PhaseMap]] = {}
-
-    def parts(self, state: Array) -> State:
-        """Return the states of the two bodies."""
-        return state[: self._split], state[self._split :]
 
     def initial(self) -> Array:
         """Return the initial state (dim,)."""
-        return np.concatenate(self.exchange.initial())
+        return self.exchange.initial().values
 
     def conductances(self, pressure: Array) -> Array:
         """Return the conductance of each phase's nodes (m, n)."""
@@ -81,11 +75,11 @@ class CycleHeat:
         return self._maps[key]
 
     def _phase_map(self, phase: int, conductance: Array) -> PhaseMap:
-        dim, n = self.gap_rows.shape[1], len(conductance)
-        propagator = np.concatenate(self.exchange.propagate(phase, self.parts(np.eye(dim)), conductance))
-        rest = self.exchange.half_cycle(self.parts(np.zeros(dim)), phase, np.zeros(n), conductance)[0]
-        response = np.concatenate(self.exchange.response(phase, conductance)[0])
-        return PhaseMap(propagator, np.concatenate(rest), response)
+        exchange, dim, n = self.exchange, self.gap_rows.shape[1], len(conductance)
+        propagator, _ = exchange.change(phase, conductance, changes=np.eye(dim))
+        response, _ = exchange.change(phase, conductance, pressure=np.eye(n))
+        rest, _ = exchange.half_cycle(exchange.at(np.zeros(dim)), phase, np.zeros(n), conductance)
+        return PhaseMap(propagator, rest.values, response)
 
     def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
         """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""

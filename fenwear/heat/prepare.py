@@ -15,6 +15,7 @@ from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.interface import ContactPair
 from fenwear.parallel import total
+from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
 
 NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
@@ -25,6 +26,7 @@ def prepare_exchange(
     bodies: tuple[HeatBody, HeatBody],
     pair: ContactPair,
     gap_rows: tuple[Array, Array],
+    sliding: SlidingField,
     motion: Motion,
     friction: Array,
     thickness: float,
@@ -38,6 +40,7 @@ def prepare_exchange(
         bodies: Conduction in the punch and in the strip.
         pair: The contact.
         gap_rows: Gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K.
+        sliding: The velocity of the strip's material for a unit speed.
         motion: The sliding motion.
         friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), in all phases.
         thickness: Of a plane model, mm.
@@ -63,7 +66,7 @@ def prepare_exchange(
     for body, inflow, rows, own, cycle in zip(
         bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), cycles, strict=True
     ):
-        around = _surroundings(body, pair, renewed=renewed)
+        around = _surroundings(body, pair, sliding, renewed=renewed)
         steps = [body.step(velocity, duration, around) for velocity in own]
         if reduced:
             moving = [own[step] for step in cycle]
@@ -81,6 +84,7 @@ def prepare_steady(
     bodies: tuple[HeatBody, HeatBody],
     pair: ContactPair,
     gap_rows: tuple[Array, Array],
+    sliding: SlidingField,
     velocities: Sequence[float],
     friction: Array,
     thickness: float,
@@ -93,7 +97,7 @@ def prepare_steady(
     plans = [[StepPlan(0, k, abs(v))] for k, v in enumerate(velocities)]
     sides = []
     for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
-        around = _surroundings(body, pair, renewed=True)
+        around = _surroundings(body, pair, sliding, renewed=True)
         steps = [body.step(velocity, np.inf, around) for velocity in own]
         sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows))
     return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
@@ -115,8 +119,8 @@ def _reduced(
         HeatError: none does.
     """
     while True:
-        lift, basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
-        field = ReducedField(body, steps, inflow, lift, basis)
+        basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
+        field = ReducedField(steps, inflow, basis)
         growth = field.spectral_radius(cycle)
         if growth <= 1 + NEUTRAL:
             return field
@@ -129,23 +133,26 @@ def _reduced(
         tolerance = max(tolerance / 10, ROUNDING)  # more fields: nearer to the full steps, whose temperatures die out
 
 
-def _surroundings(body: HeatBody, pair: ContactPair, *, renewed: bool) -> Surroundings:
+def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, renewed: bool) -> Surroundings:
     """Return what a body meets beyond its mesh: the strip new material, and beside the punch the surroundings."""
     if body.body.name == "punch":
         return Surroundings()
+    flow = body.flow(sliding)
+    renewed = renewed and (flow.is_open or not flow.turns)  # what turns in its place comes back
+    areas = body.surface.spread @ body.surface.weights
     covered = pair.transfer.T @ pair.weights
-    bare = np.maximum(body.weights - covered, 0.0)  # unlike meshes leave less than nothing beside an edge
-    bare[bare < 1e-9 * body.weights] = 0.0
+    bare = np.maximum(areas - covered, 0.0)  # unlike meshes leave less than nothing beside an edge
+    bare[bare < 1e-9 * areas] = 0.0
     if not bare.any():
-        return Surroundings(renewed)
-    bare *= (body.weights.sum() - covered.sum()) / bare.sum()
-    return Surroundings(renewed, body.place(bare))
+        return Surroundings(renewed, sliding=sliding)
+    bare *= (areas.sum() - covered.sum()) / bare.sum()
+    return Surroundings(renewed, body.place(bare), sliding)
 
 
 def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[Array, Array]:
     """Return the loads of unit fluxes at the interface nodes on each body (owned, n), mm."""
     weights = np.diag(pair.weights)
-    return bodies[0].place(weights), bodies[1].place(pair.transfer.T @ weights)
+    return bodies[0].place(pair.punch.spread @ weights), bodies[1].place(pair.transfer.T @ weights)
 
 
 def _exchange(
@@ -167,10 +174,9 @@ def _side(
     pair: ContactPair,
     gap_rows: Array,
 ) -> Side:
-    body = field.body
-    contact_rows = body.contact_rows
-    if body.body.name == "strip":
-        contact_rows = pair.transfer @ contact_rows
+    body = field.basis.body
+    onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
+    contact_rows = onto_nodes @ body.trace.rows
     convected = body.convected
     if surroundings.exposed is not None:
         convected = convected + body.heat.convection * surroundings.exposed
@@ -180,20 +186,16 @@ def _side(
     rows = np.array(balance_rows)
     comm, moves = body.body.mesh.comm, body.body.name == "strip"
     initial = total(comm, gap_rows @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
-    gap = field.observe(gap_rows)
     capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
     return Side(
         field,
         field.observe(contact_rows),
-        lambda state: gap(state) - initial,
+        field.observe(gap_rows).less(initial),
         field.observe(rows),
-        field.observe_change(contact_rows),
-        field.observe_change(gap_rows),
-        field.observe_change(rows),
         [step.held_source for step in steps],
         [step.brought for step in steps],
         body.heat.ambient * ambient_loss,
         capacity,
         body.extremes(surroundings),
-        surroundings.renewed or not moves or not body.is_open,
+        surroundings.renewed or not moves or not body.flow(surroundings.sliding).is_open,
     )

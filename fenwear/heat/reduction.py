@@ -15,6 +15,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.heat.conduction import ALONE, HeatBody, Surroundings
+from fenwear.heat.field import ReducedBasis
 from fenwear.parallel import total
 
 RATIO = 4.0  # of one time scale to the next
@@ -30,8 +31,8 @@ def reduced_basis(
     duration: float,
     tolerance: float,
     surroundings: Surroundings = ALONE,
-) -> tuple[Array, Array]:
-    """Return a lift (owned,) with the held temperatures, and the basis (owned, dim); collective.
+) -> ReducedBasis:
+    """Return a basis, with a lift that has the held temperatures; collective.
 
     Args:
         body: The body.
@@ -62,7 +63,7 @@ def reduced_basis(
             if np.isinf(scale):
                 lift = step.advance(np.zeros(body.owned))
             else:
-                relaxed.append(step.advance_linear((body.initial() - lift)[:, None]))
+                relaxed.append(step.advance(body.initial() - lift, sources=False)[:, None])
     uniform = np.ones((body.owned, 1))  # carries the balance of energy
     start = (body.initial() - lift)[:, None]
     hottest = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0)), MPI.MAX)
@@ -76,7 +77,7 @@ def reduced_basis(
         exact = _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0)
     rest = np.hstack(snapshots)
     rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
-    return lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0)
+    return ReducedBasis(body, lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0))
 
 
 def _gram(body: HeatBody, fields: Array) -> Array:

@@ -181,7 +181,7 @@ class Model:
                 return
         if reached is None or reached.half_cycle >= strokes * cycles:
             return
-        for block in follow(system, integrate, lambda on: on.exchange, reached):
+        for block in follow(system, integrate, reached):
             snapshot = _of_block(block)
             yield snapshot
             if until(snapshot):
@@ -280,10 +280,10 @@ def steady_snapshot(system: Tribosystem, pressure: Array, velocity: Mapping[str,
     heat, temperature = cycle_heat(system), None
     if heat is not None:
         end = heat.jump(heat.initial(), np.inf, heat.conductances(pressure))
-        parts, rows = heat.parts(end.state(pressure)), []
+        state, rows = heat.exchange.at(end.state(pressure)), []
         for phase in range(len(pressure)):
             p = np.asarray(pressure[phase])
-            parts, _ = heat.exchange.half_cycle(parts, phase, p, heat.exchange.conductance(p))
-            rows.append(np.stack(heat.exchange.contact_temperatures(parts)))
+            state, _ = heat.exchange.half_cycle(state, phase, p, heat.exchange.conductance(p))
+            rows.append(np.stack(heat.exchange.contact_temperatures(state)))
         temperature = np.array(rows)
     return _snapshot(system, np.inf, pressure, None, temperature, velocity)

@@ -24,7 +24,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, OutputError, Problem
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
@@ -42,26 +42,25 @@ BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generousl
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "title")
 
 
-def save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, state: RunState) -> None:
+def save(directory: Path, system: Tribosystem, state: RunState) -> None:
     """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
 
     Raises:
         OutputError: it cannot be written; the old one stays.
     """
     try:
-        _save(directory, system, exchange, state)
+        _save(directory, system, state)
     except OutputError:  # on all ranks
         on_root(system.comm, lambda: shutil.rmtree(directory / NEW, ignore_errors=True))
         raise
 
 
-def _save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, state: RunState) -> None:
+def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
     comm, new = system.comm, directory / NEW
     on_root(comm, lambda: _begin(new, system, state))
-    if exchange is not None and state.temperature is not None and system.bodies.heat is not None:
-        temperatures = exchange.temperatures(state.temperature)
-        for body, values in zip(system.bodies.heat, temperatures, strict=True):
-            path, function = new / f"temperature_{body.body.name}.bp", body.function(values)
+    if state.temperature is not None:
+        for basis, function in zip(state.temperature.bases, state.temperature.functions(), strict=True):
+            path = new / f"temperature_{basis.body.body.name}.bp"
             size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
             on_root(comm, partial(check_room, new, size))
             with writing_together(comm, path):
@@ -118,7 +117,7 @@ def _swap(directory: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def load(directory: Path, system: Tribosystem, exchange: HeatExchange | None) -> RunState:
+def load(directory: Path, system: Tribosystem) -> RunState:
     """Return the state of a run's checkpoint; collective.
 
     Raises:
@@ -128,9 +127,10 @@ def load(directory: Path, system: Tribosystem, exchange: HeatExchange | None) ->
     folder = on_root(comm, lambda: _find(directory))
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
-    if exchange is not None and system.bodies.heat is not None:
-        punch, strip = (_read_temperature(folder, body) for body in system.bodies.heat)
-        temperature = exchange.state((punch, strip))
+    if system.bodies.heat is not None:
+        temperature = HeatState.nodal(
+            system.bodies.heat, [_read_temperature(folder, body) for body in system.bodies.heat]
+        )
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)

@@ -93,10 +93,10 @@ def _traction(system: Tribosystem, phase: int, pressure: Array, temperatures: tu
     friction, surfaces = system.friction, None
     if not friction.constant and temperatures is not None and system.bodies.heat is not None:
         punch, strip = (
-            system.comm.allreduce(body.contact_rows @ values)
+            body.trace.pick(values[:, None])[:, 0, 0]
             for body, values in zip(system.bodies.heat, temperatures, strict=True)
         )
-        surfaces = (punch, system.pair.transfer @ strip)
+        surfaces = (system.pair.punch.spread.T @ punch, system.pair.transfer @ strip)
     mu = friction.values(system.conditions(phase, pressure, surfaces))
     return friction.ratio(system.motion.phases[phase].direction, mu, system.pairs[phase])
 
@@ -132,7 +132,7 @@ def _solve(
     von_mises = _interpolated(equivalent, elastic, "von_mises", ())
     flux = None
     if heat is not None and theta is not None:
-        flux = _interpolated(-heat.conductivity * ufl.grad(theta), elastic, "heat_flux", (dim,))
+        flux = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (dim,))
     return BodyFields(displacement, out_of_plane, von_mises, theta, flux)
 
 

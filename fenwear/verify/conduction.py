@@ -13,7 +13,7 @@ from scipy.special import k0e
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, Surroundings
-from fenwear.parallel import total
+from fenwear.heat.field import HeatState
 from fenwear.results.fields import body_fields
 from fenwear.verify.bodies import builtin, clamped, two_blocks
 from fenwear.verify.manufactured import (
@@ -78,14 +78,14 @@ def end_of_step(body: HeatBody, m: float, beta: complex, factor: complex, veloci
     step = body.step(velocity, duration)
     slope = factor * beta * (1 - _reflected(beta) * np.exp(-2 * beta))
     flux = K * (slope * np.exp(1j * m * contact_abscissae(body))).real
-    load = body.place(body.weights * flux)
+    load = body.load(flux)
     return step.advance(wave(x, z, m, beta, 1.0)) + step.respond(load[:, None])[:, 0]
 
 
 def contact_abscissae(body: HeatBody) -> Array:
     """Return x of the contact nodes of a body on every rank (n,), mm."""
     x, _ = owned_nodes(body)
-    return total(body.body.mesh.comm, body.contact_rows @ x)
+    return body.contact(x)
 
 
 REGIMES = {
@@ -296,8 +296,8 @@ def bimetal() -> Result:
         )
         assert system.bodies.heat is not None
         assert system.exchange is not None
-        warm = (np.full(system.bodies.heat[0].owned, warming), np.zeros(system.bodies.heat[1].owned))
-        x, deflection = system.pair.x, system.exchange.gap(system.exchange.state(warm))
+        warm = [np.full(body.owned, value) for body, value in zip(system.bodies.heat, (warming, 0.0), strict=True)]
+        x, deflection = system.pair.x, system.exchange.gap(HeatState.nodal(system.bodies.heat, warm))
         middle = np.abs(x) < 1
         curvature = 2 * np.polyfit(x[middle], deflection[middle], 2)[0]
         bending = 3 * (1 + m) ** 2 + (1 + m * n) * (m**2 + 1 / (m * n))
@@ -332,11 +332,11 @@ def periodic_flux() -> Result:
     for steps in (50, 100, 200, 400):
         dt = 2 * math.pi / omega / steps
         step = body.step(0.0, dt)
-        response = step.respond(body.place(body.weights * flux)[:, None])[:, 0]
+        response = step.respond(body.load(np.full(len(body.surface.weights), flux))[:, None])[:, 0]
         theta, surface = body.initial(), []
         for n in range(1, periods * steps + 1):
             theta = step.advance(theta) + response * math.cos(omega * n * dt)
-            surface.append(total(system.comm, body.contact_rows @ theta)[0])
+            surface.append(body.contact(theta)[0])
         times, last = dt * np.arange(1, len(surface) + 1)[-steps:], np.array(surface)[-steps:]
         basis = np.stack([np.cos(omega * times), np.sin(omega * times), np.ones(steps), times], axis=1)
         (c, s, *_), *_ = np.linalg.lstsq(basis, last, rcond=None)
@@ -390,7 +390,7 @@ def open_strip() -> Result:
     assert system.bodies.heat is not None
     body, new = system.bodies.heat[1], Surroundings(renewed=True)
     along = contact_abscissae(body) + 0.5
-    load = body.place(body.weights * flux)[:, None]
+    load = body.load(np.full(len(body.surface.weights), flux))[:, None]
     rows: list[Row] = []
     lines: list[Line] = []
     for peclet in (0.1, 1.0, 10.0, 50.0):
@@ -402,13 +402,13 @@ def open_strip() -> Result:
             case = f"v L / a = {peclet:g}, {'rightward' if d > 0 else 'leftward'}"
             step = body.step(d * speed, math.inf, new)
             steady = step.advance(body.initial()) + step.respond(load)[:, 0]
-            found = (total(system.comm, body.contact_rows @ steady) - entering) / rise
+            found = (body.contact(steady) - entering) / rise
             rows.append(profile(f"{case}: rise / (q L / rho c v H)", exact, found, 1e-4, scale=exact.max()))
             step = body.step(d * speed, 0.2 / speed, new)
             theta, heating = np.full(body.owned, -300.0), step.respond(load)[:, 0]
             for _ in range(400):
                 theta = step.advance(theta) + heating
-            apart = total(system.comm, body.contact_rows @ (theta - steady)) / rise
+            apart = body.contact(theta - steady) / rise
             rows.append(profile(f"{case}: after 80 renewals", np.zeros_like(apart), apart, 1e-6))
             if d > 0:
                 lines += [
@@ -463,7 +463,7 @@ def moving_source() -> Result:
         published = 2 * math.sqrt(2 * half_width * diffusivity / (math.pi * speed))
         for d in (1, -1):
             step = body.step(d * speed, math.inf)
-            rise = total(system.comm, body.contact_rows @ step.respond(body.place(body.weights)[:, None]))[:, 0]
+            rise = body.contact(step.respond(body.load(np.ones(len(x)))[:, None])[:, 0])
             rise *= conductivity
             exact = np.array([jaeger(d * at, half_width, speed, diffusivity) for at in x])
             case = f"Pe = {peclet:g}, {'rightward' if d > 0 else 'leftward'}"

@@ -21,7 +21,7 @@ def run(system: Tribosystem, half_cycles: int) -> list[Block]:
     def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
         return jump(now, half_cycles, tolerance=0.1, start=start, leave=leave)
 
-    return list(follow(system, integrate, lambda now: now.exchange))
+    return list(follow(system, integrate))
 
 
 def test_moved_meshes_agree_with_the_offset(assembled: Callable[..., Tribosystem]) -> None:
@@ -64,7 +64,7 @@ def test_a_run_with_heat_goes_on(assembled: Callable[..., Tribosystem]) -> None:
     def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
         return march(now, 6, start=start, leave=leave)
 
-    blocks = list(follow(moving, integrate, lambda now: now.exchange))
+    blocks = list(follow(moving, integrate))
     assert blocks[-1].system is not moving
     assert expected.heat is not None
     assert blocks[-1].heat is not None

@@ -168,7 +168,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]
     modes = np.zeros((1, 2))
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.pair.x / 30) ** 2
-    return RunState(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.parts(periodic)), state
+    return RunState(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic)), state
 
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])
@@ -224,20 +224,23 @@ def test_tangent_of_a_half_cycle(assembled: Assemble, name: str) -> None:
     heat = cycle_heat(system)
     assert heat is not None
     repeating = repeating_temperatures(system, state.phase_pressure)
-    before = repeating[1][0] if repeating[1] else heat.parts(np.full(len(heat.initial()), 3.0))
+    before = repeating[1][0] if repeating[1] else heat.exchange.at(np.full(len(heat.initial()), 3.0))
     contacts = from_steady(system)[0].contacts
 
     def end(temperature: Array, worn: Array) -> tuple[Array, Array, Array]:
-        start = heat.parts(np.concatenate(before) + temperature)
+        start = heat.exchange.at(before.values + temperature)
         moment = RunState(0, Worn(state.shape + worn, 0 * system.pair.strip.weights), contacts, start)
         block = run(system, 1, implicit=True, start=moment)
-        return np.concatenate(block.end.temperature), block.end.worn.punch, block.pressure[0]
+        return block.end.temperature.values, block.end.worn.punch, block.pressure[0]
 
     dim, n = len(heat.initial()), len(system.pair.x)
     pressure = end(np.zeros(dim), np.zeros(n))[2]
     matrix = phase_tangent(system, 0, pressure, repeating[0], before)
     rng = np.random.default_rng(0)
-    warmer, deeper = rng.normal(size=dim) * np.abs(before[0]).max(), 1e-3 * (system.pair.x / 30) ** 2
+    warmer, deeper = (
+        rng.normal(size=dim) * np.abs(before.values[: len(heat.exchange.bases[0])]).max(),
+        1e-3 * (system.pair.x / 30) ** 2,
+    )
     for disturbance in ((warmer, 0 * deeper), (0 * warmer, deeper)):
         ahead, behind = (end(sign * disturbance[0], sign * disturbance[1]) for sign in (1e-4, -1e-4))
         expected = np.split(matrix @ np.concatenate(disturbance), [dim])
@@ -273,7 +276,7 @@ def test_growth_with_friction_by_temperature(assembled: Assemble) -> None:
     contacts = from_steady(system)[0].contacts
     ends = []
     for sign in (1, -1):
-        temperature = heat.parts(np.concatenate(states[0]) + sign * mode[:dim])
+        temperature = heat.exchange.at(states[0].values + sign * mode[:dim])
         worn = Worn(state.shape + sign * mode[dim:], 0 * system.pair.strip.weights)
         ends.append(run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature)))
     apart = np.linalg.norm(ends[0].pressure - ends[1].pressure, axis=1)[1::2]

@@ -34,12 +34,10 @@ from bases import base
 from pool import Verdict, verdicts
 
 from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
-from fenwear.assembly import with_reduced_heat
 from fenwear.bodies.mesh import write_msh
 from fenwear.case import doubts
 from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError, MeshQualityError
-from fenwear.heat.exchange import HeatExchange
 
 SECONDS = 60.0  # of processor time
 NAMES = tuple(bases.BASES)
@@ -276,10 +274,7 @@ def compute(case: Case) -> None:
             )
         return march(system, last, implicit=implicit, block=1, **shared)
 
-    def exchange(system: Tribosystem) -> HeatExchange | None:
-        return with_reduced_heat(system).exchange if jumps else system.exchange
-
-    for block in follow(assemble(case), integrate, exchange):
+    for block in follow(assemble(case), integrate):
         for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
                 raise NoResultError("not finite")

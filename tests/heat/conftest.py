@@ -11,9 +11,12 @@ from dolfinx.mesh import CellType, create_rectangle, locate_entities, locate_ent
 from mpi4py import MPI
 
 from fenwear import Case, Tribosystem, assemble, make_case
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Body, Heat, Material, Model
+from fenwear.case import Body, Heat, Material
 from fenwear.heat.conduction import HeatBody
+from fenwear.heat.material import isotropic_conduction
 
 SIDES, BOTTOM, CONTACT = 1, 2, 3
 
@@ -90,8 +93,12 @@ def conducting() -> Callable[..., HeatBody]:
         **tables: Any,
     ) -> HeatBody:
         heat_table = Heat.model_validate(heat or {})
-        model = Model(thickness=thickness)
-        return HeatBody(body, _description(body, tables), _materials(materials), model, heat_table, degree)
+        held = {"supports": [{"on": "strip_sides", "fix": ["x", "z"]}]}
+        description, made = _description(body, {**held, **tables}), _materials(materials)
+        elastic = ElasticBody(
+            body, description, isotropic(body, description.regions, made, "stress"), degree, thickness
+        )
+        return HeatBody(elastic, description, isotropic_conduction(body, description.regions, made), heat_table)
 
     return conducting
 

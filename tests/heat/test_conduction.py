@@ -59,7 +59,7 @@ def end_of_wave_step(
     step = body.step(velocity, duration)
     top = np.sort(np.concatenate(body.body.mesh.comm.allgather(x[z > 1 - 1e-9])))
     slope = factor * beta * (1 - _reflected(beta) * np.exp(-2 * beta))
-    load = body.place(body.weights * K * (slope * np.exp(1j * m * top)).real)
+    load = body.load(K * (slope * np.exp(1j * m * top)).real)
     return step.advance(wave(x, z, m, beta, 1.0 + 0j, np)) + step.respond(load[:, None])[:, 0]
 
 

@@ -10,7 +10,7 @@ import pytest
 from fenwear import Tribosystem
 from fenwear.arrays import Array
 from fenwear.cycle.coupled import cycle_heat
-from fenwear.heat.exchange import State
+from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 
 # Faces that convect and no debris: all losses, and a strong feedback.
@@ -35,7 +35,7 @@ def heat(request: pytest.FixtureRequest, assembled: Callable[..., Tribosystem]) 
     return cycles, pressure, cycles.conductances(pressure)
 
 
-def follow(heat: CycleHeat, state: State, pressure: Array, conductances: Array) -> tuple[State, list[Array]]:
+def follow(heat: CycleHeat, state: HeatState, pressure: Array, conductances: Array) -> tuple[HeatState, list[Array]]:
     """Return the end of a cycle, half-cycle by half-cycle, and the thermal gap at the end of each."""
     gaps = []
     for phase in range(len(pressure)):
@@ -50,8 +50,8 @@ def test_infinitely_many_cycles_are_the_fixed_point(heat: tuple[CycleHeat, Array
     cycles, pressure, conductances = heat
     end = cycles.jump(cycles.initial(), np.inf, conductances)
     state = end.state(pressure)
-    after, gaps = follow(cycles, cycles.parts(state), pressure, conductances)
-    np.testing.assert_allclose(np.concatenate(after), state, rtol=0, atol=1e-9 * np.abs(state).max())
+    after, gaps = follow(cycles, cycles.exchange.at(state), pressure, conductances)
+    np.testing.assert_allclose(after.values, state, rtol=0, atol=1e-9 * np.abs(state).max())
     linear = end.gap + np.einsum("ikjl,jl->ik", end.coupling, pressure)
     np.testing.assert_allclose(linear, gaps, rtol=0, atol=1e-9 * np.abs(gaps).max())
 
@@ -59,10 +59,10 @@ def test_infinitely_many_cycles_are_the_fixed_point(heat: tuple[CycleHeat, Array
 def test_many_cycles_tend_to_the_periodic_state(heat: tuple[CycleHeat, Array, Array]) -> None:
     """Cycle by cycle, from the initial temperature: the same end, found without any linear algebra."""
     cycles, pressure, conductances = heat
-    state = cycles.parts(cycles.initial())
+    state = cycles.exchange.at(cycles.initial())
     for _ in range(3000):
         state, _ = follow(cycles, state, pressure, conductances)
-    periodic = cycles.parts(cycles.jump(cycles.initial(), np.inf, conductances).state(pressure))
+    periodic = cycles.exchange.at(cycles.jump(cycles.initial(), np.inf, conductances).state(pressure))
     surfaces = [np.array(cycles.exchange.contact_temperatures(s)) for s in (state, periodic)]
     assert np.ptp(surfaces[1]) > 5
     np.testing.assert_allclose(surfaces[0], surfaces[1], rtol=0, atol=0.01)
@@ -76,8 +76,8 @@ def test_a_jump_is_an_implicit_step(heat: tuple[CycleHeat, Array, Array]) -> Non
         start = cycles.initial()
         end = cycles.jump(start, count, conductances)
         state = end.state(pressure)
-        after, gaps = follow(cycles, cycles.parts(state), pressure, conductances)
-        change = count * (np.concatenate(after) - state)
+        after, gaps = follow(cycles, cycles.exchange.at(state), pressure, conductances)
+        change = count * (after.values - state)
         np.testing.assert_allclose(state - start, change, rtol=0, atol=1e-8 * np.abs(state).max())
         linear = end.gap + np.einsum("ikjl,jl->ik", end.coupling, pressure)
         np.testing.assert_allclose(linear, gaps, rtol=0, atol=1e-9 * np.abs(gaps).max())

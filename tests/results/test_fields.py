@@ -20,7 +20,7 @@ def write(system: Tribosystem, folder: Path, half_cycles: int) -> xarray.Dataset
     *_, block = march(system, half_cycles)
     temperatures = None
     if system.exchange is not None and block.end.temperature is not None:
-        temperatures = system.exchange.temperatures(block.end.temperature)
+        temperatures = block.end.temperature.temperatures()
     direction = int(block.direction[-1])
     fields = body_fields(system, block.pressure[-1], block.rigid[-1], (half_cycles - 1) % 2, temperatures)
     write_fields(folder, system, half_cycles, fields, direction, block.end.worn)

@@ -39,6 +39,10 @@ class ConvergenceError(FenwearError):
     """A solver did not converge; names the solver, the reason and what may help."""
 
 
+class HeatError(ConvergenceError):
+    """Temperatures that no friction and no boundary can make: the heat, not the contact, has failed."""
+
+
 class OutputError(FenwearError):
     """A file of the results cannot be written: names it, the reason and, in a run, how to go on."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 import time
@@ -17,8 +18,8 @@ from tqdm import tqdm
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
-from fenwear.cycle import Block, follow, growth_rate, jump, march, stability_number
-from fenwear.cycle.moment import Moment, joined
+from fenwear.cycle import Block, follow, jump, march, stability_number, stationary_growth
+from fenwear.cycle.state import RunState, joined
 from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, MeshQualityError, OutputError, Problem
 from fenwear.heat.exchange import HeatExchange
 from fenwear.parallel import on_root
@@ -37,6 +38,9 @@ from fenwear.results.history import (
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
+LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
+BLOCK_SECONDS = 2.0  # after which a block ends
+LINE_SECONDS = 10.0  # after which a long step tells that it goes on
 Log = Callable[[str], None]
 Progress = Literal["bar", "lines", "none"]
 
@@ -90,20 +94,25 @@ def _run(
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
     begin = time.perf_counter()
-    try:
-        run.march(progress)
-    except (ConvergenceError, InterruptedRunError) as error:
-        failure = error
-    times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
-    # Who interrupts a run is in a hurry: its figures can be drawn later.
-    report = system.case.output.report and not isinstance(failure, InterruptedRunError)
-    how = {
-        "stop": run.stop(failure),
-        **times,
-        "warnings": [*run.warnings, *run.watch.warnings()],
-        "retries": run.remedies,
-    }
-    summary = run.finish(how, report=report)
+
+    def finish() -> dict[str, Any]:
+        times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
+        # Who interrupts a run is in a hurry: its figures can be drawn later.
+        report = system.case.output.report and not isinstance(failure, InterruptedRunError)
+        warnings = [*run.warnings, *run.watch.warnings()]
+        how = {"stop": run.stop(failure), **times, "warnings": warnings, "retries": run.remedies}
+        return run.finish(how, report=report)
+
+    with _Signals(system.comm) as signals:
+        try:
+            run.march(progress, signals)
+        except ConvergenceError as error:
+            failure = error
+        except InterruptedRunError as error:
+            failure = error
+            summary = finish()  # a second signal does not wait for it
+    if not isinstance(failure, InterruptedRunError):
+        summary = finish()
     if failure is not None:
         raise type(failure)(f"{failure}\n{run.results_so_far(failure)}") from failure
     return summary
@@ -129,7 +138,7 @@ class _Run:
         self.directory, self.log = directory, log
         self.comm, self.case = system.comm, system.case
         self.watch = Watch(system)
-        start: Moment | None = None
+        start: RunState | None = None
         if resume:
             followed = checkpoint.followed(directory, system)
             if followed is not None:
@@ -145,7 +154,7 @@ class _Run:
         self.writer: HistoryWriter | None = None  # of rank 0
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
-        self.moment = start or Moment(0, system.unworn(), (), None)
+        self.state = start or RunState(0, system.unworn(), (), None)
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []
@@ -158,6 +167,10 @@ class _Run:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
+        self._signals: _Signals | None = None
+        self._progress: _Progress | None = None
+        self._block_begun = self._looked = time.monotonic()
+        self._block_over = False
 
     def _open_history(self, after: int | None) -> None:
         if after is not None and not (self.directory / HISTORY).exists():
@@ -169,7 +182,7 @@ class _Run:
         writer = self.writer
         on_root(self.comm, lambda: None if writer is None else act(writer))
 
-    def march(self, progress: Progress) -> None:
+    def march(self, progress: Progress, signals: _Signals) -> None:
         """Compute all half-cycles; collective.
 
         Raises:
@@ -177,16 +190,46 @@ class _Run:
             InterruptedRunError: a signal has come; the checkpoint is written.
             OutputError: a file cannot be written.
         """
-        last, done = self.case.run.half_cycles, self.moment.half_cycle
-        with _Signals() as signals:
-            for block in _with_progress(self._blocks(), last, done, self.comm, progress):
+        with _Progress(self.case.run.half_cycles, self.state, self.comm, progress) as told:
+            self._signals, self._progress = signals, told
+            for block in self._blocks():
                 self._take(block)
-                wishes = signals.received or (time.monotonic() > self._checkpoint_due)
-                interrupted, due = self.comm.allreduce(np.array([bool(signals.received), bool(wishes)], dtype=int)) > 0
-                if due:
+                told.block(block)
+                self._block_begun = time.monotonic()
+                if self._look():
                     self._save()
-                if interrupted:
-                    raise InterruptedRunError(f"interrupted after half-cycle {self.moment.half_cycle}")
+                    raise InterruptedRunError(f"interrupted after half-cycle {self.state.half_cycle}")
+
+    def _watch(self) -> bool:
+        """Look, between two solves, whether something is due; return whether the block is to end; collective.
+
+        Raises:
+            InterruptedRunError: a signal has come.
+        """
+        if self.comm.size == 1 and time.monotonic() < self._looked + LOOK:
+            return False
+        if self._look():
+            raise InterruptedRunError(f"interrupted in the step after half-cycle {self.state.half_cycle}")
+        return self._block_over
+
+    def _look(self) -> bool:
+        """Save where it is due, tell how far the run is, and return whether a signal has come; collective.
+
+        One clock decides, that of rank 0; a signal to any rank ends all of them.
+        """
+        self._looked = now = time.monotonic()
+        root, signals = self.comm.rank == 0, self._signals
+        wishes = [
+            signals is not None and signals.received > 0,
+            root and now > self._checkpoint_due,
+            root and now > self._block_begun + BLOCK_SECONDS,
+        ]
+        interrupted, save, self._block_over = (self.comm.allreduce(np.array(wishes, dtype=int)) > 0).tolist()
+        if save and self.state.half_cycle > 0:
+            self._save()
+        if self._progress is not None:
+            self._progress.working(self.state.half_cycle)
+        return bool(interrupted)
 
     def _exchange(self, system: Tribosystem) -> HeatExchange | None:
         """Return the heat exchange that the run integrates."""
@@ -204,18 +247,26 @@ class _Run:
         strokes = self.system.motion.half_cycles if self.case.run.integration == "jump" else 1
         return self.case.run.half_cycles // strokes * strokes
 
-    def _integrate(self, system: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+    def _integrate(
+        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]
+    ) -> Iterator[Block]:
         run = self.case.run
-        shared: dict[str, Any] = {"periodic_within": run.periodic_within, "start": start, "stops": self._fields_at}
+        shared: dict[str, Any] = {
+            "periodic_within": run.periodic_within,
+            "start": start,
+            "stops": self._fields_at,
+            "leave": leave,
+            "watch": self._watch,
+        }
         if run.integration == "jump":
-            return jump(system, run.half_cycles, tolerance=run.jump_tolerance, leave=leave, **shared)
-        return march(system, run.half_cycles, implicit=run.integration == "implicit", leave=leave, **shared)
+            return jump(system, run.half_cycles, tolerance=run.jump_tolerance, **shared)
+        return march(system, run.half_cycles, implicit=run.integration == "implicit", **shared)
 
     def _take(self, block: Block) -> None:
         if block.system is not self.system:
-            self.log(f"after half-cycle {self.moment.half_cycle:,} the meshes follow the worn shape")
+            self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
             self.system = block.system
-        self.last, self.moment = block, block.end
+        self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
@@ -253,20 +304,20 @@ class _Run:
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
         self._on_history(HistoryWriter.flush)
-        checkpoint.save(self.directory, self.system, self._exchange(self.system), self.moment)
+        checkpoint.save(self.directory, self.system, self._exchange(self.system), self.state)
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
 
     def stop(self, failure: Exception | None) -> str:
         """Return how the half-cycles ended."""
         if failure is not None:
             return str(failure)
-        return "all half-cycles done" if self.moment.half_cycle >= self._last else "periodic"
+        return "all half-cycles done" if self.state.half_cycle >= self._last else "periodic"
 
     def results_so_far(self, failure: Exception) -> str:
         """Say what there is after a run that ended early, and how to go on."""
-        if self.moment.half_cycle == 0:
+        if self.state.half_cycle == 0:
             return f"no half-cycle was done; {self.directory} can be removed"
-        reached = f"the results up to half-cycle {self.moment.half_cycle} are in {self.directory}"
+        reached = f"the results up to half-cycle {self.state.half_cycle} are in {self.directory}"
         if isinstance(failure, MeshQualityError):
             return f"{reached}; to get further: start anew with coarser elements at the contact, or a thicker body"
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
@@ -277,31 +328,51 @@ class _Run:
         self._on_history(HistoryWriter.close)
         if self.last is None:
             return {}
-        if self.moment.half_cycle not in self._fields_at and self.case.output.fields_at is None:
+        if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
             self._write_fields(self.last)
-        if self.moment.half_cycle > 0:
+        if self.state.half_cycle > 0:
             self._save()
-        contacts = joined(self.moment.contacts)
-        if self.last.heat is not None and contacts is not None and not self.system.track_deepens:
-            self.extremes["growth_rate_per_s"] = growth_rate(self.system, contacts.pressure)
+        reason = self._note_growth(self.last)
+        if reason:
+            how = {**how, "no_growth_rate": reason}
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 
+    def _note_growth(self, last: Block) -> str:
+        """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""
+        contacts, motion = joined(self.state.contacts), self.system.motion
+        if last.heat is None or contacts is None or self.system.track_deepens:
+            return ""
+        surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
+        phase = self.state.half_cycle % motion.half_cycles * motion.positions
+        change = float(last.periodicity[-motion.half_cycles :].max())
+        rate, reason = stationary_growth(self.system, contacts.pressure, surfaces, phase, change)
+        if rate is not None:
+            self.extremes["growth_rate_per_s"] = rate
+        else:
+            self.log(f"no growth rate of disturbances: {reason}")
+        return reason
+
 
 class _Signals:
     """Notes SIGINT and SIGTERM instead of dying at once."""
 
+    def __init__(self, comm: MPI.Comm) -> None:
+        self.comm, self.received = comm, 0
+
     def __enter__(self) -> _Signals:
-        self.received = 0
         self._before = {s: signal.signal(s, self._note) for s in (signal.SIGINT, signal.SIGTERM)}
         return self
 
     def _note(self, number: int, _frame: FrameType | None) -> None:
-        if self.received:  # asked twice: now
-            raise KeyboardInterrupt
+        if self.received:  # asked twice: at once, wherever in a solver this is, and with all ranks
+            os.write(2, b"fenwear: interrupted at once; what came after the last checkpoint is lost\n")
+            if self.comm.size > 1:
+                self.comm.Abort(1)
+            os._exit(1)
         self.received = number
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
@@ -330,22 +401,46 @@ def _warnings(number: float) -> list[str]:
     ]
 
 
-def _with_progress(
-    blocks: Iterator[Block], half_cycles: int, done: int, comm: MPI.Comm, progress: Progress
-) -> Iterator[Block]:
-    """Pass the blocks on and tell of them: on rank 0, and a bar on a terminal only."""
-    bar_hidden = progress != "bar" or comm.rank != 0 or not sys.stderr.isatty()
-    begin = time.perf_counter()
-    with tqdm(total=half_cycles, initial=done, unit=" half-cycles", disable=bar_hidden) as bar:
-        for block in blocks:
-            number = int(block.half_cycle[-1])
-            hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"
-            state = f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
-            bar.update(number - bar.n)
-            bar.set_postfix_str(state)
-            if progress == "lines" and comm.rank == 0:
-                rate = (number - done) / (time.perf_counter() - begin)
-                left = (half_cycles - number) / rate
-                line = f"half-cycle {number:,} of {half_cycles:,}, {rate:,.0f} a second, {left:,.0f} s left, {state}"
-                print(line, file=sys.stderr, flush=True)
-            yield block
+class _Progress:
+    """Tells how far a run is: on rank 0, by a bar on a terminal or by lines."""
+
+    def __init__(self, half_cycles: int, start: RunState, comm: MPI.Comm, progress: Progress) -> None:
+        self.half_cycles, self.done = half_cycles, start.half_cycle
+        self.lines = progress == "lines" and comm.rank == 0
+        hidden = progress != "bar" or comm.rank != 0 or not sys.stderr.isatty()
+        self.bar = tqdm(total=half_cycles, initial=self.done, unit=" half-cycles", disable=hidden)
+        self.begin = self.told = time.perf_counter()
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.bar.close()
+
+    def block(self, block: Block) -> None:
+        """Tell of a block."""
+        number = int(block.half_cycle[-1])
+        hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"
+        state = f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
+        self.bar.update(number - self.bar.n)
+        self.bar.set_postfix_str(state)
+        if self.lines:
+            self.told = time.perf_counter()
+            rate = (number - self.done) / (self.told - self.begin)
+            left = (self.half_cycles - number) / rate
+            self._line(
+                f"half-cycle {number:,} of {self.half_cycles:,}, {rate:,.0f} a second, {left:,.0f} s left, {state}"
+            )
+
+    def working(self, half_cycle: int) -> None:
+        """Tell, now and then, that a long step is being made."""
+        now = time.perf_counter()
+        self.bar.refresh()
+        if self.lines and now - self.told > LINE_SECONDS:
+            self.told = now
+            self._line(
+                f"half-cycle {half_cycle:,} of {self.half_cycles:,}, in the step after it, {now - self.begin:,.0f} s"
+            )
+
+    def _line(self, text: str) -> None:
+        print(text, file=sys.stderr, flush=True)

@@ -114,7 +114,7 @@ def check_history(folder: Path) -> int:
 
 def check_goes_on(fenwear: Run, folder: Path) -> None:
     """Check that the checkpoint loads, no farther than the history, and that the run goes on."""
-    with np.load(folder / "checkpoint" / "moment.npz") as moment:
+    with np.load(folder / "checkpoint" / "state.npz") as moment:
         reached = int(moment["half_cycle"])
     assert reached <= check_history(folder) + 20  # every tenth cycle is kept
     on = options(f"run.half_cycles={reached + 20}", "output.every=10")
@@ -142,7 +142,7 @@ def test_full_disk(fenwear: Run, small_disk: Callable[[int], Path], kilobytes: i
     if done.returncode == 0:  # all but the report is there
         assert "warning: no report of the run" in done.stderr
         assert check_history(folder) == 40
-        with np.load(folder / "checkpoint" / "moment.npz") as moment:
+        with np.load(folder / "checkpoint" / "state.npz") as moment:
             assert int(moment["half_cycle"]) == 40
         return
     assert done.returncode == 1, done.stderr
@@ -241,6 +241,26 @@ def test_signal_to_mpirun(fenwear: Run, tmp_path: Path, number: signal.Signals) 
     check_goes_on(fenwear, folder)
 
 
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
+    """Jumps of many solves: saved long before 200 are recorded, and ended by a signal within one."""
+    folder = tmp_path / "run"
+    settings = ("run.integration=jump", "run.jump_tolerance=1e-4", "output.checkpoint=1")
+    with running(folder, *settings, ranks=ranks, case="fretting") as process:
+        os.kill((ranks_of(process) if ranks > 1 else [process.pid])[-1], signal.SIGTERM)
+        status, messages = ended(process, 20)
+    assert status == 1
+    assert "interrupted" in messages
+    with np.load(folder / "checkpoint" / "state.npz") as saved:
+        reached = int(saved["half_cycle"])
+    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
+        assert 0 < history.sizes["half_cycle"] < 200
+        assert history.half_cycle.values[-1] == reached
+    words = options(*settings, f"run.half_cycles={reached + 2}", "output.every=1", "output.fields_at=[]")
+    done = fenwear("run", "fretting", "-o", folder, *words, "--resume")
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("victims", [1, 2])
 def test_killed_ranks(fenwear: Run, tmp_path: Path, victims: int) -> None:
     """One rank killed: the other does not wait for it for ever. Both killed: the files are whole all the same."""
@@ -264,9 +284,9 @@ def test_killed_at_any_moment(tmp_path: Path) -> None:
             time.sleep(0.037 * number)
             process.send_signal(signal.SIGKILL)
             process.communicate(timeout=PATIENCE)
-        present = [name for name in ("checkpoint", "checkpoint.old") if (folder / name / "moment.npz").exists()]
+        present = [name for name in ("checkpoint", "checkpoint.old") if (folder / name / "state.npz").exists()]
         assert present
-        with np.load(folder / present[0] / "moment.npz") as moment:
+        with np.load(folder / present[0] / "state.npz") as moment:
             assert int(moment["half_cycle"]) <= check_history(folder) + 20
 
 
@@ -286,7 +306,7 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
             _wait_for(resumed, "followed_punch")
         process.send_signal(signal.SIGKILL)
         process.communicate(timeout=PATIENCE)
-    with np.load(resumed / "checkpoint" / "moment.npz") as moment:
+    with np.load(resumed / "checkpoint" / "state.npz") as moment:
         assert np.abs(moment["wear_strip"]).max() > 0 or name != "worn strip"
         last = int(moment["half_cycle"]) + 40
     words = options(*settings, f"run.half_cycles={last}", "output.every=10", "output.fields_at=[]")
@@ -303,19 +323,19 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
 
 def _wait_for(folder: Path, name: str) -> None:
     """Wait until the checkpoint holds these depths."""
-    wait_until(lambda: name in _moment(folder))
+    wait_until(lambda: name in _kept(folder))
 
 
-def _moment(folder: Path) -> dict[str, Any]:
+def _kept(folder: Path) -> dict[str, Any]:
     """Return what the checkpoint holds; nothing at the moment that it is replaced by the next."""
-    with suppress(FileNotFoundError), np.load(folder / "checkpoint" / "moment.npz") as moment:
-        return dict(moment)
+    with suppress(FileNotFoundError), np.load(folder / "checkpoint" / "state.npz") as state:
+        return dict(state)
     return {}
 
 
 def _reached(folder: Path) -> int:
     """Return the half-cycle of the checkpoint."""
-    return int(_moment(folder).get("half_cycle", 0))
+    return int(_kept(folder).get("half_cycle", 0))
 
 
 # ---------------------------------------------------------------------- removed files
@@ -330,7 +350,7 @@ def test_history_removed(fenwear: Run, tmp_path: Path) -> None:
     assert status == 1
     assert messages.count("history.nc cannot be written: it or its folder has been removed") == 1, messages
     assert "then go on from the checkpoint" in messages
-    with np.load(folder / "checkpoint" / "moment.npz") as moment:
+    with np.load(folder / "checkpoint" / "state.npz") as moment:
         reached = int(moment["half_cycle"])
     done = fenwear("run", "example1-heat", "-o", folder, *options(f"run.half_cycles={reached + 20}"), "--resume")
     assert done.returncode == 0, done.stderr
@@ -400,7 +420,7 @@ def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
     check_goes_on(fenwear, folder)
 
 
-@pytest.mark.parametrize("name", ["moment.npz", "case.toml", "temperature_punch.bp/md.idx"])
+@pytest.mark.parametrize("name", ["state.npz", "case.toml", "temperature_punch.bp/md.idx"])
 def test_damaged_checkpoint(fenwear: Run, tmp_path: Path, name: str) -> None:
     """Cut in half it is refused, on one rank and on two, and nothing is changed."""
     folder = tmp_path / "run"
@@ -420,7 +440,7 @@ def test_nan_in_a_checkpoint(fenwear: Run, tmp_path: Path) -> None:
     """A worn shape that is no number is refused."""
     folder = tmp_path / "run"
     assert fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=4")).returncode == 0
-    path = folder / "checkpoint" / "moment.npz"
+    path = folder / "checkpoint" / "state.npz"
     with np.load(path) as stored:
         arrays = dict(stored)
     arrays["wear"][3] = np.nan
@@ -437,7 +457,7 @@ def test_damaged_depths_in_a_checkpoint(fenwear: Run, tmp_path: Path, array: str
     folder, (name, *settings) = tmp_path / "run", RICH["followed meshes"]
     words = ("run", name, "-o", folder, *options(*settings, "geometry.follow_wear=1e-6", "output.fields_at=[]"))
     assert fenwear(*words, "--set", "run.half_cycles=4").returncode == 0
-    path = folder / "checkpoint" / "moment.npz"
+    path = folder / "checkpoint" / "state.npz"
     with np.load(path) as stored:
         arrays = dict(stored)
     match damage:

@@ -466,6 +466,11 @@ class Heat(_Part):
     )
     convecting_faces: bool = True
     ambient: Temperature = 0.0
+    inflow: Temperature | None = Field(
+        default=None,
+        description="of the strip's material that enters through free ends; by default, sliding one way, the "
+        "ambient, and to and fro what has left comes back as it was",
+    )
     initial: Temperature = 0.0
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
     coupling: Literal["implicit", "split"] = "implicit"
@@ -506,10 +511,10 @@ class Run(_Part):
     integration: Literal["explicit", "implicit", "jump"] = "explicit"
     jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=3e-3,
-        description="error of pressure in a cycle jump, root mean square over the contact and over the mean pressure",
+        description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
     )
     periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
-        default=None, description="stop when pressure repeats within this fraction of the mean pressure"
+        default=None, description="stop when pressure repeats within this fraction of its scale"
     )
 
 

@@ -8,7 +8,7 @@ from fenwear.cycle.follow import follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
-from fenwear.cycle.stability import critical_speed, growth_rate, stability_number
+from fenwear.cycle.stability import critical_speed, growth_rate, stability_number, stationary_growth
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
 
 __all__ = [
@@ -23,5 +23,6 @@ __all__ = [
     "march",
     "monotonic",
     "stability_number",
+    "stationary_growth",
     "steady",
 ]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
-from fenwear.cycle.moment import Moment
+from fenwear.cycle.state import RunState, pressure_scale
 from fenwear.sliding.wear import Worn
 
 
@@ -74,11 +74,11 @@ class Block:
         rigid: Amplitudes of the rigid modes there (k, modes).
         worn_area: Cross-section worn off the punch in it, the integral of its wear (k,), mm².
         worn_area_strip: The same of the strip (k,), mm².
-        optimum_distance: Largest distance to the optimal pressure of the present contact zone,
-            over the mean pressure (k,).
+        optimum_distance: Largest distance to the optimal pressure of the present contact zone, over the pressure
+            scale, see `fenwear.cycle.state.pressure_scale` (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
-            mean pressure (k,); NaN in the first cycle.
-        equilibrium_error: Largest error of the force and moment balance relative to the load (k,).
+            pressure scale (k,); NaN in the first cycle.
+        equilibrium_error: Largest error of the force and moment balance relative to the contact force (k,).
         retries: What had to be solved in another way in it, a count (k,).
         heat: Temperatures and heat balance; None without heat.
         remedies: How it was solved then, and how often.
@@ -101,7 +101,7 @@ class Block:
     retries: NDArray[np.int64]
     heat: BlockHeat | None = field(default=None, kw_only=True)
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
-    end: Moment = field(kw_only=True)
+    end: RunState = field(kw_only=True)
 
     def __len__(self) -> int:
         return len(self.half_cycle)
@@ -164,7 +164,7 @@ class Recorder:
         """
         middle = phases[len(phases) // 2]
         state, pressure = middle.contact, middle.contact.pressure[0]
-        scale = self.system.rigid.mean_pressure
+        scale = pressure_scale(self.system, np.array([p.contact.pressure[0] for p in phases]))
         direction = self.system.motion.phases[middle.phase].direction
         change = max(
             float("nan") if p.before is None else float(np.abs(p.contact.pressure[0] - p.before).max()) / scale
@@ -182,10 +182,10 @@ class Recorder:
         return change
 
     def _balance(self, record: PhaseRecord) -> float:
-        """Return the largest error of the force and moment balance relative to the load."""
+        """Return the largest error of the force and moment balance relative to the contact force."""
         equilibrium = self.system.interfaces[record.phase].rigid
-        lengths = self.system.mode_lengths
-        scale = lengths * self.system.rigid.mean_pressure * equilibrium.pair.weights.sum()
+        force = float(equilibrium.pair.weights @ record.contact.pressure[0])
+        scale = self.system.mode_lengths * (force or np.abs(equilibrium.resultant).max(initial=0.0) or 1.0)
         known = self._equilibria.get(record.phase)
         if known is None or known[0] is not record.friction_ratio:
             self._equilibria[record.phase] = known = (
@@ -200,7 +200,7 @@ class Recorder:
         """Whether the block is as large as asked for."""
         return len(self._rows) >= self.size
 
-    def take(self, end: Moment) -> Block:
+    def take(self, end: RunState) -> Block:
         """Return the block that ends with `end`, and begin the next one."""
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
         heat = None

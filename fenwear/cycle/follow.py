@@ -20,16 +20,16 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, preparation
 from fenwear.compat import interpolation_points
 from fenwear.cycle.block import Block
-from fenwear.cycle.moment import Moment
+from fenwear.cycle.state import RunState
 from fenwear.heat.exchange import HeatExchange, State
 
-# Runs a system from a moment, or the beginning, and leaves at the first moment for which it is told to.
-Integrate = Callable[[Tribosystem, Moment | None, Callable[[Moment], bool]], Iterator[Block]]
+# Runs a system from a state, or the beginning, and leaves at the first state for which it is told to.
+Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
 Exchange = Callable[[Tribosystem], HeatExchange | None]
 
 
 def follow(
-    system: Tribosystem, integrate: Integrate, exchange: Exchange, start: Moment | None = None
+    system: Tribosystem, integrate: Integrate, exchange: Exchange, start: RunState | None = None
 ) -> Iterator[Block]:
     """Yield the blocks of a run whose meshes follow large wear; collective. Each block knows its system.
 
@@ -43,16 +43,16 @@ def follow(
         ConvergenceError: as `integrate`.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    moment = start
+    state = start
     while True:
-        if moment is not None and system.outworn(moment.worn):  # a run may also go on from just there
-            moved = assemble(system.case, system.comm, moment.worn, heat=preparation(system))
-            moment = replace(moment, temperature=_carried(moment.temperature, (system, moved), exchange))
+        if state is not None and system.outworn(state.worn):  # a run may also go on from just there
+            moved = assemble(system.case, system.comm, state.worn, heat=preparation(system))
+            state = replace(state, temperature=_carried(state.temperature, (system, moved), exchange))
             system = moved
-        for block in integrate(system, moment, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
+        for block in integrate(system, state, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
             yield block
-            moment = block.end
-        if moment is None or not system.outworn(moment.worn):
+            state = block.end
+        if state is None or not system.outworn(state.worn):
             return
 
 

@@ -1,39 +1,57 @@
 """Cycle jumps: N cycles in one implicit step, N chosen by an error estimate.
 
-All phases of a cycle stand in one inequality with the wear of N cycles at their own pressures:
+A cycle takes the state y, the worn depths and the temperatures, to y + F(y). Let y(n) be smooth and meet
+the states of a march at whole numbers n of cycles: y(n + 1/2) changes by F(y(n)), so that to second order
 
-    gap_k = S_k p_k + H a_k + g_k + w_n + N beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
+    dy/dn = f(y) = F(y - f(y) / 2):
 
-and, with heat, the thermal gap at the end of N cycles, which is linear in the same pressures. It is
-stable for any N. A step is made whole and in two halves; their difference in pressure is the error
-estimate, and the halves are kept.
+the cycle with the middle y begins half a cycle's change before it. One jump is a step of the two-stage,
+second-order, L-stable and stiffly accurate Runge-Kutta method (SDIRK; Alexander, SIAM J. Numer. Anal.
+14, 1977) with g = 1 - 1/sqrt(2):
+
+    y_1 = y + g N f(y_1),    y_2 = y + (1 - g) N f(y_1) + g N f(y_2).
+
+Its weights 1 - g and g are positive, so that no depth decreases, and its end y_2 is itself a solved
+contact. A stage solves contact, wear and heat together: all phases of a cycle stand in one inequality
+with the wear of h = g N cycles at their own pressures,
+
+    gap_k = S_k p_k + H a_k + g_k + w_n + h beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
+
+and, with heat, the thermal gap at the end of each phase, which is linear in the same pressures. Its
+cycle begins at h - 1/2 cycles. Friction, wear and conductance are those of the stage itself: the
+pressure of each phase, and the temperature at its start. All phases meet the shape in the middle of the
+cycle, where those of a march come one after the other: they differ by the wear of half a cycle, as an
+explicit march does from an implicit one.
+
+A jump is made whole and in two halves. A third of their difference is the error estimate of the halves,
+which are kept: of the depths, of the pressures and of the temperatures.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
+from scipy.stats import wasserstein_distance
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
+from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
-from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
-from fenwear.cycle.moment import Moment, beginning, joined, parted
+from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord
+from fenwear.cycle.coupled import Coupled
+from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Watch, drive, unwatched
+from fenwear.cycle.state import RunState, beginning, joined, parted
 from fenwear.errors import ConvergenceError
-from fenwear.heat.periodic import CycleHeat
 from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn, WornLayer
 
+GAMMA = 1 - np.sqrt(0.5)
+ORDER = 2
 PARTS = 8  # of a cycle that does not converge as a whole
-MAX_ITERATIONS = 60  # of contact with the nodes that conduct
-CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
-
-# Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), from a start.
-SolveContact = Callable[[Array, Array, ContactState], ContactState]
+SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
 
 
 def jump(
@@ -42,133 +60,179 @@ def jump(
     *,
     tolerance: float,
     periodic_within: float | None = None,
-    block: int = 200,
-    start: Moment | None = None,
+    block: int = BLOCK,
+    start: RunState | None = None,
     stops: frozenset[int] = frozenset(),
-    leave: Callable[[Moment], bool] = lambda _: False,
+    leave: Callable[[RunState], bool] = lambda _: False,
+    watch: Watch = unwatched,
 ) -> Iterator[Block]:
     """Yield the last cycle of every jump, in blocks; collective.
 
     Args:
         system: The assembled problem.
         half_cycles: Where to end, a whole number of cycles.
-        tolerance: Largest error of pressure in one jump, root mean square over the contact and over the mean pressure.
-        periodic_within: Stop when the pressure changes per cycle by less than this fraction of the
-            mean pressure.
-        block: Half-cycles in a block.
+        tolerance: Largest estimated error of one jump, see `Estimate`.
+        periodic_within, block, leave, watch: As of `fenwear.cycle.driver.Course`; the change per cycle counts.
         start: Where to go on from, such as the end of a block; by default the beginning.
-        stops: Half-cycles at which a jump and a block end in any case.
-        leave: Ends the run at the first moment for which it is true.
+        stops: Half-cycles at which a jump and a block end in any case, or the cycle they are in.
 
     Raises:
         ConvergenceError: the shortest jump did not converge; what came before it is yielded.
+        InterruptedRunError: as `watch`.
     """
     strokes = system.motion.half_cycles
-    stepper = _Stepper(system)
-    cycles = half_cycles // strokes
-    ends = sorted({-(-stop // strokes) for stop in stops} | {cycles})
-    moment = start or stepper.beginning()
-    recorder = Recorder(system, block)
-    done, length = moment.half_cycle // strokes, moment.jump_length
-    while done < cycles:
-        tried = min(length, next(end for end in ends if end > done) - done)
-        try:
-            end, estimate = stepper.attempt(moment, tried, tolerance)
-        except ConvergenceError as error:
-            if tried > 1:
-                system.remedies.note(SHORTER_JUMPS)
+    stepper = _Stepper(system, watch)
+    whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
+    course = Course(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watch)
+    yield from drive(system, _Jumps(stepper, tolerance), start or stepper.beginning(), course)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated error of a jump.
+
+    Attributes:
+        depth: Of the worn depths over what the jump wears, both integrated over the surfaces; so the errors of
+            all jumps add up to at most the largest of them times the depth.
+        pressure: How far the contact force lies from where it should, over the width in contact, in the worst phase.
+        temperature: Of the contact surfaces over their rise from the initial one, root mean squares.
+    """
+
+    depth: float
+    pressure: float
+    temperature: float
+
+    @property
+    def largest(self) -> float:
+        """The largest of the three."""
+        return max(self.depth, self.pressure, self.temperature)
+
+
+class _Jumps:
+    """Steps of as many cycles as the tolerance allows."""
+
+    def __init__(self, stepper: _Stepper, tolerance: float) -> None:
+        self.stepper, self.tolerance = stepper, tolerance
+
+    def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next jump that is accurate enough, and its last cycle."""
+        stepper, tolerance = self.stepper, self.tolerance
+        strokes = stepper.system.motion.half_cycles
+        length, left = state.jump_length, (until - state.half_cycle) // strokes
+        while True:
+            tried = min(length, left)
+            try:
+                end, estimate = stepper.attempt(state, tried)
+            except ConvergenceError:
+                if tried == 1:
+                    raise
+                stepper.system.remedies.note(SHORTER_JUMPS)
                 length = max(1, tried // 4)
                 continue
-            if recorder:
-                yield recorder.take(moment)
-            raise ConvergenceError(f"half-cycle {done * strokes + 1}: {error}") from error
-        factor = 0.9 * np.sqrt(tolerance / max(estimate, 1e-300))
-        if estimate > tolerance and tried > 1:
-            length = max(1, int(tried * max(0.2, factor)))
-            continue
-        done += tried
+            factor = SAFETY * (tolerance / max(estimate.largest, 1e-300)) ** (1 / (ORDER + 1))
+            if estimate.largest <= tolerance or tried == 1:
+                break
+            # A half is half made already.
+            length = max(1, int(tried * min(0.5, max(LEAST, factor))))
         if tried == length or factor < 1:  # a step cut short by an end says little of the next length
-            length = max(1, int(tried * min(5.0, factor)))
-        end = replace(end, half_cycle=done * strokes, jump_length=length)
-        change = stepper.record(recorder, moment, end, tried)
-        moment = end
-        finished = (periodic_within is not None and change < periodic_within) or leave(moment)
-        if recorder.full or finished or done in ends:
-            yield recorder.take(moment)
-        if finished:
-            return
+            length = max(1, int(tried * min(MOST, max(LEAST, factor))))
+            if factor > 1 and tried < 4:
+                length = max(length, tried + 1)
+        after = RunState(state.half_cycle + tried * strokes, end.worn, end.contacts, end.temperature, length)
+        return after, stepper.last_cycle(state, after, tried)
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,) and depths."""
+
+    contact: ContactState
+    heated: Array
+    worn: Worn
 
 
 class _Stepper:
     """Implicit steps of any number of cycles."""
 
-    def __init__(self, system: Tribosystem) -> None:
-        self.system = system
+    def __init__(self, system: Tribosystem, watch: Watch = unwatched) -> None:
+        self.system, self.watch = system, watch
         self.contact = system.phase_contact(range(len(system.motion.phases)))
-        self.heat = cycle_heat(system)
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
+        self.coupled = Coupled(system, self.take)
+        self._heated: Array = np.zeros(0)  # by the last cycle
+        self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
 
-    def beginning(self) -> Moment:
+    def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
-        return beginning(self.system, None if self.heat is None else self.heat.exchange.initial())
+        return beginning(self.system, None if self.coupled.heat is None else self.coupled.heat.exchange.initial())
 
-    def attempt(self, moment: Moment, cycles: int, tolerance: float) -> tuple[Moment, float]:
-        """Return the moment `cycles` cycles later, by two steps, and an estimate of its error.
+    def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate]:
+        """Return the state `cycles` cycles later, by two steps, and an estimate of its error.
 
         Raises:
             ConvergenceError: it did not converge; a single cycle not in smaller steps either.
         """
         try:
-            whole, halves = self.step(moment, cycles), self.steps(moment, cycles, 2)
+            known, self._half = self._half, None
+            whole = known[2] if known and known[0] is state and known[1] == cycles else self.step(state, cycles)
+            half = self.step(state, cycles / 2)
+            self._half = (state, cycles / 2, half)
+            return (halves := self.step(half, cycles / 2)), _estimate(self.system, state, whole, halves)
         except ConvergenceError as error:
             if cycles > 1:
                 raise
             try:
-                parts = self.steps(moment, cycles, PARTS)
+                parts = self.steps(state, cycles, PARTS)
             except ConvergenceError:
                 raise error from None
             self.system.remedies.note(SMALLER_STEPS.format(PARTS))
-            return parts, tolerance
-        return halves, _difference(self.system, whole, halves)
+            return parts, Estimate(np.inf, np.inf, np.inf)
 
-    def steps(self, moment: Moment, cycles: float, count: int) -> Moment:
-        """Return the moment `cycles` cycles later, by that many equal steps."""
+    def steps(self, state: RunState, cycles: float, count: int) -> RunState:
+        """Return the state `cycles` cycles later, by that many equal steps."""
         for _ in range(count):
-            moment = self.step(moment, cycles / count)
-        return moment
+            state = self.step(state, cycles / count)
+        return state
 
-    def step(self, moment: Moment, cycles: float) -> Moment:
-        """Return the moment `cycles` cycles later."""
-        if not self.system.constant_coefficients:
-            self._update(moment)
-        layer = WornLayer(self.wear, cycles)
-        phases = range(len(self.ratios))
-        gap = np.array([self.system.gap(phase, moment.worn) for phase in phases])
-        contact, temperature = joined(moment.contacts), moment.temperature
-        if self.heat is None or temperature is None or contact is None:
-            # With heat this is the first step: which nodes conduct is seen from the contact without it.
-            contact = self.contact.solve(gap, contact, layer)
-        if self.heat is not None and temperature is not None:
-            contact, end = solve_with_heat(
-                self.heat,
-                np.concatenate(temperature),
-                cycles,
-                contact,
-                lambda thermal, coupling, start: self.contact.solve(gap + thermal, start, layer, coupling),
-                self.system.rigid.mean_pressure,
-            )
-            temperature = self.heat.parts(end)
-        worn = moment.worn + self.wear.worn(contact.pressure).times(cycles)
-        return Moment(moment.half_cycle, worn, parted(contact), temperature)
+    def step(self, state: RunState, cycles: float) -> RunState:
+        """Return the state `cycles` cycles later, by the two stages of one step."""
+        share = GAMMA * cycles
+        rest = cycles - share
+        temperature = None if state.temperature is None else np.concatenate(state.temperature)
+        first = self._stage(state.worn, temperature, joined(state.contacts), share)
+        between = None if temperature is None else temperature + rest * first.heated
+        worn = state.worn + first.worn.times(rest)
+        second = self._stage(worn, between, first.contact, share)
+        end = None
+        if self.coupled.heat is not None and between is not None:
+            end = self.coupled.heat.parts(between + share * second.heated)
+            self._heated = second.heated
+        return RunState(state.half_cycle, worn + second.worn.times(share), parted(second.contact), end)
 
-    def _update(self, moment: Moment) -> None:
-        """Take friction and wear at the pressures and temperatures at the start of the step."""
-        surfaces = None
-        if self.heat is not None and moment.temperature is not None:
-            surfaces = self.heat.exchange.contact_temperatures(moment.temperature)
-        pressures = [None if contact is None else contact.pressure[0] for contact in moment.contacts]
-        self.take([self.system.conditions(k, pressure, surfaces) for k, pressure in enumerate(pressures)])
+    def _stage(self, worn: Worn, temperature: Array | None, start: ContactState | None, cycles: float) -> _Stage:
+        """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0."""
+        gap = np.array([self.system.gap(phase, worn) for phase in range(len(self.ratios))])
+        if start is None:  # the first of all: what conducts is seen from the contact without heat
+            start = self._solve(gap, None, cycles)
+        contact, begin = self.coupled.solve(
+            temperature,
+            cycles - 0.5,
+            start,
+            lambda thermal, coupling, near: self._solve(
+                gap if thermal is None else gap + thermal, near, cycles, coupling
+            ),
+        )
+        heated: Array = np.zeros(0)
+        if begin is not None:
+            heated = self.coupled.through(begin, contact.pressure)[-1] - begin
+        return _Stage(contact, heated, self.wear.worn(contact.pressure))
+
+    def _solve(
+        self, gap: Array, start: ContactState | None, cycles: float, coupling: Array | None = None
+    ) -> ContactState:
+        self.watch()
+        return self.contact.solve(gap, start, WornLayer(self.wear, cycles), coupling)
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""
@@ -179,13 +243,10 @@ class _Stepper:
         self.ratios = system.friction_ratios(conditions)
         if isinstance(self.contact, CondensedContact):
             self.contact.slide(self.ratios)
-        if self.heat is not None:
-            mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
-            self.heat = CycleHeat(self.heat.exchange.with_friction(mu))
 
-    def record(self, recorder: Recorder, before: Moment, after: Moment, cycles: int) -> float:
-        """Record the half-cycles of the last cycle; return the largest change of pressure per cycle."""
-        motion, changes = self.system.motion, []
+    def last_cycle(self, before: RunState, after: RunState, cycles: int) -> list[HalfCycle]:
+        """Return the half-cycles of the last cycle of a jump."""
+        motion, found = self.system.motion, []
         contacts = [_present(contact) for contact in after.contacts]
         heats = self._last_cycle_heat(after)
         # Half-cycles after one have worn what is missing at its end.
@@ -200,8 +261,8 @@ class _Stepper:
             number = after.half_cycle - (motion.half_cycles - 1 - stroke)
             own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
             heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
-            changes.append(recorder.add(number, records, depth, heat))
-        return max(changes)
+            found.append(HalfCycle(number, records, depth, heat))
+        return found
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState]) -> Worn:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
@@ -214,67 +275,65 @@ class _Stepper:
         areas = self.wear.some([phase]).worn_area(contact.pressure)
         return PhaseRecord(phase, contact, previous, areas, self.ratios[phase])
 
-    def _last_cycle_heat(self, moment: Moment) -> list[HalfCycleHeat | None]:
-        """Return the heat of one more cycle at the pressures of the moment."""
-        if self.heat is None or moment.temperature is None:
-            return [None] * len(moment.contacts)
+    def _last_cycle_heat(self, state: RunState) -> list[HalfCycleHeat | None]:
+        """Return the heat of the cycle that ends with the state."""
+        if self.coupled.heat is None or state.temperature is None:
+            return [None] * len(state.contacts)
         heats: list[HalfCycleHeat | None] = []
-        exchange, state = self.heat.exchange, moment.temperature
-        for phase, contact in enumerate(moment.contacts):
+        exchange = self.coupled.heat.exchange
+        temperature = self.coupled.heat.parts(np.concatenate(state.temperature) - self._heated)
+        for phase, contact in enumerate(state.contacts):
             pressure = _present(contact).pressure[0]
-            state, terms = exchange.half_cycle(state, phase, pressure, exchange.conductance(pressure))
-            heats.append(HalfCycleHeat(*exchange.contact_temperatures(state), terms, 1))
+            conductance = exchange.conductance(pressure)
+            temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
+            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature), terms, 1))
         return heats
 
 
-def cycle_heat(system: Tribosystem) -> CycleHeat | None:
-    """Return the heat of whole cycles; None without heat."""
-    exchange = with_reduced_heat(system).exchange
-    return None if exchange is None else CycleHeat(exchange)
-
-
-def solve_with_heat(
-    heat: CycleHeat,
-    temperature: Array,
-    cycles: float,
-    start: ContactState,
-    solve: SolveContact,
-    mean_pressure: float,
-) -> tuple[ContactState, Array]:
-    """Return contact and temperature after `cycles` cycles, with the nodes that conduct in contact.
-
-    Raises:
-        ConvergenceError: nodes open and close in turn.
-    """
-    contact, pressure, share = start, start.pressure, 1.0
-    for iteration in range(MAX_ITERATIONS):
-        conductances = heat.conductances(pressure)
-        end = heat.jump(temperature, cycles, conductances)
-        contact = solve(end.gap, end.coupling, contact)
-        settled = np.array_equal(heat.conductances(contact.pressure), conductances, equal_nan=True)
-        change = contact.pressure - pressure
-        if settled or np.abs(change).max() < CLOSE * mean_pressure:
-            return contact, end.state(contact.pressure)
-        if iteration > 15:  # go half way
-            share = 0.5
-        pressure = pressure + share * change
-    raise ConvergenceError(
-        f"contact and the nodes that conduct did not come together in {MAX_ITERATIONS} iterations; "
-        'set heat.conducting = "nominal"'
+def _estimate(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:
+    """Return the error of two half steps from their difference to the whole one, by Richardson."""
+    weights, strip = system.pair.weights, system.pair.strip.weights
+    apart, step = whole.worn - halves.worn, halves.worn - before.worn
+    wrong, worn = (weights @ np.abs(w.punch) + strip @ np.abs(w.strip) for w in (apart, step))
+    pressure = max(
+        _force_difference(system, _present(one).pressure[0], _present(other).pressure[0])
+        for one, other in zip(whole.contacts, halves.contacts, strict=True)
+    )
+    share = 1 / (2**ORDER - 1)
+    return Estimate(
+        share * wrong / max(worn, 1e-300), share * pressure, share * _heat_difference(system, whole, halves)
     )
 
 
-def _difference(system: Tribosystem, one: Moment, other: Moment) -> float:
-    """Return the root mean square of the pressures' difference over what is in contact, over the mean pressure there.
+def _force_difference(system: Tribosystem, first: Array, second: Array) -> float:
+    """Return how far the force of one pressure (n,) lies from that of another, over the extent of the contact.
 
-    Not the largest: that is the whole pressure of the one node which is in contact here and not there.
+    The Wasserstein distance of the two distributions, and the difference of their forces. Not a norm of the pressures'
+    difference: a node at the edge closes as soon as the shape changes by what a node gives way, and a norm would be
+    that of this node alone.
     """
-    weights, largest = system.pair.weights, 0.0
-    for a, b in zip(one.contacts, other.contacts, strict=True):
-        first, second = _present(a).pressure[0], _present(b).pressure[0]
-        width = float(weights @ (np.maximum(first, second) > 0))
-        largest = max(largest, float(weights @ (first - second) ** 2) * width)
-    return float(np.sqrt(largest) / (system.rigid.mean_pressure * weights.sum()))
+    x, weights = system.pair.punch.x, system.pair.weights
+    forces = [weights * first, weights * second]
+    one, other = (float(force.sum()) for force in forces)
+    if min(one, other) <= 0:
+        return float(max(one, other) > 0)
+    touched = x[(first > 0) | (second > 0)]
+    width = max(float(np.ptp(touched, axis=0).max()), float(weights.min()))
+    moved = max(float(wasserstein_distance(along, along, *forces)) for along in x.T)  # along each axis
+    return moved / width + abs(one - other) / max(one, other)
+
+
+def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> float:
+    """Return the difference of the contact temperatures over their rise; 0 without heat."""
+    exchange = with_reduced_heat(system).exchange
+    if exchange is None or one.temperature is None or other.temperature is None:
+        return 0.0
+    first, second, initial = (
+        np.array(exchange.contact_temperatures(t)) for t in (one.temperature, other.temperature, exchange.initial())
+    )
+    weights = system.pair.weights
+    apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
+    return apart / max(rise, 1e-300)
 
 
 def _present(contact: ContactState | None) -> ContactState:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import reduce
 
 from fenwear.assembly import Tribosystem
-from fenwear.cycle.block import Block, HalfCycleHeat, Recorder
-from fenwear.cycle.moment import Moment, beginning
+from fenwear.cycle.block import Block, HalfCycleHeat
+from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Watch, drive, unwatched
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
+from fenwear.cycle.state import RunState, beginning
 from fenwear.errors import ConvergenceError
-
-BLOCK = 200
 
 
 def march(
@@ -22,9 +21,10 @@ def march(
     implicit: bool = False,
     periodic_within: float | None = None,
     block: int = BLOCK,
-    start: Moment | None = None,
+    start: RunState | None = None,
     stops: frozenset[int] = frozenset(),
-    leave: Callable[[Moment], bool] = lambda _: False,
+    leave: Callable[[RunState], bool] = lambda _: False,
+    watch: Watch = unwatched,
 ) -> Iterator[Block]:
     """Yield all half-cycles, in blocks; collective.
 
@@ -35,54 +35,53 @@ def march(
         system: The assembled problem.
         half_cycles: The last one at most.
         implicit: Which of the two steps.
-        periodic_within: Stop when in a whole cycle the pressure differs from the cycle before by
-            less than this fraction of the mean pressure.
-        block: Half-cycles in a block.
+        periodic_within, block, stops, leave, watch: As of `fenwear.cycle.driver.Course`.
         start: Where to go on from, such as the end of a block; by default the beginning.
-        stops: Half-cycles at which a block ends in any case.
-        leave: Ends the run at the first moment for which it is true.
 
     Raises:
         ConvergenceError: a half-cycle, which it names, did not converge; all before it are yielded.
+        InterruptedRunError: as `watch`.
     """
-    motion, exchange = system.motion, system.exchange
-    steps = [PhaseStep(system, phase, implicit=implicit) for phase in range(len(motion.phases))]
-    moment = start or beginning(system, None if exchange is None else exchange.initial())
-    smaller = SmallerSteps(system, implicit=implicit)
-    recorder = Recorder(system, block)
-    for half_cycle in range(moment.half_cycle + 1, half_cycles + 1):
-        first = (half_cycle - 1) % motion.half_cycles * motion.positions
+    exchange = system.exchange
+    state = start or beginning(system, None if exchange is None else exchange.initial())
+    course = Course(half_cycles, periodic_within, block, stops, leave, watch)
+    yield from drive(system, _HalfCycles(system, watch, implicit=implicit), state, course)
+
+
+class _HalfCycles:
+    """Steps of one half-cycle."""
+
+    def __init__(self, system: Tribosystem, watch: Watch, *, implicit: bool) -> None:
+        self.system, self.watch = system, watch
+        phases = range(len(system.motion.phases))
+        self.steps = [PhaseStep(system, phase, implicit=implicit) for phase in phases]
+        self.smaller = SmallerSteps(system, implicit=implicit)
+
+    def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next half-cycle, and its record."""
+        motion = self.system.motion
+        first = state.half_cycle % motion.half_cycles * motion.positions
         phases = range(first, first + motion.positions)
         try:
-            ends = _half_cycle(steps, moment, phases, smaller)
+            ends = self._whole(state, phases)
         except ConvergenceError as error:
-            if recorder:
-                yield recorder.take(moment)
-            raise ConvergenceError(f"half-cycle {half_cycle}: {error}") from error
-        worn, contacts = moment.worn, list(moment.contacts)
+            ends = self.smaller.half_cycle(state, phases, error)
+        worn, contacts = state.worn, list(state.contacts)
         for phase, end in zip(phases, ends, strict=True):
             worn, contacts[phase] = worn + end.worn, end.record.contact
         heats = [end.heat for end in ends if end.heat is not None]
         heat = reduce(HalfCycleHeat.then, heats) if heats else None
-        change = recorder.add(half_cycle, [end.record for end in ends], worn, heat)
-        repeats = periodic_within is not None and change < periodic_within
-        periodic = moment.periodic_phases + 1 if repeats else 0
-        moment = Moment(half_cycle, worn, tuple(contacts), ends[-1].temperature, periodic_phases=periodic)
-        finished = periodic >= motion.half_cycles or leave(moment)
-        if recorder.full or finished or half_cycle == half_cycles or half_cycle in stops:
-            yield recorder.take(moment)
-        if finished:
-            return
+        number = state.half_cycle + 1
+        after = RunState(number, worn, tuple(contacts), ends[-1].temperature)
+        return after, [HalfCycle(number, [end.record for end in ends], worn, heat)]
 
-
-def _half_cycle(steps: Sequence[PhaseStep], moment: Moment, phases: range, smaller: SmallerSteps) -> list[PhaseEnd]:
-    """Return the ends of the phases of a half-cycle, in smaller steps where it must be."""
-    worn, temperature, ends = moment.worn, moment.temperature, []
-    try:
-        for phase in phases:
-            end = steps[phase].solve(temperature, worn, moment.contacts[phase])
+    def _whole(self, state: RunState, phases: range) -> list[PhaseEnd]:
+        """Return the ends of the phases of a half-cycle, each solved as a whole."""
+        worn, temperature, ends = state.worn, state.temperature, []
+        for place, phase in enumerate(phases):
+            if place:
+                self.watch()
+            end = self.steps[phase].solve(temperature, worn, state.contacts[phase])
             worn, temperature = worn + end.worn, end.temperature
             ends.append(end)
-    except ConvergenceError as error:
-        return smaller.half_cycle(moment, phases, error)
-    return ends
+        return ends

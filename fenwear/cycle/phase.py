@@ -10,13 +10,19 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
+from fenwear.cycle.fixed_point import fixed_point
+from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
 
-MAX_ITERATIONS = 60  # of coefficients and the pressure they depend on
-CLOSE = 1e-9  # change of pressure over the mean pressure that ends them
+CLOSE = 1e-9  # change of pressure over its scale that ends the iterations of coefficients and pressure
+COEFFICIENTS_FAIL = (
+    "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
+    "they depend on did not come together"
+)
+_Solved = tuple[ContactState, State | None, HalfCycleHeat | None, PhasesWear]
 
 
 @dataclass(frozen=True)
@@ -63,23 +69,27 @@ class PhaseStep:
         gap = self.system.gap(self.phase, worn)
         if self.system.constant_coefficients:
             return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
-        start, pressure = before, None if before is None else before.pressure[0]
-        for _ in range(MAX_ITERATIONS):
+        start = before
+
+        def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
+            nonlocal start
             wear = self._update(pressure, temperature)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
             except ConvergenceError as error:
                 largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
                 raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
-            start, found = contact, contact.pressure[0]
-            change = np.inf if pressure is None else np.abs(found - pressure).max()
-            pressure = found if pressure is None else (pressure + found) / 2  # a coefficient of p would go to and fro
-            if change < CLOSE * self.system.rigid.mean_pressure:
-                return self._end(contact, after, heat, before, wear)
-        raise ConvergenceError(
-            f"the coefficients of friction and wear and the pressure they depend on did not come together in "
-            f"{MAX_ITERATIONS} iterations: a weaker dependence on p, or a smoother table may help"
+            start = contact
+            return contact.pressure[0], (contact, after, heat, wear), False
+
+        mean = np.full(len(gap), self.system.rigid.mean_pressure)
+        contact, after, heat, wear = fixed_point(
+            solve,
+            mean if before is None else before.pressure[0],
+            lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
+            COEFFICIENTS_FAIL,
         )
+        return self._end(contact, after, heat, before, wear)
 
     def _update(self, pressure: Array | None, temperature: State | None) -> PhasesWear:
         """Take friction and wear at this pressure and at the temperature at the start of the phase."""

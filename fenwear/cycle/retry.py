@@ -13,8 +13,8 @@ import numpy as np
 from fenwear.assembly import Tribosystem, in_parts
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
-from fenwear.cycle.moment import Moment
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
+from fenwear.cycle.state import RunState
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.remedies import SMALLER_STEPS
@@ -35,11 +35,11 @@ class SmallerSteps:
         self.system, self.implicit = system, implicit
         self._steps: dict[int, tuple[Tribosystem, list[PhaseStep]]] = {}
 
-    def half_cycle(self, moment: Moment, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
+    def half_cycle(self, state: RunState, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle.
 
         Args:
-            moment: At its start.
+            state: At its start.
             phases: Their numbers in the cycle.
             error: Why it is not solved as a whole.
 
@@ -48,19 +48,19 @@ class SmallerSteps:
         """
         for parts in PARTS:
             try:
-                ends = self._in_parts(moment, phases, parts)
+                ends = self._in_parts(state, phases, parts)
             except ConvergenceError:
                 continue
             self.system.remedies.note(SMALLER_STEPS.format(parts * len(phases)))
             return ends
         raise error
 
-    def _in_parts(self, moment: Moment, phases: range, parts: int) -> list[PhaseEnd]:
+    def _in_parts(self, state: RunState, phases: range, parts: int) -> list[PhaseEnd]:
         system, steps = self._prepared(parts)
-        temperature = _carried(moment.temperature, self.system, system)
-        worn, ends = moment.worn, []
+        temperature = _carried(state.temperature, self.system, system)
+        worn, ends = state.worn, []
         for phase in phases:
-            before = moment.contacts[phase]
+            before = state.contacts[phase]
             contact, own = before, []
             for step in steps[phase * parts : (phase + 1) * parts]:
                 end = step.solve(temperature, worn, contact)

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
 import numpy as np
 import scipy.linalg
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, steady_exchange
-from fenwear.cycle.jump import cycle_heat
+from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
+from fenwear.cycle.coupled import cycle_heat
+from fenwear.errors import CaseError, ConvergenceError
+from fenwear.heat.exchange import State
+from fenwear.heat.periodic import CycleHeat
+from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import PhasesWear
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
+MAX_ITERATIONS = 60  # of friction and the temperatures that it depends on
+CLOSE = 1e-10  # change of these temperatures over their range that ends them
+APART = 0.1  # what a nearly stationary state may be away from itself a cycle later, or from its own temperatures
+STEP, MAX_HALVINGS, SETTLED = 1.0, 10, 1e-6  # of differences to temperatures, K; of their steps; of the slopes
 
 
 def stability_number(system: Tribosystem) -> float:
@@ -50,43 +62,265 @@ def growth_rate(system: Tribosystem, pressure: Array) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
-    cycle's map of temperature and worn depth is linearised around the given pressures with the same
-    nodes in contact and implicit wear, and its eigenvalue largest in size taken: ln |lambda| over the
-    duration of a cycle. A rigid motion of the worn shape changes nothing, nor does the shape where
+    state is that of the given pressures and of the temperatures that repeat under them. The cycle's map
+    of temperature and worn depth is linearised there, friction, wear and conductance with it, for the
+    same nodes in contact and implicit wear, and its eigenvalue largest in size taken: ln |lambda| over
+    the duration of a cycle. A rigid motion of the worn shape changes nothing, nor does the shape where
     nothing touches; these disturbances (lambda = 1) do not count.
 
     Args:
         system: The assembled problem.
         pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
+
+    Raises:
+        CaseError: a coefficient is negative or not finite there.
+        ConvergenceError: friction and the temperatures that it depends on do not come together.
     """
-    heat = cycle_heat(system)
+    heat, states = repeating_temperatures(system, pressure)
     n = pressure.shape[1]
     dim = 0 if heat is None else heat.gap_rows.shape[1]
-    maps = None if heat is None else heat.maps(heat.conductances(pressure))
-    left, right = system.phases_wear.border(pressure)
-    ratios = system.friction_ratios()
     cycle = np.eye(dim + n)
-    for phase, interface in enumerate(system.interfaces):
-        change = np.zeros((dim + n, dim + n))  # of temperature and depth over the phase
-        compliance = interface.compliance(ratios[phase])
-        disturbance = np.zeros((n, dim + n))
-        disturbance[:, dim:] = np.eye(n)
-        if heat is not None and maps is not None:
-            one = maps[phase]
-            disturbance[:, :dim] = heat.gap_rows @ one.propagator
-            compliance = compliance + heat.gap_rows @ one.response
-            change[:dim, :dim] = one.propagator
-        wear = left[phase] @ right[phase]  # depth by pressure
-        compliance = compliance + wear  # wear at the end of the phase: no step is too long
-        answer = -_restricted_stiffness(system, ratios[phase], compliance, pressure[phase] > 0) @ disturbance
-        if maps is not None:
-            change[:dim] += maps[phase].response @ answer
-        change[dim:, dim:] = np.eye(n)
-        change[dim:] += wear @ answer
-        cycle = change @ cycle
+    for phase in range(len(pressure)):
+        cycle = phase_tangent(system, phase, pressure[phase], heat, states[phase] if states else None) @ cycle
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
+
+
+def stationary_growth(
+    system: Tribosystem, pressure: Array, surfaces: tuple[Array, Array], phase: int, change: float
+) -> tuple[float | None, str]:
+    """Return the growth rate of a run's last state, or None with the reason why it has none; collective.
+
+    A state that itself changes about as fast as its disturbances grow has no growth rate, nor has one whose
+    temperatures are not yet those that repeat at its pressures.
+
+    Args:
+        system: The assembled problem.
+        pressure: Of each phase in the last cycle (phases, n), MPa.
+        surfaces: Temperatures of the punch's and the strip's surface at the end of the run (n,), K.
+        phase: The one that would come next.
+        change: Largest change of pressure in the last cycle over the mean pressure.
+    """
+    if not change < 1:
+        return None, "the last cycle is the first, or not like the one before"
+    try:
+        rate = growth_rate(system, pressure)
+        heat, states = repeating_temperatures(system, pressure)
+    except (CaseError, ConvergenceError) as error:
+        return None, str(error)
+    if heat is not None and states:
+        found = np.array(heat.exchange.contact_temperatures(states[phase]))
+        away = float(np.abs(found - surfaces).max())
+        scale = float(np.abs(found - heat.exchange.heat.initial).max())
+        if away > APART * scale:
+            return None, f"the temperatures are still {away:.3g} K away from those that its pressures would keep up"
+    drift = change / system.motion.period
+    if drift > APART * abs(rate):
+        return None, (
+            f"the pressures still change by {drift:.3g} of their mean a second, and its disturbances by {rate:.3g}"
+        )
+    return rate, ""
+
+
+def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleHeat | None, list[State]]:
+    """Return the heat of cycles and the temperatures that repeat at these pressures, before each phase; collective.
+
+    None where no law and no conductance depends on the state: then any temperatures do.
+
+    Raises:
+        ConvergenceError: there are none, or friction and the temperatures that it depends on do not come together.
+    """
+    heat = cycle_heat(system)
+    if heat is None:
+        return None, []
+    if system.constant_coefficients and heat.exchange.heat.conductance_per_pressure is None:
+        return heat, []
+    conductances = heat.conductances(pressure)
+    surfaces: list[tuple[Array, Array] | None] = [None] * len(pressure)
+    before = None
+    for _ in range(MAX_ITERATIONS):
+        if not system.friction.constant:
+            conditions = [system.conditions(k, pressure[k], surfaces[k]) for k in range(len(pressure))]
+            mu = np.array([heating_friction(system, system.friction.values(c)) for c in conditions])
+            heat = CycleHeat(heat.exchange.with_friction(mu))
+        exchange = heat.exchange
+        try:
+            end = heat.jump(heat.initial(), np.inf, conductances)
+        except scipy.linalg.LinAlgError:
+            raise ConvergenceError("no temperatures repeat: the bodies lose heat nowhere") from None
+        states = [heat.parts(end.state(pressure))]
+        for phase in range(len(pressure) - 1):
+            states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])
+        surfaces = [exchange.contact_temperatures(state) for state in states]
+        found = np.array(surfaces)
+        if system.friction.constant:
+            return heat, states
+        if before is not None and np.abs(found - before).max() <= CLOSE * max(1.0, float(np.ptp(found))):
+            return heat, states
+        before = found
+    raise ConvergenceError(
+        f"friction and the temperatures that it depends on did not come together in {MAX_ITERATIONS} iterations at "
+        "these pressures: there is no state whose growth could be told"
+    )
+
+
+@dataclass(frozen=True)
+class _Laws:
+    """Friction and wear of a phase, and their derivatives to its pressure and to the temperatures at its start.
+
+    Attributes:
+        mu: (n,).
+        rate: What each node slides for a unit of the stroke's law (n,): friction heat is mu p times that.
+        mu_p: To the pressure of the same node (n,), 1/MPa.
+        mu_s: To the state of the heat (n, dim).
+        worn_p, worn_s: Of the gap that the wear of the phase opens (n, n) and (n, dim).
+    """
+
+    mu: Array
+    rate: Array
+    mu_p: Array
+    mu_s: Array
+    worn_p: Array
+    worn_s: Array
+
+
+def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None, state: State | None) -> _Laws:
+    n, conditions = len(pressure), system.conditions(phase, pressure)
+    speed, surfaces = conditions.speed, conditions.temperatures
+    if heat is not None and state is not None:
+        surfaces = heat.exchange.contact_temperatures(state)
+    around = (pressure, *surfaces)
+
+    def at(p: Array, punch: Array, strip: Array) -> ContactConditions:
+        return ContactConditions(p, speed, (punch, strip))
+
+    def friction(*values: Array) -> Array:
+        return system.friction.values(at(*values))
+
+    def depths(*values: Array) -> Array:
+        wear = system.wear.phases([at(*values)], [phase])
+        worn = (None if body is None else body.depth(values[0][None])[0] for body in (wear.punch, wear.strip))
+        return np.array([np.zeros(n) if depth is None else depth for depth in worn])
+
+    wear = system.wear.phases([at(*around)], [phase])
+    mu_p, *mu_t = _slopes(friction, around)
+    worn_p, *worn_t = (_opened(wear, slope) for slope in _slopes(depths, around))
+    picked = _picked(heat, n)
+    mu_s: Array = (np.array(mu_t)[:, :, None] * picked).sum(axis=0)
+    worn_s: Array = (np.array(worn_t) @ picked).sum(axis=0)
+    rate = heating_friction(system, np.ones(n))
+    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
+
+
+def phase_tangent(
+    system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None = None, state: State | None = None
+) -> Array:
+    """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
+
+    With changes ds, dw at its start and dp of its pressure, d(mu p) = (mu + p mu_p) dp + p mu_s ds,
+
+        ds' = P ds + Q d(mu p) + Q_h h_p dp,   dw' = dw + D_p dp + D_s ds,
+
+    and where nodes are in contact the gap stays closed at its end, and the load balanced:
+
+        dw' + G ds' + S dp + S_tau p dtau + H da = 0,   E dp + E_tau p dtau = 0.
+
+    Args:
+        system: The assembled problem.
+        phase: Its number in the cycle.
+        pressure: During it (n,), MPa.
+        heat: Of cycles, at the friction there; None without heat.
+        state: Temperatures at its start; None where nothing depends on them.
+    """
+    n, interface = len(pressure), system.interfaces[phase]
+    laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
+    dim = laws.mu_s.shape[1]
+    friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
+    by_mu = interface.compliance(further) - interface.compliance(friction_ratio)  # all are linear in mu
+    balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
+    traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
+    gap_rows: Array = np.zeros((n, dim))
+    state_s: Array = np.zeros((dim, dim))
+    state_p: Array = np.zeros((dim, n))
+    if heat is not None:
+        gap_rows = heat.gap_rows
+        state_s, state_p = _heated(heat, phase, pressure, state, laws)
+    closed = pressure > 0
+    k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
+    opened = interface.compliance(friction_ratio) + by_mu * traction_p + gap_rows @ state_p + laws.worn_p
+    matrix: Array = np.zeros((k + r, k + r))
+    matrix[:k, :k] = opened[np.ix_(closed, closed)] / scale
+    matrix[:k, k:] = rigid.rigid_normal[closed]
+    matrix[k:, :k] = (rigid.equilibrium(friction_ratio) + balance_by_mu * traction_p)[:, closed]
+    disturbance: Array = np.zeros((k + r, dim + n))
+    disturbance[:k, :dim] = (by_mu @ traction_s + gap_rows @ state_s + laws.worn_s)[closed] / scale
+    disturbance[:k, dim:] = np.eye(n)[closed] / scale
+    disturbance[k:, :dim] = balance_by_mu @ traction_s
+    answer: Array = np.zeros((n, dim + n))
+    answer[closed] = -np.linalg.solve(matrix, disturbance)[:k]
+    change: Array = np.zeros((dim + n, dim + n))
+    change[:dim, :dim], change[dim:, :dim], change[dim:, dim:] = state_s, laws.worn_s, np.eye(n)
+    change[:dim] += state_p @ answer
+    change[dim:] += laws.worn_p @ answer
+    return change
+
+
+def _heated(heat: CycleHeat, phase: int, pressure: Array, state: State | None, laws: _Laws) -> tuple[Array, Array]:
+    """Return the changes of the state at the end of a phase by those at its start, and by its pressure."""
+    exchange = heat.exchange
+    conductance = exchange.conductance(pressure)
+    unit = exchange.with_friction(np.tile(laws.rate, (len(exchange.friction), 1)))
+    by_power: Array = np.concatenate(unit.response(phase, conductance)[0])
+    by_state: Array = np.concatenate(exchange.propagate(phase, heat.parts(np.eye(heat.gap_rows.shape[1])), conductance))
+    by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
+    if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
+        rise = np.divide(exchange.conductance(pressure), pressure, out=np.zeros_like(pressure), where=pressure > 0)
+        by_pressure += np.concatenate(exchange.by_conductance(phase, state, pressure, conductance)) * rise
+    return by_state + by_power @ (pressure[:, None] * laws.mu_s), by_pressure
+
+
+def _picked(heat: CycleHeat | None, n: int) -> Array:
+    """Return the rows that pick the temperatures of the punch's and the strip's surface (2, n, dim)."""
+    if heat is None:
+        return np.zeros((2, n, 0))
+    dim = heat.gap_rows.shape[1]
+    rows = np.zeros((2, n, dim))
+    for body, (side, part) in enumerate(zip(heat.exchange.sides, heat.parts(np.eye(dim)), strict=True)):
+        rows[body] = side.contact_change(part)
+    return rows
+
+
+def _opened(wear: PhasesWear, slope: Array) -> Array:
+    """Return the gap (n, n) that depths worn off punch and strip open, for each unit at a node `slope` (2, n)."""
+    punch, strip = (
+        None if body is None else replace(body, rate=slope[k : k + 1], exponent=1.0)
+        for k, body in enumerate((wear.punch, wear.strip))
+    )
+    if punch is None and strip is None:
+        return np.zeros((slope.shape[1],) * 2)
+    left, right = replace(wear, punch=punch, strip=strip).border(slope[:1])
+    return np.asarray(left[0] @ right[0])
+
+
+def _slopes(law: Callable[..., Array], around: tuple[Array, Array, Array]) -> list[Array]:
+    """Return the derivatives of a law of (p, T_punch, T_strip), node by node, to each of them.
+
+    Central differences whose step is made smaller until it makes no difference; 0 where p is.
+    """
+    found = []
+    for which, value in enumerate(around):
+        step = 0.01 * value if which == 0 else np.full(len(value), STEP)
+        before: Array | None = None
+        for _ in range(MAX_HALVINGS):
+            ends = [law(*(v + sign * step if k == which else v for k, v in enumerate(around))) for sign in (1, -1)]
+            difference = ends[0] - ends[1]
+            slope = np.divide(difference, 2 * step, out=np.zeros_like(difference), where=step > 0)
+            if before is not None and np.abs(slope - before).max() <= SETTLED * np.abs(slope).max():
+                break
+            before, step = slope, step / 4
+        found.append(slope)
+    return found
 
 
 def _restricted_stiffness(system: Tribosystem, friction_ratio: Array, compliance: Array, closed: Mask) -> Array:

@@ -24,16 +24,17 @@ import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, heating_friction
+from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import DenseInequality
-from fenwear.cycle.jump import cycle_heat, jump, solve_with_heat
+from fenwear.cycle.coupled import Coupled
+from fenwear.cycle.jump import jump
+from fenwear.cycle.state import pressure_scale
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
-MAX_ITERATIONS, CLOSE = 60, 1e-9  # of coefficients that depend on the state; change of pressure over the mean
 ZERO = 1e-12  # of the largest: a velocity that is rounding
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
@@ -219,22 +220,7 @@ def steady(system: Tribosystem) -> Steady:
     problem = _SteadyInequality(system)
     for body in system.bodies.heat or ():
         body.check_heat_sink()
-    contact, heat, temperature = _solve(problem, cycle_heat(system))
-    pressure: Array | None = None
-    for _ in range(0 if system.constant_coefficients else MAX_ITERATIONS):
-        before = contact.pressure
-        pressure = before if pressure is None else (pressure + before) / 2  # a coefficient of p would go to and fro
-        conditions = _conditions(system, pressure, heat, temperature)
-        problem.take(conditions)
-        if heat is not None and not system.friction.constant:
-            mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
-            heat = CycleHeat(heat.exchange.with_friction(mu))
-        contact, heat, temperature = _solve(problem, heat)
-        if np.abs(contact.pressure - pressure).max() < CLOSE * system.rigid.mean_pressure:
-            break
-    else:
-        if not system.constant_coefficients:
-            raise ConvergenceError("the coefficients and the steady state they depend on did not come together")
+    contact, heat, temperature = _solve(problem)
     return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
 
 
@@ -248,7 +234,7 @@ def _check_exists(system: Tribosystem) -> None:
         )
 
 
-def _solve(problem: _SteadyInequality, heat: CycleHeat | None) -> tuple[ContactState, CycleHeat | None, Array | None]:
+def _solve(problem: _SteadyInequality) -> tuple[ContactState, CycleHeat | None, Array | None]:
     """Return the contact of all phases, and with heat the temperature."""
     system = problem.system
     try:
@@ -260,31 +246,14 @@ def _solve(problem: _SteadyInequality, heat: CycleHeat | None) -> tuple[ContactS
             f"{error}; friction tips the punch so far that no pressures wear the whole contact by a rigid motion: "
             "it goes on changing its shape. Expected less friction, a lower pin or a wider contact"
         ) from error
-    if heat is None:
+    coupled = Coupled(system, problem.take)
+    if coupled.heat is None and system.constant_coefficients:
         return contact, None, None
-    contact, temperature = solve_with_heat(
-        heat,
-        heat.initial(),
-        np.inf,
-        contact,
-        lambda thermal, coupling, _: problem.solve(thermal, coupling),
-        system.rigid.mean_pressure,
+    initial = None if coupled.heat is None else coupled.heat.initial()
+    contact, temperature = coupled.solve(
+        initial, np.inf, contact, lambda thermal, coupling, _: problem.solve(thermal, coupling)
     )
-    return contact, heat, temperature
-
-
-def _conditions(
-    system: Tribosystem, pressure: Array, heat: CycleHeat | None, temperature: Array | None
-) -> list[ContactConditions]:
-    """Return what coefficients depend on in each phase: the temperatures at its start."""
-    phases = range(len(pressure))
-    if heat is None or temperature is None:
-        return [system.conditions(k, pressure[k]) for k in phases]
-    conditions, parts = [], heat.parts(temperature)
-    for k in phases:
-        conditions.append(system.conditions(k, pressure[k], heat.exchange.contact_temperatures(parts)))
-        parts, _ = heat.exchange.half_cycle(parts, k, pressure[k], heat.exchange.conductance(pressure[k]))
-    return conditions
+    return contact, coupled.at_friction(), temperature
 
 
 def _result(
@@ -361,10 +330,10 @@ def cycles_to_reach(system: Tribosystem, state: Steady, fraction: float, limit: 
 
     Args:
         state: The steady state.
-        fraction: Of the mean pressure.
+        fraction: Of the pressure scale.
         limit: Cycles tried; None is returned beyond.
     """
-    phases, goal = len(state.directions), fraction * system.rigid.mean_pressure
+    phases, goal = len(state.directions), fraction * pressure_scale(system, state.phase_pressure)
     before: tuple[int, float] | None = None
     for block in jump(system, limit * phases, tolerance=fraction / 10, block=phases):
         cycles, distance = int(block.half_cycle[-1]) // phases, float(np.abs(block.pressure - state.pressure).max())

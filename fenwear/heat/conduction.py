@@ -3,14 +3,21 @@
     rho c (d theta/dt + v . grad theta) = div(k grad theta) - (2 h / t) (theta - theta_a)
 
 with convection h (theta - theta_a) on free boundaries, held temperatures, and a heat flux q into
-the contact surface. Implicit Euler in time. Advection is stabilised by streamline upwinding with
-the whole residual (SUPG), so that the order of the elements is kept.
+the contact surface. Where material that is new enters through a free boundary, v . n < 0, it brings
+the heat of its temperature theta_in with it, and it leaves with its own:
+
+    k d theta/dn = rho c (v . n) (theta - theta_in)   where v . n < 0,
+
+which makes the form coercive: its boundary part is (1/2) rho c |v . n| theta². Implicit Euler in
+time. Advection is stabilised by streamline upwinding with the whole residual (SUPG), so that the
+order of the elements is kept.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +26,7 @@ import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
@@ -33,6 +41,25 @@ from fenwear.errors import CaseError, Problem
 
 PREFIX = "fenwear_heat_"
 FREE, CONTACT, HELD = 1, 2, 3
+CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
+LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made again with pivoting
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a body meets beyond its mesh.
+
+    Attributes:
+        renewed: Whether material that enters is new, at theta_in; else what has left comes back as it was.
+        exposed: Part of the contact surface that lies opposite nothing and convects, as loads of a
+            unit flux there (owned,), mm; None for none.
+    """
+
+    renewed: bool = False
+    exposed: Array | None = None
+
+
+ALONE = Surroundings()
 
 
 class HeatBody:
@@ -40,6 +67,8 @@ class HeatBody:
 
     Attributes:
         space: Scalar Lagrange space on the nodes of the displacement, K.
+        flow: Velocity of the material at unit speed, a vector field of UFL; by default along x.
+        inflow: theta_in, K.
         nodes: Global numbers of the contact nodes (n,), in order along the contact.
         weights: Quadrature weights of these nodes (n,), mm.
     """
@@ -52,6 +81,7 @@ class HeatBody:
         model: Model,
         heat: Heat,
         degree: int,
+        flow: Any = None,
     ) -> None:
         """Prepare the forms; collective.
 
@@ -59,6 +89,9 @@ class HeatBody:
             CaseError: an unknown group.
         """
         self.body, self.heat = body, heat
+        along_x = np.eye(body.mesh.geometry.dim)[0]
+        self.flow = fem.Constant(body.mesh, along_x.astype(PETSc.ScalarType)) if flow is None else flow
+        self.inflow = heat.ambient if heat.inflow is None else heat.inflow
         self.space = fem.functionspace(body.mesh, basix.ufl.element("Lagrange", body.mesh.basix_cell(), degree))
         of_region = {region: materials[name] for region, name in description.regions.items()}
         self.conductivity = region_field(body, {r: m.conductivity or 0.0 for r, m in of_region.items()})
@@ -116,69 +149,112 @@ class HeatBody:
         return vector
 
     @cached_property
-    def _step_forms(self) -> tuple[Any, Any, Any, fem.Constant, fem.Constant]:
-        """Return the forms of A, B and f with the constants 1 / dt and v that they contain."""
+    def _step_forms(self) -> _StepForms:
         domain = self.body.mesh
         theta, w = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-        rate, velocity = (fem.Constant(domain, PETSc.ScalarType(0)) for _ in range(2))
+        rate, speed, renewed = (fem.Constant(domain, PETSc.ScalarType(0)) for _ in range(3))
+        v = speed * self.flow
         k, rho_c, h = self.conductivity, self.capacity, self.heat.convection
         degree = self.space.ufl_element().degree
         dx = ufl.dx(domain, metadata={"quadrature_degree": 2 * degree + 1})  # tau is constant in an element
         ambient = fem.Constant(domain, PETSc.ScalarType(self.heat.ambient))
         faces = fem.Constant(domain, PETSc.ScalarType(self.face_loss))
         edges = fem.Constant(domain, PETSc.ScalarType(h))
-        tau = self._supg_time(rate, velocity)
-        upwind = tau * velocity * w.dx(0)
-        residual = rho_c * (rate * theta + velocity * theta.dx(0)) - ufl.div(k * ufl.grad(theta)) + faces * theta
-        a = rho_c * (rate * theta + velocity * theta.dx(0)) * w * dx + ufl.inner(k * ufl.grad(theta), ufl.grad(w)) * dx
-        a += faces * theta * w * dx + edges * theta * w * self._ds(FREE) + upwind * residual * dx
+        tau = self._supg_time(rate, v)
+        upwind = tau * ufl.dot(v, ufl.grad(w))
+        advected = ufl.dot(v, ufl.grad(theta))
+        entering = rho_c * renewed * ufl.max_value(-ufl.dot(v, ufl.FacetNormal(domain)), 0)  # heat capacity a second
+        residual = rho_c * (rate * theta + advected) - ufl.div(k * ufl.grad(theta)) + faces * theta
+        a = rho_c * (rate * theta + advected) * w * dx + ufl.inner(k * ufl.grad(theta), ufl.grad(w)) * dx
+        a += faces * theta * w * dx + (edges + entering) * theta * w * self._ds(FREE) + upwind * residual * dx
         b = rho_c * rate * theta * (w + upwind) * dx
-        f = faces * ambient * (w + upwind) * dx + edges * ambient * w * self._ds(FREE)
-        return fem.form(a), fem.form(b), fem.form(f), rate, velocity
+        f = faces * ambient * (w + upwind) * dx + (edges * ambient + entering * self.inflow) * w * self._ds(FREE)
+        a_form, b_form, f_form, brought = (fem.form(form) for form in (a, b, f, entering * w * self._ds(FREE)))
+        return _StepForms(a_form, b_form, f_form, brought, rate, speed, renewed)
 
-    def _supg_time(self, rate: Any, velocity: Any) -> Any:
-        """Return the stabilisation time tau: 1 / sqrt((2/dt)^2 + (2 v p / l)^2 + (4 p^2 a / l^2)^2).
+    def _supg_time(self, rate: Any, v: Any) -> Any:
+        """Return the stabilisation time tau: 1 / sqrt((2/dt)^2 + (2 |v| p / l)^2 + (4 p^2 a / l^2)^2).
 
-        l is the element's length along x, p the degree, a = k / (rho c) the diffusivity
+        l is the element's length along v, p the degree, a = k / (rho c) the diffusivity
         (Shakib, Hughes and Johan 1991, with the node spacing l / p for the length).
         """
-        length = self._lengths_along_x() / self.space.ufl_element().degree
+        length = self._lengths_along_flow() / self.space.ufl_element().degree
         diffusivity = self.conductivity / self.capacity
-        return 1 / ufl.sqrt((2 * rate) ** 2 + (2 * velocity / length) ** 2 + (4 * diffusivity / length**2) ** 2)
+        squares = (2 * rate) ** 2 + 4 * ufl.dot(v, v) / length**2 + (4 * diffusivity / length**2) ** 2
+        return 1 / ufl.sqrt(squares)
 
-    def _lengths_along_x(self) -> fem.Function:
+    def _lengths_along_flow(self) -> fem.Function:
         domain = self.body.mesh
-        cells = domain.topology.index_map(domain.topology.dim)
+        cells, dim = domain.topology.index_map(domain.topology.dim), domain.geometry.dim
         count = cells.size_local + cells.num_ghosts
-        x = domain.geometry.x[compat.geometry_dofmap(domain)[:count], 0]
+        vectors = fem.functionspace(domain, ("DG", 0, (dim,)))
+        flow = fem.Function(vectors)
+        flow.interpolate(fem.Expression(self.flow, compat.interpolation_points(vectors)))
+        along = flow.x.array.reshape(-1, dim)[:count]
+        speeds = np.linalg.norm(along, axis=1, keepdims=True)
+        along = np.where(speeds > 0, along, np.eye(dim)[0]) / np.where(speeds > 0, speeds, 1.0)  # on an axis: any
+        x = np.einsum("kic,kc->ki", domain.geometry.x[compat.geometry_dofmap(domain)[:count], :dim], along)
         lengths = fem.Function(fem.functionspace(domain, ("DG", 0)))
         lengths.x.array[:count] = x.max(axis=1) - x.min(axis=1)
         return lengths
 
-    def step(self, velocity: float, duration: float) -> HeatStep:
+    def step(self, speed: float, duration: float, surroundings: Surroundings = ALONE) -> HeatStep:
         """Assemble and factor one implicit Euler step, or for an infinite duration the steady state; collective.
+
+        Args:
+            speed: Of the material, mm/s: its velocity is speed times `flow`.
+            duration: Of the step, s.
+            surroundings: What lies beyond the mesh.
 
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
         """
         if math.isinf(duration):
-            self.check_heat_sink()
-        a, b, f, rate, speed = self._step_forms
-        rate.value = 0.0 if math.isinf(duration) else 1 / duration
-        speed.value = velocity
-        return HeatStep(self, assembled(a), assembled(b), self._vector(f), velocity, duration)
+            self.check_heat_sink(speed, surroundings)
+        forms = self._step_forms
+        forms.rate.value = 0.0 if math.isinf(duration) else 1 / duration
+        forms.speed.value, forms.renewed.value = speed, float(surroundings.renewed)
+        a, b, f, entering = assembled(forms.a), assembled(forms.b), self._vector(forms.f), self._vector(forms.entering)
+        if surroundings.exposed is not None:
+            loss = a.createVecLeft()
+            loss.array[:] = self.heat.convection * surroundings.exposed
+            a.setDiagonal(loss, addv=PETSc.InsertMode.ADD)
+            f.axpy(self.heat.ambient, loss)
+        carried = speed * self.carried + entering.array_r
+        brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.array_r.sum()))
+        return HeatStep(self, a, b, f, duration, carried, brought)
 
-    def loses_heat(self) -> bool:
-        """Return whether a heat sink exists: convection or a held temperature; collective."""
-        return self.heat.convection > 0 or self.body.mesh.comm.allreduce(len(self.held)) > 0
+    def loses_heat(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> bool:
+        """Return whether a heat sink exists: convection, a held temperature or new material; collective."""
+        return (
+            self.heat.convection > 0
+            or self.body.mesh.comm.allreduce(len(self.held)) > 0
+            or (surroundings.renewed and speed != 0 and self.is_open)
+        )
 
-    def check_heat_sink(self) -> None:
+    @cached_property
+    def is_open(self) -> bool:
+        """Whether the material moves through a free boundary, rounding apart; collective."""
+        flow, normal = self.flow, ufl.FacetNormal(self.body.mesh)
+        forms = (abs(ufl.dot(flow, normal)) * self._ds(FREE), ufl.sqrt(ufl.dot(flow, flow)) * self._ds(FREE))
+        comm = self.body.mesh.comm
+        through, along = (comm.allreduce(fem.assemble_scalar(fem.form(form))) for form in forms)
+        return bool(through > 1e-9 * along)
+
+    def extremes(self, surroundings: Surroundings) -> tuple[float, float]:
+        """Return the coldest and the hottest that the body is at first, is held at, or meets, K; collective."""
+        met = [self.heat.initial, self.heat.ambient] + ([self.inflow] if surroundings.renewed else [])
+        met += [float(value) for value in self.held_values]
+        comm = self.body.mesh.comm
+        return comm.allreduce(min(met), MPI.MIN), comm.allreduce(max(met), MPI.MAX)
+
+    def check_heat_sink(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> None:
         """Make sure that a steady temperature exists; collective.
 
         Raises:
             CaseError: the body loses heat nowhere.
         """
-        if not self.loses_heat():
+        if not self.loses_heat(speed, surroundings):
             message = f"the {self.body.name} loses heat nowhere: expected convection or a held temperature"
             raise CaseError(Problem("heat.convection", message))
 
@@ -227,7 +303,7 @@ class HeatBody:
     def carried(self) -> Array:
         """Heat carried out by material moving at unit speed, for each kelvin (owned,), mJ/(mm² K)."""
         w = ufl.TestFunction(self.space)
-        return self._vector(self.capacity * w.dx(0) * ufl.dx(self.body.mesh)).array_r.copy()
+        return self._vector(self.capacity * ufl.dot(self.flow, ufl.grad(w)) * ufl.dx(self.body.mesh)).array_r.copy()
 
     @cached_property
     def convected(self) -> Array:
@@ -238,20 +314,41 @@ class HeatBody:
         return self._vector(faces * w * ufl.dx(self.body.mesh) + edges * w * self._ds(FREE)).array_r.copy()
 
 
+@dataclass(frozen=True)
+class _StepForms:
+    """The forms of A, B, f and of the heat capacity that enters a second, with the constants that they contain."""
+
+    a: fem.Form
+    b: fem.Form
+    f: fem.Form
+    entering: fem.Form
+    rate: fem.Constant
+    speed: fem.Constant
+    renewed: fem.Constant
+
+
 class HeatStep:
     """One factored step of a body: A theta = B theta_before + f + C q.
 
     Attributes:
         body: Whose step it is.
-        velocity: Of the material, mm/s.
+        carried: Heat that the material carries out a second, for each kelvin (owned,), mW/(mm K).
+        brought: Heat that new material brings in a second, mW/mm.
         held_by_end, held_by_start, held_source: Sums of the rows of A, B and f that held
             temperatures replace: with them the heat that enters through these boundaries.
     """
 
     def __init__(
-        self, body: HeatBody, a: PETSc.Mat, b: PETSc.Mat, f: PETSc.Vec, velocity: float, duration: float
+        self,
+        body: HeatBody,
+        a: PETSc.Mat,
+        b: PETSc.Mat,
+        f: PETSc.Vec,
+        duration: float,
+        carried: Array,
+        brought: float,
     ) -> None:
-        self.body, self.velocity = body, velocity
+        self.body, self.carried, self.brought = body, carried, brought
         start = body.space.dofmap.index_map.local_range[0]
         rows = (body.held + start).astype(np.int32)
         indicator = a.createVecLeft()
@@ -267,6 +364,7 @@ class HeatStep:
         self._is_held[body.held] = True
         self._rhs, self._solution = a.createVecLeft(), a.createVecRight()
         self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
+        self._pivoted, self._solved = duration == np.inf, 0
 
     def advance(self, theta: Array) -> Array:
         """Return the temperature at the end without any flux through the contact (owned,); collective."""
@@ -274,7 +372,24 @@ class HeatStep:
         self.b.mult(self._solution, self._rhs)
         self._rhs.array[:] += self.source
         self._factor.solve(self._rhs, self._solution)
+        self._solved += 1
+        if self._solved % CHECK_EVERY == 1 and not self._is_exact(self._rhs, self._solution):
+            self._pivot()
+            self._factor.solve(self._rhs, self._solution)
         return self._solution.array_r.copy()
+
+    def _is_exact(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> bool:
+        """Return whether a solution of the factor is one of the matrix, or no factor can be better; collective."""
+        if self._pivoted:
+            return True
+        residual = rhs.duplicate()
+        self.a.mult(solution, residual)
+        residual.axpy(-1.0, rhs)
+        return bool(residual.norm() <= LARGEST_RESIDUAL * rhs.norm())
+
+    def _pivot(self) -> None:
+        """Factor again, with pivoting; collective."""
+        self._factor, self._pivoted = Factor(self.a, PREFIX, "lu"), True
 
     def advance_linear(self, thetas: Array) -> Array:
         """Return A^-1 B of several fields (owned, k), without the sources; collective."""
@@ -295,7 +410,15 @@ class HeatStep:
         solution = rhs.duplicate()
         solution.setUp()
         self._factor.matSolve(rhs, solution)
+        if not self._pivoted and not self._are_exact(rhs, solution):
+            self._pivot()
+            self._factor.matSolve(rhs, solution)
         return solution.getDenseArray().copy()
+
+    def _are_exact(self, rhs: PETSc.Mat, solution: PETSc.Mat) -> bool:
+        residual = self.a.matMult(solution)
+        residual.axpy(-1.0, rhs)
+        return bool(residual.norm() <= LARGEST_RESIDUAL * rhs.norm())
 
 
 def _dense(like: PETSc.Mat, fields: Array) -> PETSc.Mat:

@@ -22,9 +22,12 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case import Heat
+from fenwear.errors import HeatError
 from fenwear.heat.field import Field, Functional, ReducedField
 
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
+# What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
+OVERSHOOT, DRIFT = 0.1, 1e-3
 State = tuple[Array, Array]  # of the punch and of the strip
 
 
@@ -41,7 +44,11 @@ class Side:
             material carries out; per thickness.
         contact_change, gap_change, balance_change: The same of changes of the state (dim, k).
         held_source: Constant part of what enters at held temperatures, per prepared step, mW/mm.
+        brought: Heat that new material brings, per prepared step, mW/mm.
         ambient_loss: Constant part of the convected heat, mW/mm.
+        capacity: Heat capacity of the body, mJ/(mm K).
+        extremes: Coldest and hottest of its initial, held, ambient and entering temperatures, K.
+        bounded: Whether nothing but friction makes it hotter: not so where what has left comes back.
     """
 
     field: Field
@@ -52,11 +59,15 @@ class Side:
     gap_change: Functional
     balance_change: Functional
     held_source: list[float]
+    brought: list[float]
     ambient_loss: float
+    capacity: float
+    extremes: tuple[float, float]
+    bounded: bool
 
 
 # The heat of a half-cycle: done by friction, carried off by debris, gained by both bodies, lost to the
-# surroundings, lost through boundaries of held temperature, carried out by the strip's material.
+# surroundings, lost through boundaries of held temperature, carried out by the strip's material less what it brings.
 TERMS = ("friction", "debris", "stored", "convected", "held", "carried")
 
 
@@ -175,9 +186,13 @@ class HeatExchange:
             phase: Which of the motion's phases.
             pressure: During it (n,), MPa.
             conductance: Of each node, from `conductance`.
+
+        Raises:
+            HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
         terms = np.zeros(len(TERMS))
         before = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
+        stored = before[0][0] + before[1][0]
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             free = [side.field.advance(k, s) for side, k, s in zip(self.sides, kinds, state, strict=True)]
@@ -188,13 +203,65 @@ class HeatExchange:
             after = [side.balance(s) for side, s in zip(self.sides, state, strict=True)]
             terms += self._account(kinds, heat, fluxes, before, after, sources=True)
             before = after
+        self._check_bounds(stored, before[0][0] + before[1][0], terms[0] - terms[1])
         return state, terms * self.thickness
+
+    def _check_bounds(self, start: float, end: float, friction: float) -> None:
+        """Hold the heat of the bodies against what can have entered them, all per thickness.
+
+        By the maximum principle friction raises the heat above the hottest boundary or initial temperature by
+        no more than its own, and nothing cools below the coldest of them.
+
+        Raises:
+            HeatError: it is out of these bounds.
+        """
+        if np.isinf(self.duration) or not all(side.bounded for side in self.sides):
+            return
+        coldest, hottest = (pick(side.extremes[k] for side in self.sides) for k, pick in enumerate((min, max)))
+        capacity = sum(side.capacity for side in self.sides)
+        span, least = capacity * (hottest - coldest), capacity * coldest
+        slack = OVERSHOOT * abs(friction) + DRIFT * (abs(start - least) + span)
+        if end - start <= abs(friction) + span + slack and end - least >= -slack:  # not so for NaN
+            return
+        mean = end / capacity
+        raise HeatError(
+            f"the heat has failed, not the contact: the bodies are at {mean:.4g} K in the mean after a half-cycle in "
+            f"which friction can warm them by {abs(friction) / capacity:.3g} K, and all else to between {coldest:.4g} "
+            f'and {hottest:.4g} K; set heat.operator = "full", lower heat.reduction_tolerance, or take more heat.steps'
+        )
 
     def response(self, phase: int, conductance: Array) -> tuple[State, Array]:
         """Return the changes at the end of a half-cycle from unit pressures (dim, n), and of the heat terms."""
         n = len(conductance)
         zero = tuple(np.zeros((side.field.responses[0].shape[0], n)) for side in self.sides)
         return self._linear_half_cycle(phase, zero, np.eye(n), conductance)  # type: ignore[arg-type]
+
+    def by_conductance(self, phase: int, state: State, pressure: Array, conductance: Array) -> State:
+        """Return the change at the end of a half-cycle for each node's change of conductance (dim, n) each.
+
+        The rate of kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2): where h_c changes by one unit,
+        theta_1 - theta_2 is missing in q_1.
+
+        Args:
+            state, pressure, conductance: As of `half_cycle`.
+        """
+        n = len(conductance)
+        conducts = np.isfinite(conductance)
+        changes: State = (np.zeros((len(state[0]), n)), np.zeros((len(state[1]), n)))
+        for plan in self.plans[phase]:
+            kinds = (plan.punch, plan.strip)
+            heat = self.friction[phase] * plan.speed * pressure
+            free = [side.field.advance(k, s) for side, k, s in zip(self.sides, kinds, state, strict=True)]
+            bare = [side.contact(f) for side, f in zip(self.sides, free, strict=True)]
+            state = self._with_fluxes(kinds, free, self._fluxes(kinds, bare, heat, conductance, self.heat.ambient))
+            first, second = self.contact_temperatures(state)
+            free = [side.field.advance_linear(k, c) for side, k, c in zip(self.sides, kinds, changes, strict=True)]
+            bare = [side.contact_change(f) for side, f in zip(self.sides, free, strict=True)]
+            fluxes = np.concatenate(self._fluxes(kinds, bare, np.zeros((n, n)), conductance, 0.0))
+            missing = np.where(conducts, second - first, 0.0)
+            fluxes += scipy.linalg.inv(self._flux_matrix(kinds, conductance))[:, :n] * missing
+            changes = self._with_fluxes(kinds, free, [fluxes[:n], fluxes[n:]])
+        return changes
 
     def propagate(self, phase: int, changes: State, conductance: Array) -> State:
         """Return what changes of the state at the start (dim, k) become at the end of a half-cycle."""
@@ -242,7 +309,7 @@ class HeatExchange:
             stored = stored + (a[0] - b[0]) / self.duration
             convected = convected + a[1] - sources * side.ambient_loss
             held = held - (a[2 + 3 * k] - b[3 + 3 * k] - sources * side.held_source[k])
-            carried = carried + a[4 + 3 * k]
+            carried = carried + a[4 + 3 * k] - sources * side.brought[k]
         seconds = 1.0 if np.isinf(self.duration) else self.duration
         return np.array([friction, debris, stored, convected, held, carried]) * seconds
 

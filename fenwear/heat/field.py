@@ -7,8 +7,10 @@ its response to the fluxes there, and any linear functional of the temperature.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import Protocol
 
+import numpy as np
 import scipy.linalg
 from scipy.sparse import csr_array
 
@@ -120,6 +122,11 @@ class ReducedField:
             source = basis.T @ (step.source + (b_lift - a_lift)[:, 0])
             self._sources.append(scipy.linalg.solve(a, self._sum(source)))
             self.responses.append(scipy.linalg.solve(a, self._sum(basis.T @ inflow)))
+
+    def spectral_radius(self, cycle: Sequence[int]) -> float:
+        """Return the factor by which some temperature changes in every cycle of these steps, the largest in size."""
+        product = reduce(lambda through, step: self._propagators[step] @ through, cycle, np.eye(len(self.basis[0])))
+        return float(np.abs(np.linalg.eigvals(product)).max(initial=0.0))
 
     def _sum(self, partial: Array) -> Array:
         return total(self.body.body.mesh.comm, partial)

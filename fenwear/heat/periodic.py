@@ -31,7 +31,7 @@ class CycleJump:
     """Where a jump ends, as a function of the pressures of its phases.
 
     Attributes:
-        gap: Thermal gap at the end of each phase of the last cycle without pressure (m, n), mm.
+        gap: Thermal gap at the end of each phase of the cycle that starts there, without pressure (m, n), mm.
         coupling: Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa.
         end: State at the end without pressure (dim,).
         end_response: Its response to the pressures (dim, m n).
@@ -111,10 +111,8 @@ class CycleHeat:
         solved = scipy.linalg.solve(matrix, columns)
         end, end_response = solved[:, 0], solved[:, 1:]
         gaps, couplings = [], []
-        for before, constant, added in ends[:-1]:  # phases of the last cycle, which starts from the end state
+        for before, constant, added in ends:  # phases of the cycle that starts from the end state
             gaps.append(self.gap_rows @ (before @ end + constant))
             couplings.append(self.gap_rows @ (before @ end_response + added.reshape(dim, -1)))
-        gaps.append(self.gap_rows @ end)
-        couplings.append(self.gap_rows @ end_response)
         coupling = np.array(couplings).reshape(m, n, m, n)
         return CycleJump(np.array(gaps) + self._gap_constant, coupling, end, end_response)

@@ -8,14 +8,16 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Heat
-from fenwear.errors import CaseError, Problem
-from fenwear.heat.conduction import HeatBody, HeatStep
+from fenwear.errors import CaseError, HeatError, Problem
+from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
-from fenwear.heat.reduction import reduced_basis
+from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.interface import ContactPair
 from fenwear.parallel import total
 from fenwear.sliding.motion import Motion
+
+NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
 
 
 def prepare_exchange(
@@ -43,6 +45,7 @@ def prepare_exchange(
 
     Raises:
         CaseError: the half-cycles of the motion last unequally long.
+        HeatError: no basis gives temperatures that die out.
     """
     if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
         raise CaseError(Problem("motion", "expected half-cycles of equal duration with heat"))
@@ -50,20 +53,26 @@ def prepare_exchange(
     duration = motion.phases[0].duration / count
     speeds = motion.mean_speeds(count)
     signed = [[d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
-    every = [velocity for row in signed for velocity in row]
-    velocities = sorted(set(every))
+    velocities = sorted({velocity for row in signed for velocity in row})
     of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
     plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]
+    # Sliding to and fro brings back what it took away, unless the case says what comes instead.
+    renewed = heat.inflow is not None or velocities[0] * velocities[-1] > 0
+    cycles = [[getattr(step, body.body.name) for plan in plans for step in plan] for body in bodies]
     sides = []
-    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
-        steps = [body.step(velocity, duration) for velocity in own]
+    for body, inflow, rows, own, cycle in zip(
+        bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), cycles, strict=True
+    ):
+        around = _surroundings(body, pair, renewed=renewed)
+        steps = [body.step(velocity, duration, around) for velocity in own]
         if reduced:
-            moving = [0.0] if len(own) == 1 and own[0] == 0 else every
-            lift, basis = reduced_basis(body, inflow, moving, duration, heat.reduction_tolerance)
-            field: FullField | ReducedField = ReducedField(body, steps, inflow, lift, basis)
+            moving = [own[step] for step in cycle]
+            field: FullField | ReducedField = _reduced(
+                body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle
+            )
         else:
             field = FullField(body, steps, inflow)
-        sides.append(_side(field, steps, pair, rows))
+        sides.append(_side(field, steps, around, pair, rows))
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 
 
@@ -84,9 +93,53 @@ def prepare_steady(
     plans = [[StepPlan(0, k, abs(v))] for k, v in enumerate(velocities)]
     sides = []
     for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
-        steps = [body.step(velocity, np.inf) for velocity in own]
-        sides.append(_side(FullField(body, steps, inflow), steps, pair, rows))
+        around = _surroundings(body, pair, renewed=True)
+        steps = [body.step(velocity, np.inf, around) for velocity in own]
+        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows))
     return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
+
+
+def _reduced(
+    body: HeatBody,
+    steps: list[HeatStep],
+    inflow: Array,
+    speeds: Sequence[float],
+    duration: float,
+    tolerance: float,
+    surroundings: Surroundings,
+    cycle: Sequence[int],
+) -> ReducedField:
+    """Return the field on a basis whose cycle of steps lets every temperature die out; collective.
+
+    Raises:
+        HeatError: none does.
+    """
+    while True:
+        lift, basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
+        field = ReducedField(body, steps, inflow, lift, basis)
+        growth = field.spectral_radius(cycle)
+        if growth <= 1 + NEUTRAL:
+            return field
+        if tolerance <= ROUNDING:
+            raise HeatError(
+                f"the reduced temperatures of the {body.body.name} grow without heat, by a factor of "
+                f"{growth:.6g} a cycle, on any basis: hold the temperature where its material enters, "
+                'give heat.inflow, or set heat.operator = "full"'
+            )
+        tolerance = max(tolerance / 10, ROUNDING)  # more fields: nearer to the full steps, whose temperatures die out
+
+
+def _surroundings(body: HeatBody, pair: ContactPair, *, renewed: bool) -> Surroundings:
+    """Return what a body meets beyond its mesh: the strip new material, and beside the punch the surroundings."""
+    if body.body.name == "punch":
+        return Surroundings()
+    covered = pair.transfer.T @ pair.weights
+    bare = np.maximum(body.weights - covered, 0.0)  # unlike meshes leave less than nothing beside an edge
+    bare[bare < 1e-9 * body.weights] = 0.0
+    if not bare.any():
+        return Surroundings(renewed)
+    bare *= (body.weights.sum() - covered.sum()) / bare.sum()
+    return Surroundings(renewed, body.place(bare))
 
 
 def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[Array, Array]:
@@ -107,19 +160,28 @@ def _exchange(
     return HeatExchange(heat, sides, plans, duration, np.tile(friction, (len(plans), 1)), pair.weights, thickness)
 
 
-def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], pair: ContactPair, gap_rows: Array) -> Side:
+def _side(
+    field: FullField | ReducedField,
+    steps: Sequence[HeatStep],
+    surroundings: Surroundings,
+    pair: ContactPair,
+    gap_rows: Array,
+) -> Side:
     body = field.body
     contact_rows = body.contact_rows
     if body.body.name == "strip":
         contact_rows = pair.transfer @ contact_rows
-    balance_rows = [body.storage, body.convected]
+    convected = body.convected
+    if surroundings.exposed is not None:
+        convected = convected + body.heat.convection * surroundings.exposed
+    balance_rows = [body.storage, convected]
     for step in steps:
-        balance_rows += [step.held_by_end, step.held_by_start, step.velocity * body.carried]
+        balance_rows += [step.held_by_end, step.held_by_start, step.carried]
     rows = np.array(balance_rows)
-    comm = body.body.mesh.comm
+    comm, moves = body.body.mesh.comm, body.body.name == "strip"
     initial = total(comm, gap_rows @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
     gap = field.observe(gap_rows)
-    ambient = body.heat.ambient * float(total(comm, np.array([body.convected.sum()]))[0])
+    capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
     return Side(
         field,
         field.observe(contact_rows),
@@ -129,5 +191,9 @@ def _side(field: FullField | ReducedField, steps: Sequence[HeatStep], pair: Cont
         field.observe_change(gap_rows),
         field.observe_change(rows),
         [step.held_source for step in steps],
-        ambient,
+        [step.brought for step in steps],
+        body.heat.ambient * ambient_loss,
+        capacity,
+        body.extremes(surroundings),
+        surroundings.renewed or not moves or not body.is_open,
     )

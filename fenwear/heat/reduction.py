@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
-from fenwear.heat.conduction import HeatBody
+from fenwear.heat.conduction import ALONE, HeatBody, Surroundings
 from fenwear.parallel import total
 
 RATIO = 4.0  # of one time scale to the next
@@ -24,7 +24,12 @@ FAST = 4  # scales over which a motion to and fro does not average out
 
 
 def reduced_basis(
-    body: HeatBody, inflow: Array, speeds: Sequence[float], duration: float, tolerance: float
+    body: HeatBody,
+    inflow: Array,
+    speeds: Sequence[float],
+    duration: float,
+    tolerance: float,
+    surroundings: Surroundings = ALONE,
 ) -> tuple[Array, Array]:
     """Return a lift (owned,) with the held temperatures, and the basis (owned, dim); collective.
 
@@ -34,6 +39,7 @@ def reduced_basis(
         speeds: Velocities of its material; over a cycle they average out where they have both signs.
         duration: Of one step, s: the shortest time scale.
         tolerance: Singular values below this fraction of the largest are dropped.
+        surroundings: What lies beyond the mesh.
     """
     mean = float(np.mean(speeds))
     moving = sorted({min(speeds), max(speeds)} - {mean})
@@ -41,13 +47,15 @@ def reduced_basis(
     # Fluxes of the same power: the singular values then weigh temperatures as friction makes them.
     even = inflow / np.sqrt(total(body.body.mesh.comm, np.abs(inflow).sum(axis=0)))
     scales = [duration * RATIO**k for k in range(SCALES)]
-    scales += [np.inf] if body.loses_heat() else [scales[-1] * 100]
+    scales += [np.inf] if body.loses_heat(mean, surroundings) else [scales[-1] * 100]
+    # What is new on both sides does not average out: material that leaves is cooled on either way.
+    unlike = len(scales) if surroundings.renewed and min(speeds) * max(speeds) < 0 else FAST
     snapshots: list[Array] = []
     relaxed: list[Array] = []
     largest = 0.0
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
-        for velocity in [mean, *(moving if k < FAST else [])]:
-            step = body.step(velocity, scale)
+        for velocity in [mean, *(moving if k < unlike else [])]:
+            step = body.step(velocity, scale, surroundings)
             fields, values = _principal(body, step.respond(even), tolerance, largest)
             largest = max(largest, values[-1])
             snapshots.append(fields)

@@ -216,7 +216,10 @@ def _heat(summary: dict[str, Any]) -> Table:
 def _stability(summary: dict[str, Any], history: xarray.Dataset) -> str:
     rate = summary.get("growth_rate_per_s")
     if rate is None or not math.isfinite(rate):
-        return "Not computed for this run." if "max_temperature" in history else "Computed with heat only."
+        if "max_temperature" not in history:
+            return "Computed with heat only."
+        reason = summary.get("no_growth_rate")
+        return f"No growth rate: {reason}." if reason else "Not computed for this run."
     if rate > 0:
         text = f"Unstable: small disturbances of the final contact grow, e-fold in {1 / rate:.3g} s"
     elif rate < 0:

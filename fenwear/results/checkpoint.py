@@ -1,4 +1,4 @@
-"""Checkpoints: a moment of a run on disk, whole or not at all, for any number of ranks.
+"""Checkpoints: a state of a run on disk, whole or not at all, for any number of ranks.
 
 Arrays of the interface go to one NumPy file; temperatures are functions on the meshes, written by
 adios4dolfinx in the numbering of the geometry, so that another number of ranks can read them.
@@ -21,7 +21,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
-from fenwear.cycle.moment import Moment
+from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, OutputError, Problem
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
@@ -30,7 +30,7 @@ from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
-CASE, ARRAYS = "case.toml", "moment.npz"
+CASE, ARRAYS = "case.toml", "state.npz"
 NUMBERS, WEAR, STATES = (
     ("half_cycle", "jump_length", "periodic_phases"),
     ("wear", "wear_strip"),
@@ -42,24 +42,24 @@ BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generousl
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "title")
 
 
-def save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, moment: Moment) -> None:
+def save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, state: RunState) -> None:
     """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
 
     Raises:
         OutputError: it cannot be written; the old one stays.
     """
     try:
-        _save(directory, system, exchange, moment)
+        _save(directory, system, exchange, state)
     except OutputError:  # on all ranks
         on_root(system.comm, lambda: shutil.rmtree(directory / NEW, ignore_errors=True))
         raise
 
 
-def _save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, moment: Moment) -> None:
+def _save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, state: RunState) -> None:
     comm, new = system.comm, directory / NEW
-    on_root(comm, lambda: _begin(new, system, moment))
-    if exchange is not None and moment.temperature is not None and system.bodies.heat is not None:
-        temperatures = exchange.temperatures(moment.temperature)
+    on_root(comm, lambda: _begin(new, system, state))
+    if exchange is not None and state.temperature is not None and system.bodies.heat is not None:
+        temperatures = exchange.temperatures(state.temperature)
         for body, values in zip(system.bodies.heat, temperatures, strict=True):
             path, function = new / f"temperature_{body.body.name}.bp", body.function(values)
             size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
@@ -70,23 +70,23 @@ def _save(directory: Path, system: Tribosystem, exchange: HeatExchange | None, m
     on_root(comm, lambda: _swap(directory))
 
 
-def _begin(new: Path, system: Tribosystem, moment: Moment) -> None:
+def _begin(new: Path, system: Tribosystem, state: RunState) -> None:
     with writing(new):
         shutil.rmtree(new, ignore_errors=True)
         new.mkdir()
-        _write(new, system, moment)
+        _write(new, system, state)
 
 
-def _write(new: Path, system: Tribosystem, moment: Moment) -> None:
+def _write(new: Path, system: Tribosystem, state: RunState) -> None:
     (new / CASE).write_text(system.case.to_toml(), "utf-8")
     n, r = len(system.pair.weights), len(system.rigid.resultant)
     empty = ContactState(np.full((1, n), np.nan), np.full((1, n), np.nan), np.full((1, r), np.nan), 0)
-    contacts = [contact or empty for contact in moment.contacts]
+    contacts = [contact or empty for contact in state.contacts]
     with (new / ARRAYS).open("wb") as file:
         np.savez(
             file,
-            **{name: getattr(moment, name) for name in NUMBERS},
-            **_depths(WEAR, moment.worn),
+            **{name: getattr(state, name) for name in NUMBERS},
+            **_depths(WEAR, state.worn),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
         )
@@ -118,8 +118,8 @@ def _swap(directory: Path) -> None:
         shutil.rmtree(old, ignore_errors=True)
 
 
-def load(directory: Path, system: Tribosystem, exchange: HeatExchange | None) -> Moment:
-    """Return the moment of a run's checkpoint; collective.
+def load(directory: Path, system: Tribosystem, exchange: HeatExchange | None) -> RunState:
+    """Return the state of a run's checkpoint; collective.
 
     Raises:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
@@ -137,7 +137,7 @@ def load(directory: Path, system: Tribosystem, exchange: HeatExchange | None) ->
     )
     numbers = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
     worn = Worn(*(arrays[name] for name in WEAR))
-    return Moment(int(arrays["half_cycle"]), worn, contacts, temperature, *numbers)
+    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, *numbers)
 
 
 def _read_temperature(folder: Path, body: HeatBody) -> Array:

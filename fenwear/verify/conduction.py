@@ -12,7 +12,7 @@ from scipy.special import k0e
 
 from fenwear import vary
 from fenwear.arrays import Array
-from fenwear.heat.conduction import HeatBody
+from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.parallel import total
 from fenwear.results.fields import body_fields
 from fenwear.verify.bodies import builtin, clamped, two_blocks
@@ -363,6 +363,59 @@ def periodic_flux() -> Result:
         lines,
     )
     return Result(rows, [plot])
+
+
+def plug_flow(x: Array, peclet: float) -> Array:
+    """Return (theta - theta_in) rho c v H / (q L) of material that enters at x = 0 and leaves at L, x over L.
+
+    rho c v theta' = k theta'' + q/H with k theta' = rho c v (theta - theta_in) at x = 0 and theta' = 0 at x = L,
+    for v L / a = peclet: x + (1 - e^(peclet (x - 1))) / peclet (Danckwerts, Continuous flow systems, 1953).
+    """
+    return np.asarray(x + (1 - np.exp(peclet * (x - 1))) / peclet)
+
+
+@verification(
+    "open-strip",
+    "A strip with free ends: new material enters, is heated, and carries the heat away",
+    "P. V. Danckwerts, Continuous flow systems, Chem. Eng. Sci. 2, 1953: conditions at inflow and outflow",
+)
+def open_strip() -> Result:
+    """Even heat q on a strip 1 mm long and so thin that it is as warm below as above, insulated elsewhere.
+
+    The steady state, and marching to it from a temperature far off, in both directions.
+    """
+    entering, flux, height = 20.0, 5.0, 1e-3
+    sizes = {"strip_height": height, "across": 32, "strip_layers": 1, "punch_layers": 1}
+    system = two_blocks(MATERIAL, MATERIAL, sizes, degree=3, heat={"ambient": AMBIENT, "inflow": entering})
+    assert system.bodies.heat is not None
+    body, new = system.bodies.heat[1], Surroundings(renewed=True)
+    along = contact_abscissae(body) + 0.5
+    load = body.place(body.weights * flux)[:, None]
+    rows: list[Row] = []
+    lines: list[Line] = []
+    for peclet in (0.1, 1.0, 10.0, 50.0):
+        for d in (1, -1):
+            speed = peclet * K / RHO_C
+            rise = flux / (height * RHO_C * speed)
+            x = along if d > 0 else 1 - along
+            exact = plug_flow(x, peclet)
+            case = f"v L / a = {peclet:g}, {'rightward' if d > 0 else 'leftward'}"
+            step = body.step(d * speed, math.inf, new)
+            steady = step.advance(body.initial()) + step.respond(load)[:, 0]
+            found = (total(system.comm, body.contact_rows @ steady) - entering) / rise
+            rows.append(profile(f"{case}: rise / (q L / rho c v H)", exact, found, 1e-4, scale=exact.max()))
+            step = body.step(d * speed, 0.2 / speed, new)
+            theta, heating = np.full(body.owned, -300.0), step.respond(load)[:, 0]
+            for _ in range(400):
+                theta = step.advance(theta) + heating
+            apart = total(system.comm, body.contact_rows @ (theta - steady)) / rise
+            rows.append(profile(f"{case}: after 80 renewals", np.zeros_like(apart), apart, 1e-6))
+            if d > 0:
+                lines += [
+                    Line(f"fenwear, v L / a = {peclet:g}", x, found / exact.max()),
+                    Line(f"Danckwerts, v L / a = {peclet:g}", x, exact / exact.max(), reference=True),
+                ]
+    return Result(rows, [Plot("Open strip: rise along it", "x / L", "rise over its largest", lines)])
 
 
 def jaeger(x: float, half_width: float, speed: float, diffusivity: float) -> float:

@@ -11,14 +11,14 @@ import pytest
 from fenwear import Tribosystem, assemble, jump, march
 from fenwear.cycle import Block, follow
 from fenwear.cycle.follow import _in_place
-from fenwear.cycle.moment import Moment
+from fenwear.cycle.state import RunState
 from fenwear.sliding.wear import Worn
 
 SMALL = ("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=0.4")
 
 
 def run(system: Tribosystem, half_cycles: int) -> list[Block]:
-    def integrate(now: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+    def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
         return jump(now, half_cycles, tolerance=0.1, start=start, leave=leave)
 
     return list(follow(system, integrate, lambda now: now.exchange))
@@ -61,7 +61,7 @@ def test_a_run_with_heat_goes_on(assembled: Callable[..., Tribosystem]) -> None:
     moving = assembled("example1-heat", *settings, "geometry.follow_wear=1e-7")
     *_, expected = march(plain, 6)
 
-    def integrate(now: Tribosystem, start: Moment | None, leave: Callable[[Moment], bool]) -> Iterator[Block]:
+    def integrate(now: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
         return march(now, 6, start=start, leave=leave)
 
     blocks = list(follow(moving, integrate, lambda now: now.exchange))

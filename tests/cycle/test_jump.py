@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, jump, march
+from fenwear import Case, Tribosystem, assemble, jump, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
+from fenwear.cycle import Block
 from fenwear.sliding.wear import WornLayer
 
 MEAN = 1e4 / 600
@@ -48,6 +50,56 @@ def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> N
     errors = [np.abs(end(system, 2 * cycles, t)[0] - state.pressure).max() / MEAN for t in (1e-2, 1e-3, 1e-4)]
     assert errors[2] < errors[1] < errors[0] < 0.1
     assert errors[2] < 2e-3
+
+
+HEAT = ("heat.partition=0.2", "heat.debris=0", "heat.conductance=0.08", "heat.convecting_faces=true")
+BY_TEMPERATURE = "wear.punch.coefficient={table=[[0, 4e-8], [50, 2.4e-7]]}"
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+
+
+@pytest.mark.parametrize(
+    ("case", "settings"),
+    [
+        ("example2-heat", (*SMALL, *HEAT, BY_TEMPERATURE)),
+        ("example1-heat", (*SMALL, *HEAT, BY_TEMPERATURE, "contact.friction={expression='0.2 + 1e-3 * T - 5e-4 * p'}")),
+        ("example2", (*SMALL, "wear.punch.coefficient={expression='4e-8 * (1 + p / 20)'}")),
+    ],
+)
+@pytest.mark.slow
+def test_laws_come_to_the_march(assembled: Callable[..., Tribosystem], case: str, settings: tuple[str, ...]) -> None:
+    """As the tolerance falls, depths and temperatures come to lie between explicit and implicit marches."""
+    system = assembled(case, *settings)
+    weights = system.pair.weights
+
+    def ends(blocks: Iterable[Block]) -> list[Array]:
+        *_, last = blocks
+        return [last.wear[-1], *([] if last.heat is None else [last.heat.temperature_punch[-1]])]
+
+    explicit, implicit = (ends(march(system, 200, implicit=way)) for way in (False, True))
+    coarse, fine = (ends(jump(system, 200, tolerance=tolerance)) for tolerance in (3e-2, 3e-4))
+    for one, other, first, last in zip(explicit, implicit, coarse, fine, strict=True):
+        middle = (one + other) / 2
+        errors = [float(weights @ np.abs(found - middle) / (weights @ middle)) for found in (first, last)]
+        within = float(weights @ np.abs(one - other) / (weights @ middle))
+        assert errors[1] < within
+        assert errors[1] < errors[0] < 3e-2
+
+
+def test_growing_contact(edited: Callable[..., Case]) -> None:
+    """A cylinder worn flat over many nodes, one by one: few steps, and the depth of single steps."""
+
+    def one_way(tables: dict[str, Any]) -> None:
+        del tables["wear"]["strip"]
+        tables["wear"]["punch"]["coefficient"] = 2e-8
+        tables["motion"] = {"kind": "one-way", "direction": "rightward", "speed": 200, "duration": 1}
+
+    width = ("geometry.parameters.contact_width=1", "geometry.parameters.elements_along_contact=80")
+    system = assemble(edited("fretting", one_way, *width))
+    *_, whole = march(system, 200, implicit=True)
+    blocks = list(jump(system, 200, tolerance=3e-3))
+    assert (blocks[0].pressure[0] > 0).sum() < 0.5 * (whole.pressure[-1] > 0).sum()
+    assert sum(len(block) for block in blocks) < 60
+    np.testing.assert_allclose(blocks[-1].wear[-1], whole.wear[-1], rtol=0, atol=1e-3 * whole.wear[-1].max())
 
 
 @pytest.mark.mpi

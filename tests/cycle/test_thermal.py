@@ -13,9 +13,10 @@ from mpi4py import MPI
 from fenwear import ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
-from fenwear.cycle import Block, growth_rate
-from fenwear.cycle.jump import cycle_heat
-from fenwear.cycle.moment import Moment
+from fenwear.cycle import Block, growth_rate, stationary_growth
+from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.stability import phase_tangent, repeating_temperatures
+from fenwear.cycle.state import RunState
 from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., Tribosystem]
@@ -145,7 +146,7 @@ def test_march_tends_to_the_steady_state(assembled: Assemble, coefficient: float
     assert abs(stored) < 2e-3 * last.heat.terms[-1, 0]
 
 
-def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[Moment, Any]:
+def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]:
     """Return a moment in the cyclic steady state, its shape disturbed by a parabola (mm at the edges)."""
     state, heat = steady(system), cycle_heat(system)
     assert heat is not None
@@ -154,7 +155,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[Moment, Any]:
     modes = np.zeros((1, 2))
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.pair.x / 30) ** 2
-    return Moment(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.parts(periodic)), state
+    return RunState(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.parts(periodic)), state
 
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])
@@ -191,6 +192,94 @@ def test_growth_of_a_disturbance(assembled: Assemble, coefficient: float) -> Non
     measured = np.log(apart[115] / apart[85]) / (30 * system.motion.period)
     assert rate > 0.05
     assert measured == pytest.approx(rate, rel=0.03)
+
+
+LAWS = {
+    "constant": ("wear.punch.coefficient=4e-7",),
+    "h(p)": ("heat.conductance=0", "heat.conductance_per_pressure=[0.02, 0.02]", "heat.partition=0.7"),
+    "mu(T)": ("contact.friction={expression='0.25*(1+0.005*T)'}", "wear.punch.coefficient=4e-7"),
+    "mu(p)": ("contact.friction={expression='0.2*(1+0.5*exp(-p/16))'}",),
+    "beta(T, p)": ("wear.punch.coefficient={expression='4e-7*(1+0.02*T)*(p/16)**0.5'}",),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_tangent_of_a_half_cycle(assembled: Assemble, name: str) -> None:
+    """What a march makes of a small disturbance in one half-cycle is what the growth rate is made of, pointwise."""
+    system = assembled("example1-heat", *COARSE, *LAWS[name])
+    state = steady(system)
+    heat = cycle_heat(system)
+    assert heat is not None
+    repeating = repeating_temperatures(system, state.phase_pressure)
+    before = repeating[1][0] if repeating[1] else heat.parts(np.full(len(heat.initial()), 3.0))
+    contacts = from_steady(system)[0].contacts
+
+    def end(temperature: Array, worn: Array) -> tuple[Array, Array, Array]:
+        start = heat.parts(np.concatenate(before) + temperature)
+        moment = RunState(0, Worn(state.shape + worn, 0 * system.pair.strip.weights), contacts, start)
+        block = run(system, 1, implicit=True, start=moment)
+        return np.concatenate(block.end.temperature), block.end.worn.punch, block.pressure[0]
+
+    dim, n = len(heat.initial()), len(system.pair.x)
+    pressure = end(np.zeros(dim), np.zeros(n))[2]
+    matrix = phase_tangent(system, 0, pressure, repeating[0], before)
+    rng = np.random.default_rng(0)
+    warmer, deeper = rng.normal(size=dim) * np.abs(before[0]).max(), 1e-3 * (system.pair.x / 30) ** 2
+    for disturbance in ((warmer, 0 * deeper), (0 * warmer, deeper)):
+        ahead, behind = (end(sign * disturbance[0], sign * disturbance[1]) for sign in (1e-4, -1e-4))
+        expected = np.split(matrix @ np.concatenate(disturbance), [dim])
+        for k, one in enumerate(expected):
+            measured = (ahead[k] - behind[k]) / 2e-4
+            np.testing.assert_allclose(one, measured, rtol=0, atol=1e-6 * np.abs(measured).max())
+
+
+def test_growth_with_conductance_by_pressure(assembled: Assemble) -> None:
+    """Two marches part at the rate of the eigenvalue, 0.08 1/s; with the conductance frozen it were 0.19."""
+    system = assembled("example1-heat", *COARSE, *LAWS["h(p)"], "wear.punch.coefficient=1e-10")
+    moment, state = from_steady(system)
+    disturbed, _ = from_steady(system, 1e-10)
+    one, other = (run(system, 240, implicit=True, start=m) for m in (moment, disturbed))
+    apart = np.linalg.norm(one.pressure - other.pressure, axis=1)[1::2]
+    measured = np.log(apart[115] / apart[85]) / (30 * system.motion.period)
+    assert measured == pytest.approx(growth_rate(system, state.phase_pressure), rel=0.03)
+
+
+def test_growth_with_friction_by_temperature(assembled: Assemble) -> None:
+    """A disturbance along the eigenvector grows by the eigenvalue from the first cycle on."""
+    system = assembled("example1-heat", *COARSE, "contact.friction={expression='0.25*(1+0.005*T)'}")
+    state = steady(system)
+    pressure = state.phase_pressure
+    heat, states = repeating_temperatures(system, pressure)
+    assert heat is not None
+    first, second = (phase_tangent(system, k, pressure[k], heat, states[k]) for k in range(2))
+    values, vectors = np.linalg.eig(second @ first)
+    largest = np.argmax(np.abs(values) * (np.abs(values - 1) > 1e-8))
+    assert values[largest].imag == 0
+    mode, dim = vectors[:, largest].real, len(heat.initial())
+    mode *= 1e-4 / np.abs(mode[:dim]).max()
+    contacts = from_steady(system)[0].contacts
+    ends = []
+    for sign in (1, -1):
+        temperature = heat.parts(np.concatenate(states[0]) + sign * mode[:dim])
+        worn = Worn(state.shape + sign * mode[dim:], 0 * system.pair.strip.weights)
+        ends.append(run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature)))
+    apart = np.linalg.norm(ends[0].pressure - ends[1].pressure, axis=1)[1::2]
+    rate = growth_rate(system, pressure)
+    assert rate == pytest.approx(np.log(values[largest].real) / system.motion.period, rel=1e-12)
+    assert np.log(apart[-1] / apart[0]) / (9 * system.motion.period) == pytest.approx(rate, rel=0.01)
+
+
+def test_no_growth_rate_of_what_is_not_stationary(assembled: Assemble) -> None:
+    """The rate of a run's last state is told where it stays, and else the reason why it is not."""
+    system = assembled("example1-heat", *COARSE, "heat.partition=0.2", "wear.punch.coefficient=4e-6")
+    for half_cycles, told in ((1, False), (40, False), (3000, True)):
+        *_, last = march(system, half_cycles, implicit=True)
+        contacts = [c.pressure[0] for c in last.end.contacts if c is not None]
+        surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
+        change = last.periodicity[-2:].max() if half_cycles > 1 else np.nan
+        rate, reason = stationary_growth(system, np.array(contacts), surfaces, half_cycles % 2, change)
+        assert (rate is not None) == told
+        assert bool(reason) != told
 
 
 @pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="needs several ranks")

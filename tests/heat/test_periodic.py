@@ -9,7 +9,7 @@ import pytest
 
 from fenwear import Tribosystem
 from fenwear.arrays import Array
-from fenwear.cycle.jump import cycle_heat
+from fenwear.cycle.coupled import cycle_heat
 from fenwear.heat.exchange import State
 from fenwear.heat.periodic import CycleHeat
 

@@ -82,7 +82,7 @@ def test_a_signal_loses_nothing(fenwear: Run, tmp_path: Path, number: signal.Sig
         assert process.returncode == 1
         assert "--resume" in messages
         assert "Traceback" not in messages
-    with np.load(folder / "checkpoint" / "moment.npz") as moment:
+    with np.load(folder / "checkpoint" / "state.npz") as moment:
         reached = int(moment["half_cycle"])
     assert (np.diff(history(folder).half_cycle) > 0).all()
     on = options(f"run.half_cycles={reached + 20}", "output.every=10")

@@ -176,13 +176,13 @@ def thermal_modulus_without_poisson(patch: Patch) -> None:
 def material_the_other_way(patch: Patch) -> None:
     """The strip's material moves against the sliding direction."""
     right = HeatBody.step
-    patch.setattr(HeatBody, "step", lambda self, velocity, duration: right(self, -velocity, duration))
+    patch.setattr(HeatBody, "step", lambda self, velocity, *rest: right(self, -velocity, *rest))
 
 
 def longer_step(patch: Patch) -> None:
     """Time steps one per cent too long."""
     right = HeatBody.step
-    patch.setattr(HeatBody, "step", lambda self, velocity, duration: right(self, velocity, 1.01 * duration))
+    patch.setattr(HeatBody, "step", lambda self, velocity, time, *rest: right(self, velocity, 1.01 * time, *rest))
 
 
 def forgotten_heat(patch: Patch) -> None:
@@ -231,6 +231,7 @@ def forgotten_heat(patch: Patch) -> None:
         ("bimetal", thermal_modulus_without_poisson),
         ("periodic-flux", longer_step),
         ("jaeger", material_the_other_way),
+        ("open-strip", material_the_other_way),
         ("conductance", other_share),
         ("burton", thermal_modulus_without_poisson),
         ("burton", other_share),

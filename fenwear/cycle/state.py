@@ -1,4 +1,4 @@
-"""A moment of a run: all that its continuation needs."""
+"""The state of a run between two half-cycles: all that its continuation needs."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.heat.exchange import State
@@ -13,8 +14,8 @@ from fenwear.sliding.wear import Worn
 
 
 @dataclass(frozen=True)
-class Moment:
-    """The end of a half-cycle.
+class RunState:
+    """The state at the end of a half-cycle.
 
     Attributes:
         half_cycle: Its number; 0 before the first.
@@ -33,9 +34,9 @@ class Moment:
     periodic_phases: int = 0
 
 
-def beginning(system: Tribosystem, temperature: State | None) -> Moment:
+def beginning(system: Tribosystem, temperature: State | None) -> RunState:
     """Return the unworn bodies at their initial temperature."""
-    return Moment(0, system.unworn(), (None,) * len(system.motion.phases), temperature)
+    return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature)
 
 
 def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:
@@ -53,3 +54,18 @@ def parted(contact: ContactState) -> tuple[ContactState, ...]:
         ContactState(contact.pressure[k : k + 1], contact.gap[k : k + 1], contact.rigid[k : k + 1], contact.iterations)
         for k in range(len(contact.pressure))
     )
+
+
+def pressure_scale(system: Tribosystem, pressure: Array) -> float:
+    """Return the pressure where the load is carried, integral of p^2 over integral of p, MPa.
+
+    Its own mean weighted by itself: uniform pressure gives itself, and surface that carries nothing, however
+    much of it is drawn, changes nothing.
+
+    Args:
+        system: The assembled problem.
+        pressure: Of one or more phases (n,) or (m, n), MPa.
+    """
+    weights = system.pair.weights
+    force = float((np.abs(pressure) @ weights).sum())
+    return float((pressure**2 @ weights).sum()) / force if force > 0 else system.rigid.mean_pressure

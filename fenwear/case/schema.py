@@ -32,9 +32,21 @@ from fenwear.case.units import convert, quantity_text, shown
 from fenwear.errors import CaseError, Problem
 
 
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a key's bare numbers; in the JSON schema a text with a unit may stand for the number."""
+
+    symbol: str
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a number with this unit."""
+        return {"anyOf": [handler(core), {"type": "string"}]}
+
+
 def _quantity(unit: str) -> Any:
     """Return pydantic metadata: a number read with, and written in, `unit`."""
     return (
+        Unit(unit),
         BeforeValidator(lambda value: convert(value, unit)),
         PlainSerializer(lambda value: quantity_text(value, unit)),
     )
@@ -70,9 +82,13 @@ def _parameter(value: object) -> float:
 class Geometry(_Part):
     """Where the meshes come from: a gmsh .geo with its parameters, or a .msh."""
 
-    file: str = "punch_on_strip.geo"
-    parameters: dict[str, Annotated[float, BeforeValidator(_parameter)]] = {}
-    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = 4
+    file: str = Field(
+        default="punch_on_strip.geo", description=".geo or .msh beside the case file, or one of the ready geometries"
+    )
+    parameters: dict[str, Annotated[float, Unit("mm"), BeforeValidator(_parameter)]] = Field(
+        default={}, description="values of parameters of the .geo, by their names"
+    )
+    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(default=4, description="of the elements")
     order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
         default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
     )
@@ -91,27 +107,35 @@ class Geometry(_Part):
 class Model(_Part):
     """The plane model and its thickness."""
 
-    plane: Literal["stress", "strain"] = "stress"
-    thickness: Annotated[Length, Field(gt=0)] = 1.0
+    plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
+    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="size out of the plane")
 
 
 class Material(_Part):
     """An isotropic, linear-elastic material; the thermal values are needed with heat only."""
 
-    young: Annotated[Stress, Field(gt=0)]
-    poisson: Annotated[Number, Field(gt=-1, le=0.5)]
-    conductivity: Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None = None
-    heat_capacity: Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = None
-    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = None
-    expansion: Annotated[float, *_quantity("1/K")] | None = None
+    young: Annotated[Stress, Field(gt=0)] = Field(description="Young's modulus E")
+    poisson: Annotated[Number, Field(gt=-1, le=0.5)] = Field(description="Poisson's ratio nu")
+    conductivity: Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None = Field(
+        default=None, description="thermal conductivity k; 1 W/(m K) = 1"
+    )
+    heat_capacity: Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = Field(
+        default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
+    )
+    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
+        default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
+    )
+    expansion: Annotated[float, *_quantity("1/K")] | None = Field(
+        default=None, description="linear thermal expansion alpha"
+    )
 
 
 class Support(_Part):
     """Displacement components held at zero, on a named group or at a point."""
 
-    on: str | None = None
-    at: tuple[Length, Length] | None = None
-    fix: Annotated[tuple[Axis, ...], Field(min_length=1)]
+    on: str | None = Field(default=None, description="group of the geometry")
+    at: tuple[Length, Length] | None = Field(default=None, description="or a point [x, z] at a mesh node")
+    fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero")
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
@@ -123,9 +147,9 @@ class Support(_Part):
 class Load(_Part):
     """A load spread evenly over a named group: its resultant, or a traction (x, z)."""
 
-    on: str
-    force: tuple[Force, Force] | None = None
-    traction: tuple[Stress, Stress] | None = None
+    on: str = Field(description="group of the geometry")
+    force: tuple[Force, Force] | None = Field(default=None, description="resultant [x, z], spread evenly")
+    traction: tuple[Stress, Stress] | None = Field(default=None, description="or the traction [x, z] itself")
     over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
         default=None, description="(fraction of the cycle, factor) pairs: the load varies linearly between them"
     )
@@ -163,17 +187,17 @@ class Load(_Part):
 class Prescribed(_Part):
     """A temperature held on a named group of the boundary."""
 
-    on: str
-    temperature: Temperature = 0.0
+    on: str = Field(description="group of the geometry")
+    temperature: Temperature = Field(default=0.0, description="theta held there")
 
 
 class Body(_Part):
     """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
     regions: dict[str, str] = Field(default={}, description="name of the material of each region")
-    supports: tuple[Support, ...] = ()
-    loads: tuple[Load, ...] = ()
-    temperatures: tuple[Prescribed, ...] = ()
+    supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
+    loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
+    temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
     pivot: tuple[Length, Length] | None = Field(
         default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
     )
@@ -182,12 +206,12 @@ class Body(_Part):
 class Dependence(_Part):
     """A coefficient that depends on T (K), p (MPa) or v (mm/s): an expression, or a table with straight lines."""
 
-    expression: str | None = None
+    expression: str | None = Field(default=None, description="arithmetic on T, p and v")
     table: tuple[tuple[Number, Number], ...] | None = Field(
         default=None, description="(argument, value) pairs; beyond its ends the end values hold"
     )
-    of: Literal["T", "p", "v"] = "T"
-    unit: str = ""
+    of: Literal["T", "p", "v"] = Field(default="T", description="argument of the table")
+    unit: str = Field(default="", description="unit of the values")
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -247,7 +271,9 @@ class Contact(_Part):
     transverse_friction: Number = Field(
         default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
     )
-    solver: Literal["condensed", "full"] = "condensed"
+    solver: Literal["condensed", "full"] = Field(
+        default="condensed", description="full: all displacements as unknowns, slow, to compare with"
+    )
 
     @model_validator(mode="after")
     def _pure_number(self) -> Self:
@@ -269,12 +295,12 @@ class WearLaw(_Part):
     )
     beta: float | None = Field(default=None, description="beta, in the same unit; beta~ = beta mu^b")
     archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
-    hardness: Annotated[Stress, Field(gt=0)] | None = None
+    hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H, with archard")
     energy: Annotated[float, *_quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )
-    pressure_exponent: Annotated[Number, Field(gt=0)] = 1.0
-    speed_exponent: Annotated[Number, Field(gt=0)] = 1.0
+    pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
+    speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
 
     @staticmethod
     def coefficient_unit(pressure_exponent: float, speed_exponent: float) -> str:
@@ -342,8 +368,8 @@ class WearLaw(_Part):
 class Wear(_Part):
     """The wear law of each body that wears."""
 
-    punch: WearLaw | None = None
-    strip: WearLaw | None = None
+    punch: WearLaw | None = Field(default=None, description="law of the punch; without it the punch does not wear")
+    strip: WearLaw | None = Field(default=None, description="law of the strip; without it the strip does not wear")
 
     @model_validator(mode="after")
     def _some_law(self) -> Self:
@@ -373,12 +399,18 @@ class Reciprocating(_ToAndFro):
     speed rises linearly over the fraction `ramp` of the half-cycle, stays, and falls again.
     """
 
-    kind: Literal["reciprocating"]
-    amplitude: Annotated[Length, Field(gt=0)]
-    angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = None
-    period: Annotated[Time, Field(gt=0)] | None = None
-    profile: Literal["sinusoidal", "triangular", "trapezoidal"] = "sinusoidal"
-    ramp: Annotated[Number, Field(gt=0, le=0.5)] | None = None
+    kind: Literal["reciprocating"] = Field(description="to and fro")
+    amplitude: Annotated[Length, Field(gt=0)] = Field(description="u0, to both sides of the middle")
+    angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = Field(
+        default=None, description="omega; a half-cycle takes pi / omega"
+    )
+    period: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or the time of a whole cycle")
+    profile: Literal["sinusoidal", "triangular", "trapezoidal"] = Field(
+        default="sinusoidal", description="speed over a half-cycle; triangular: constant speed"
+    )
+    ramp: Annotated[Number, Field(gt=0, le=0.5)] | None = Field(
+        default=None, description="trapezoidal: fraction of the half-cycle in which the speed rises, and falls"
+    )
 
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
@@ -397,10 +429,10 @@ class Reciprocating(_ToAndFro):
 class OneWay(_Motion):
     """Steady sliding in one direction, counted in steps of `duration`."""
 
-    kind: Literal["one-way"]
-    direction: Literal["leftward", "rightward"]
-    speed: Annotated[Speed, Field(gt=0)]
-    duration: Annotated[Time, Field(gt=0)]
+    kind: Literal["one-way"] = Field(description="steadily in one direction")
+    direction: Literal["leftward", "rightward"] = Field(description="of the strip")
+    speed: Annotated[Speed, Field(gt=0)] = Field(description="of the strip")
+    duration: Annotated[Time, Field(gt=0)] = Field(description="of a step, which counts as a half-cycle")
     track: Annotated[Length, Field(gt=0)] | None = Field(
         default=None, description="length of the closed track over which the strip's wear spreads"
     )
@@ -409,8 +441,8 @@ class OneWay(_Motion):
 class Tabulated(_ToAndFro):
     """The strip's position over one cycle, straight lines between the given times; every stroke is a half-cycle."""
 
-    kind: Literal["table"]
-    times: Annotated[tuple[Time, ...], Field(min_length=3)]
+    kind: Literal["table"] = Field(description="the strip's position over a cycle")
+    times: Annotated[tuple[Time, ...], Field(min_length=3)] = Field(description="rising from 0 to the cycle's end")
     displacements: Annotated[tuple[Length, ...], Field(min_length=3)] = Field(description="of the strip, towards +x")
 
     @model_validator(mode="after")
@@ -464,23 +496,27 @@ class Heat(_Part):
     convection: Annotated[Conductance, Field(ge=0)] = Field(
         default=0.0, description="h on all other boundaries and on the two faces of the plane model"
     )
-    convecting_faces: bool = True
-    ambient: Temperature = 0.0
+    convecting_faces: bool = Field(default=True, description="whether the faces of the plane model convect, too")
+    ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings")
     inflow: Temperature | None = Field(
         default=None,
         description="of the strip's material that enters through free ends; by default, sliding one way, the "
         "ambient, and to and fro what has left comes back as it was",
     )
-    initial: Temperature = 0.0
+    initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
-    coupling: Literal["implicit", "split"] = "implicit"
+    coupling: Literal["implicit", "split"] = Field(
+        default="implicit", description="heat and contact together, or in turn by the operator split"
+    )
     split_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=1e-4, description="change of the gap volume that ends the operator split, equation (30)"
     )
     relaxation: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.5, description="of the pressure in the operator split, equation (29)"
     )
-    operator: Literal["reduced", "full"] = "reduced"
+    operator: Literal["reduced", "full"] = Field(
+        default="reduced", description="temperatures on a small basis, or on the whole mesh"
+    )
     # The keys that the operators of the bodies do not depend on.
     exchange_keys: ClassVar[frozenset[str]] = frozenset(
         (
@@ -507,8 +543,10 @@ class Heat(_Part):
 class Run(_Part):
     """How far a run goes and how it integrates the wear."""
 
-    half_cycles: Annotated[int, Field(ge=1, strict=True)]
-    integration: Literal["explicit", "implicit", "jump"] = "explicit"
+    half_cycles: Annotated[int, Field(ge=1, strict=True)] = Field(description="how many at most")
+    integration: Literal["explicit", "implicit", "jump"] = Field(
+        default="explicit", description="of the wear; jump: over many cycles at once"
+    )
     jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=3e-3,
         description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
@@ -550,18 +588,20 @@ class Written:
 class Case(_Part):
     """A problem: the root of the case file."""
 
-    title: str = ""
-    geometry: Geometry = Geometry()
-    model: Model = Model()
-    materials: Annotated[dict[str, Material], Field(min_length=1)]
-    punch: Body
-    strip: Body
-    contact: Contact = Contact()
-    wear: Wear
-    motion: Annotated[Reciprocating | OneWay | Tabulated, Field(discriminator="kind")]
-    heat: Heat | None = None
-    run: Run
-    output: Output = Output()
+    title: str = Field(default="", description="shown with the results")
+    geometry: Geometry = Field(default=Geometry(), description="the meshes")
+    model: Model = Field(default=Model(), description="of the plane")
+    materials: Annotated[dict[str, Material], Field(min_length=1)] = Field(description="by their names")
+    punch: Body = Field(description="the body above, body 1")
+    strip: Body = Field(description="the body below, which slides, body 2")
+    contact: Contact = Field(default=Contact(), description="between the two")
+    wear: Wear = Field(description="of punch, strip or both")
+    motion: Annotated[Reciprocating | OneWay | Tabulated, Field(discriminator="kind")] = Field(
+        description="of the strip under the punch"
+    )
+    heat: Heat | None = Field(default=None, description="without this table there is no temperature")
+    run: Run = Field(description="how far, and how")
+    output: Output = Field(default=Output(), description="what is kept")
 
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
     _written: Written = Written()

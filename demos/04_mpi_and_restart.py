@@ -141,8 +141,8 @@ axes[1].set_xlabel("half-cycle")
 plt.show()
 
 # %% [markdown]
-# They agree to rounding: the order in which numbers are added up differs with the number of processes. With
-# $\kappa = 0.5$ the contact is unstable (notebook 3), and late in a run even rounding grows. Then compare statistics,
+# They agree to rounding: the order in which numbers are added up differs with the number of processes. Where a contact
+# is as unstable as in `example1-heat-unstable` (notebook 3), late in a run even rounding grows. Then compare statistics,
 # not single values.
 #
 # ## A checkpoint of another case

@@ -12,15 +12,20 @@
 # # 6. Beside the paper
 #
 # Both examples come from a paper: I. Páczelt and Z. Mróz, "Numerical Analysis of Thermo-Mechanical Wear Problems for
-# Reciprocal Punch Sliding". This notebook computes every number that it prints anew, shows how far each depends on what
-# the paper leaves open, and gives a verdict on each. Nothing is fitted: where a number depends on something open, you
-# see it for several values.
+# Reciprocal Punch Sliding". This notebook computes every number that it prints anew, under several readings of what the
+# paper leaves open, and gives a verdict on each.
 #
-# What is open: the share $\kappa$ of the friction heat that goes to the punch, the debris' share $\gamma_d$, plane stress
-# or strain, the strip's supports, the heights of the hinges of Example 2, and the relaxation between heat and contact.
+# What is open: the share $\kappa$ of the friction heat that goes to the punch, the debris' share $\gamma_d$, whether the
+# faces of the punch lose heat (the words can be read either way), whether the conductance grows with pressure, plane
+# stress or strain, the strip's supports, the heights of the hinges of Example 2, and the relaxation between heat and
+# contact.
 #
-# The computations live in `fenwear.paper`; they take two to three minutes altogether. `python3 -m fenwear verify
-# --only paper` writes the same comparison as a page.
+# Some 60 readings were tried, against seven numbers and descriptions. So keep apart what is **fitted** and what is
+# **predicted**: that a reading meets a number it was fitted to says nothing, and that one of sixty comes close to some
+# number by chance says little.
+#
+# The computations live in `fenwear.paper`; they take some minutes altogether. `python3 -m fenwear verify --only paper`
+# writes the same comparison as a page.
 
 # %%
 # %matplotlib inline
@@ -30,79 +35,107 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython import display as show
 
-from fenwear.paper import Scope, needed_shares, paper_figures, paper_rows, sensitivity_rows
-from fenwear.paper.section import markdown
-from fenwear.paper.study import heat_runs
+from fenwear.paper import READINGS, Scope, paper_figures, paper_rows, sensitivity_rows
+from fenwear.paper.section import map_text, markdown, readings_markdown
+from fenwear.paper.study import central_runs, heat_runs, stability_maps
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: coarser meshes, fewer variants
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: coarser meshes, fewer readings
 if COARSE:
     scope = Scope(
         settings=("geometry.degree=2", "geometry.parameters.elements_along_contact=8"),
-        shares=(0.2, 0.5), cycles=2_000, variants=110, meshes=((8, 1), (8, 2)), steps=(5, 10),
+        readings=(READINGS[0], READINGS[3]), cycles=2_000, variants=110, meshes=((8, 1), (8, 2)), steps=(5, 10),
+        conductances=(0, 80), shares=(0.1, 0.3, 0.5),
     )  # fmt: skip
 else:
-    scope = Scope(meshes=((8, 2), (32, 2)), steps=(5, 10))  # 16 elements of degree 4 with 5 steps are the built-in case
-print(scope)
+    scope = Scope(meshes=((8, 4), (16, 4)), steps=(10, 5))  # each ends with the built-in case
+for reading in scope.readings:
+    print(f"{reading.name}: fitted {reading.fitted or 'nothing'}\n    {reading.command}")
 
 # %% [markdown]
 # ## Row by row
 #
-# A number is **reproduced** where ours agrees to one unit of the last digit printed, and **reproduced under an
-# assumption** where that needs a value that the paper does not give. The verdicts are computed from the numbers.
+# A number is **reproduced** where ours agrees to one unit of the last digit printed under every reading, and
+# **reproduced under an assumption** where it does under one that keeps to all that the paper gives. The verdicts are
+# computed from the numbers; the reason says who was fitted to what.
 
 # %%
 rows = paper_rows(scope)
 show.display(show.Markdown(markdown(rows)))
 
 # %% [markdown]
-# ## One kappa for all?
+# ## Readings side by side
 #
-# The temperatures are linear in $\kappa$: a value that gives 47.16 K always exists, so this agreement says nothing by
-# itself. What tests the model is whether **one** $\kappa$ gives several numbers.
+# Beside the paper's 47.16 K (one-way), 50.11 K (at $n = 2200$), a largest pressure that falls after $n = 1800$, and
+# 33.33 MPa at the centre of Example 2.
 
 # %%
-needed = needed_shares(scope)
-for name, share in needed.items():
-    print(f"{name:28s} kappa = {'none' if share is None else f'{share:.3f}'}")
+show.display(show.Markdown(readings_markdown(heat_runs(scope), central_runs(scope))))
 
 # %% [markdown]
-# It does not. The two temperatures need about 0.47 and 0.48, their difference 0.31, and the pressure in the middle of
-# Example 2 needs 0.18. And above 0.26 the periodic state of Example 1 is unstable in our model: what the paper calls the
-# end is then a state that no run of ours reaches.
+# What to look at:
 #
-# ## The pictures
+# - **Round values** are the built-in cases: insulated faces, $\kappa = \gamma_d = 1/2$, everything else as printed, nothing
+#   fitted. The two temperatures come out within 4 % and 1.5 %, the contact narrows and widens as described, and nothing
+#   splits. The peak comes by $n = 250$, and Example 2 draws 51 MPa to its centre: these two do not fit.
+# - **Fitted** to both temperatures are three: by $\kappa$ and $\gamma_d$ at the printed conductance, by $\kappa$ and the
+#   conductance without debris, by $\kappa$ and $\gamma_d$ with a conductance that grows with pressure and is the printed
+#   one at the mean pressure. Two free values for two numbers: look at the other columns.
+# - **Text literal** loses heat through the faces. The punch then needs twice the heat for the same 47.16 K, the bulge runs
+#   away, and the contact splits (notebook 3).
+# - **Small face loss** without conductance: a ninth of the printed loss meets both temperatures. So insulated faces
+#   are not the only way; small against the printed loss they must be.
+# - **Literal sum** takes 47.16 K as the sum of both directions and the conductance as proportional to pressure. It gives
+#   that number with nothing fitted, 47.42 K; but then the run stays at 34 K.
+# - A late peak, or 33 MPa in Example 2, needs something that departs from the paper's data: a thermo-elastic response
+#   **times 0.65**, a **friction arm** of 30 mm, $n$ counted in **steps of heat**; or the next one.
+# - **Relaxed** takes the relaxation (29) from the pressure of the half-cycle before, by 0.001. The rule (30) ends the
+#   iterations after two, because the gap hardly moves in them, and the pressure that heats and wears lags some 500
+#   half-cycles behind the contact. The peak then comes near $n = 1800$, to which the factor was chosen, and Example 2
+#   sees 38 MPa instead of 51. With all three values fitted it is the reading nearest to all numbers. But its pressures are
+#   not those of the contact at that time: it would mean that the course of the bulge shows the iteration, not the
+#   physics. Nothing in the text says that the factor was so small.
+#
+# ## The map
+#
+# One figure explains the temperatures. Each is linear in the punch's share of the heat, so each is a line over the
+# conductance; where the two lines meet, both fit. What a run does there depends on the side of neutral stability.
 
 # %%
 for picture in paper_figures(scope):
     show.display(show.Markdown(f"**{picture.title}.** {picture.caption}"))
     show.display(picture.figure)
+print(map_text(stability_maps(scope)))
 
 # %% [markdown]
+# The one-way temperature fixes $\kappa (1 - \gamma_d)$, the ratio of the two temperatures then fixes the conductance or
+# $\gamma_d$. With insulated faces the lines meet right at neutral stability, near a share of 0.2: a run takes thousands of
+# half-cycles to forget its start, as in the paper. With faces that convect they lie where disturbances grow
+# a hundredfold in a minute: that state exists, and no run stays in it.
+#
 # ## How exact are our own numbers?
 #
-# Before a difference to the paper means anything, ours must not depend on the mesh and the time step. Temperatures and
-# growth rates do not, to the digits of the table: the time steps matter most, and half of them change the periodic
-# temperature by less than half a per cent. The width in contact is known to one node's weight, so to a millimetre or
-# two. Pressures of an unstable run agree between fine meshes to a few per cent, and only before the contact splits.
+# Before a difference to the paper means anything, ours must not depend on mesh, time step and coupling. Here they do not,
+# to the digits of the table; time steps matter most. The width in contact is known to one node's weight, so to a
+# millimetre or two.
 
 # %%
 choices, discretisations = sensitivity_rows(scope)
-print(f"{'':42s} kappa  one-way  periodic     growth  narrowest  in the middle")
+print(f"{'':42s} one-way  periodic     growth  at the end  narrowest  in the middle")
 for variant in (*discretisations, *choices):
-    print(f"{variant.name:42s} {variant.share:5.1f}  {variant.steady.monotonic:5.2f} K   {variant.steady.periodic:5.2f} K  "
-          f"{variant.steady.growth:+.4f}/s   {variant.narrowest:5.1f} mm   {variant.peak:6.1f} MPa")  # fmt: skip
+    print(f"{variant.name:42s} {variant.steady.monotonic:5.2f} K   {variant.steady.periodic:5.2f} K  "
+          f"{variant.steady.growth:+.4f}/s     {variant.late:5.2f} K   {variant.narrowest:5.1f} mm   "
+          f"{variant.peak:6.1f} MPa")  # fmt: skip
 
 # %% [markdown]
 # What to look at:
 #
 # - **Strip supports** change nothing that the table shows.
 # - **Hinge heights** change the pressure in the middle of Example 2 by some MPa.
-# - **Debris** carries heat off before it enters: $\gamma_d = 0.1$ acts like a tenth less friction heat. A
-#   $\kappa$ and a $\gamma_d$ cannot be told apart by one temperature.
-# - **Plane strain** leaves the temperatures and makes the state less stable: the thermal strain out of the plane is held,
-#   which bulges the punch more. With $\kappa = 0.2$ it is unstable there.
+# - **Debris and share**: $\gamma_d$ up or $\kappa$ down by 0.1 do nearly the same. The two cannot be told apart by one
+#   temperature.
+# - **Plane strain** makes the state less stable: the thermal strain out of the plane is held, which bulges the punch more.
 # - A strip that **moves** under the punch, in five positions of its stroke of 3 mm, changes pressures by 2 % at most.
-# - **Splitting** heat and contact as in the paper gives the same, as long as the contact does not split.
+# - **Splitting** heat and contact as in the paper, from the contact one cycle ago, gives the same.
 #
 # ## When does the peak fall?
 #
@@ -116,15 +149,13 @@ layer, half_cycle = 20.0, np.pi / 10
 print(f"diffusion through the composite layer: {layer**2 / (2 * diffusivity) / half_cycle:.0f} half-cycles")
 
 figure, ax = plt.subplots(figsize=(7, 3), layout="constrained")
-for number, run in enumerate(heat_runs("example1-heat", scope)):
-    ax.plot(run.half_cycle[1::2], run.middle_pressure[1::2] / run.mean, linestyle=("-", "--", "-.", ":")[number % 4],
-            color=f"C{number}", label=f"{run.share:g}")  # fmt: skip
+for number, run in enumerate(heat_runs(scope)[:5]):
+    ax.plot(run.half_cycle[1::2], run.middle_pressure[1::2] / run.mean, color=f"C{number}", label=run.reading.name,
+            linestyle=("-", "--", "-.", ":", (0, (5, 1, 1, 1)))[number])  # fmt: skip
 ax.axvline(1800, color="0.5", linewidth=0.8)
-ax.set(
-    xlabel="half-cycle", ylabel="over the mean (-)", title="Largest pressure on the middle third, leftward half-cycles"
-)
+ax.set(xlabel="n", ylabel="over the mean (-)", title="Largest pressure on the middle two thirds, leftward half-cycles")
 ax.set_ylim(bottom=0)
-ax.legend(title="κ", frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
+ax.legend(title="reading", frameon=False, loc="center left", bbox_to_anchor=(1, 0.5))
 plt.show()
 
 # %% [markdown]
@@ -132,12 +163,13 @@ plt.show()
 #
 # - Everything that follows from equilibrium and the wear rule is reproduced: wear velocities, the pressure without heat,
 #   equal mean fluxes.
-# - Everything that the text describes in words about the growth of the bulge is reproduced, for most values of $\kappa$.
-# - The temperatures are reproduced one by one with a suitable $\kappa$, but not together with their difference, and not
-#   in a run: with that $\kappa$ our contact is thermo-elastically unstable and splits.
-# - The half-cycle at which the peak falls is not reproduced.
+# - Both temperatures and the described course come together where the faces lose little heat or none. Round values for what
+#   is open give them within 4 % with nothing fitted, two fitted values give them exactly.
+# - The half-cycle at which the peak falls and the 33.33 MPa of Example 2 are not reproduced by any reading that keeps to the
+#   paper's data and solves heat and contact together. A relaxation that lags moves the first, and comes near the second.
 #
 # ## Your turn
 #
 # - `Scope(settings=("model.plane=strain",))`: the whole table in plane strain.
-# - `Scope(shares=(0.2, 0.22, 0.24, 0.26, 0.28))`: around the neutral $\kappa$.
+# - `Reading("mine", ("heat.partition=0.3", "heat.debris=0.2"))` from `fenwear.paper`: your own reading, in
+#   `Scope(readings=(*READINGS, mine))`.

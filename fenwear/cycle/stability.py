@@ -28,34 +28,44 @@ STEP, MAX_HALVINGS, SETTLED = 1.0, 10, 1e-6  # of differences to temperatures, K
 def stability_number(system: Tribosystem) -> float:
     """Return the wear step over its explicit limit: above 1 an explicit run oscillates and diverges; collective.
 
-    On closed contact a worn depth lowers the pressure by P = (I - H-part) S^-1, the leading block of
-    the inverse of [[S, H], [E, 0]]. An explicit half-cycle multiplies an error of the shape by
-    I - K P with K = beta~ S b p^(b-1) of both bodies at the mean pressure, in the phase that wears most:
-    stable while K times the largest eigenvalue of P is below 2.
+    On closed contact an opened gap lowers the pressure by P, the leading block of the inverse of
+    [[S, H], [E, 0]], and the pressure of a phase opens the gap by its wear by W: beta~ S b p^(b-1) of both
+    bodies at the mean pressure, the strip's put on its nodes and read there. An explicit step multiplies an
+    error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
+    the phase that wears most.
     """
-    rigid = system.rigid
-    n, r = rigid.rigid_normal.shape
-    uniform = np.full((len(system.motion.phases), n), rigid.mean_pressure)
+    n, r = system.rigid.rigid_normal.shape
+    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
     wear = system.phases_wear
     slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
-    scale = system.interface.elastic_length
+    left, right = wear.border(uniform)
+    ratios, directions = system.friction_ratios(), np.array(system.motion.directions)
+    scale, most = system.interface.elastic_length, slopes.max(axis=1)
     largest = 0.0
-    for d in sorted(set(system.motion.directions)):
-        friction_ratio = system.friction_ratio(d)
+    for d in np.unique(directions):
+        phase = int(np.argmax(np.where(directions == d, most, -1.0)))
+        interface, ratio = system.interfaces[phase], ratios[phase]
         matrix = np.zeros((n + r, n + r))
-        matrix[:n, :n] = system.interface.compliance(friction_ratio) / scale
-        matrix[:n, n:] = rigid.rigid_normal
-        matrix[n:, :n] = rigid.equilibrium(friction_ratio)
-        factor = scipy.linalg.lu_factor(matrix)
-
-        def respond(shape: Array, factor: tuple[Array, Array] = factor) -> Array:
-            return scipy.linalg.lu_solve(factor, np.concatenate([shape.ravel(), np.zeros(r)]))[:n]
-
-        operator = LinearOperator((n, n), matvec=respond, dtype=float)
+        matrix[:n, :n] = interface.compliance(ratio) / scale
+        matrix[:n, n:] = interface.rigid.rigid_normal
+        matrix[n:, :n] = interface.rigid.equilibrium(ratio)
+        operator = _worn_response(scipy.linalg.lu_factor(matrix), left[phase] / scale, right[phase])
         start = np.where(np.arange(n) % 2, 1.0, -1.0)  # the fastest mode alternates from node to node
         values = eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)
-        largest = max(largest, float(np.abs(values).max()) / scale)
-    return float(slopes.max()) * largest / 2
+        largest = max(largest, float(np.abs(values).max()))
+    return largest / 2
+
+
+def _worn_response(factor: tuple[Array, Array], left: Array, right: Array) -> LinearOperator:
+    """Return W P: the gap (n,) worn open by the pressure that a gap takes away, W = left right."""
+    n = len(left)
+    none = np.zeros(len(factor[0]) - n)
+
+    def apply(gap: Array) -> Array:
+        pressure = scipy.linalg.lu_solve(factor, np.concatenate([gap.ravel(), none]))[:n]
+        return left @ (right @ pressure)
+
+    return LinearOperator((n, n), matvec=apply, dtype=float)
 
 
 def growth_rate(system: Tribosystem, pressure: Array) -> float:

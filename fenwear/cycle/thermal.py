@@ -136,7 +136,7 @@ class ThermalContact:
                 contact = self._contact.solve(free, contact, layer)
             except ConvergenceError as error:  # the heat of a pressure too far off opens all nodes
                 raise ConvergenceError(f"{error}; in iteration {iteration} of the split: {SPLIT_ADVICE}") from error
-            before, volume = volume, self._volume(free)
+            before, volume = volume, gap_volume(self.system, free)
             pressure = pressure + relaxation * (contact.pressure[0] - pressure)
             if abs(volume - before) < tolerance * volume:
                 return contact, after, self._heat(after, terms, iteration)
@@ -146,13 +146,14 @@ class ThermalContact:
             f"the operator split of heat and contact did not converge in {iteration} iterations: {SPLIT_ADVICE}"
         )
 
-    def _volume(self, gap: Array) -> float:
-        """Return the cross-section between the unloaded surfaces where they touch first, mm²."""
-        modes, weights = self.system.rigid.rigid_normal, self.system.pair.weights
-        root = np.sqrt(weights)
-        fitted = modes @ np.linalg.lstsq(modes * root[:, None], gap * root, rcond=None)[0]
-        return float(weights @ np.abs(gap - fitted))
-
     def _heat(self, state: State, terms: Array, iterations: int) -> HalfCycleHeat:
         punch, strip = self.exchange.contact_temperatures(state)
         return HalfCycleHeat(punch, strip, terms, iterations)
+
+
+def gap_volume(system: Tribosystem, gap: Array) -> float:
+    """Return the cross-section between the unloaded surfaces where they touch first, mm², for (30)."""
+    modes, weights = system.rigid.rigid_normal, system.pair.weights
+    root = np.sqrt(weights)
+    fitted = modes @ np.linalg.lstsq(modes * root[:, None], gap * root, rcond=None)[0]
+    return float(weights @ np.abs(gap - fitted))

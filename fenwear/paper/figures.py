@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from fenwear.arrays import Array
 from fenwear.paper.published import (
-    DIFFERENCE,
     LARGEST_PRESSURE,
     MONOTONIC_TEMPERATURE,
     PEAK_HALF_CYCLE,
     PERIODIC_TEMPERATURE,
+    TEMPERATURE_HALF_CYCLE,
 )
-from fenwear.paper.rows import NEUTRAL, needed_shares, sensitivity_rows
-from fenwear.paper.study import FULL, HeatRun, Scope, Variant, heat_runs, no_heat
+from fenwear.paper.rows import sensitivity_rows
+from fenwear.paper.study import FULL, HeatRun, Scope, Variant, central_runs, heat_runs, no_heat, stability_maps
 from fenwear.report.style import (
     ALONG_CONTACT,
     BLUE,
+    COLOURS,
     DIRECTIONS,
     GREY,
-    RED,
     contact_axis,
     legend_beside,
     panels,
@@ -32,8 +34,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-KAPPA = "kappa, the punch's share of the friction heat (-)"
 SHAPES_AT = (1, 100, 300, 1000, 1800, 2600)
+GROWTH = 0.02  # 1/s at which the colours of the map end
 
 
 class Picture(NamedTuple):
@@ -45,8 +47,8 @@ class Picture(NamedTuple):
 
 
 def paper_figures(scope: Scope = FULL) -> list[Picture]:
-    """Return the pictures of the comparison; collective, three minutes for the full scope at first use."""
-    one, two = heat_runs("example1-heat", scope), heat_runs("example2-heat", scope)
+    """Return the pictures of the comparison; collective, four minutes for the full scope at first use."""
+    runs = heat_runs(scope)
     choices, discretisations = sensitivity_rows(scope)
     return [
         Picture(
@@ -56,43 +58,41 @@ def paper_figures(scope: Scope = FULL) -> list[Picture]:
             _without_heat(scope),
         ),
         Picture(
-            "Temperature and stability over kappa",
-            "Temperature at x = 0 of Example 1 from the two one-way motions and in periodic motion, how far they are "
-            "apart, and the rate at which disturbances of the periodic state grow. Dotted: the paper.",
-            _over_share(one),
-        ),
-        Picture(
-            "Which kappa each number needs",
-            "Were one kappa behind all of the paper's numbers, the points would stand on one vertical line. Left of "
-            "the grey area the periodic state of Example 1 is stable in our model; in it no run stays there.",
-            _needed(scope),
+            "What the two temperatures ask for, and what is stable",
+            "Growth of disturbances of the periodic state of Example 1 over the conductance and the punch's share of "
+            f"the friction heat. On the dashed line the one-way motions give {MONOTONIC_TEMPERATURE} K, on the "
+            f"dash-dotted one the periodic state has {PERIODIC_TEMPERATURE} K; where they meet, both fit. Above the "
+            "black line this state is unstable. Where the faces convect, the punch needs twice the heat, and the lines "
+            "run where disturbances grow fast.",
+            _map(scope),
         ),
         Picture(
             "Example 1: runs from the cold, flat punch",
-            f"Largest pressure in the middle third, width in contact and temperature at x = 0. The paper's pressure "
-            f"grows until half-cycle {PEAK_HALF_CYCLE:,} and then falls (dotted).",
-            _runs(one),
+            "Largest pressure on the middle two thirds, width in contact and temperature at x = 0, of rightward "
+            f"half-cycles. Dotted: the paper's temperatures, and n = {PEAK_HALF_CYCLE:,}, after which its largest "
+            "pressure falls.",
+            _runs(runs[: len(COLOURS)]),
         ),
         Picture(
             "Example 1: worn shape",
-            "Worn depth after several half-cycles, for a stable and an unstable kappa.",
-            _shapes(one),
+            "Worn depth after several half-cycles, where the contact stays whole and where it splits.",
+            _shapes(runs),
         ),
         Picture(
             "Example 2: pressure at the centre",
             f"Mean of both directions at x = 0 over the half-cycles. The paper: about {LARGEST_PRESSURE} MPa (dotted).",
-            _central(two),
+            _central([run for run in central_runs(scope) if run is not None][: len(COLOURS)]),
         ),
         Picture(
-            "What the paper leaves open",
-            "Each line is one other choice, at two values of kappa; the dotted lines pass through the built-in case "
-            "of each example.",
+            "What else the paper leaves open",
+            "Each point is one other choice, all else as in the built-in case, after "
+            f"{scope.variants} half-cycles; the dotted lines pass through the built-in case of each example.",
             _variants(choices),
         ),
         Picture(
-            "Mesh and time step",
-            "The same numbers on other meshes and with other time steps of heat, for Example 1; the dotted lines pass "
-            "through the finest of each.",
+            "Mesh, time step and coupling",
+            "The same numbers on other meshes, with other time steps of heat and other couplings, for Example 1; the "
+            "dotted lines pass through the last of each.",
             _variants(discretisations, reference=-1),
         ),
     ]
@@ -114,53 +114,39 @@ def _without_heat(scope: Scope) -> Figure:
     return figure
 
 
-def _over_share(runs: Sequence[HeatRun]) -> Figure:
-    figure, axes = panels(3, 2.2)
-    shares = [run.share for run in runs]
-    one_way, periodic = run_style(0), run_style(1)
-    axes[0].plot(shares, [run.steady.monotonic for run in runs], marker="o", label="two one-way motions", **one_way)
-    axes[0].plot(shares, [run.steady.periodic for run in runs], marker="s", label="periodic motion", **periodic)
-    for printed, colour in ((MONOTONIC_TEMPERATURE, one_way["color"]), (PERIODIC_TEMPERATURE, periodic["color"])):
-        axes[0].axhline(float(printed), color=colour, linestyle=":", linewidth=1)
-    axes[0].set(ylabel="temperature (K)", title="Temperature at x = 0")
-    axes[0].legend(frameon=False)
-    axes[1].plot(shares, [run.steady.difference for run in runs], marker="o", **one_way)
-    reference_line(axes[1], float(DIFFERENCE), "paper")
-    axes[1].set(ylabel="apart (%)", title="Difference over the periodic temperature")
-    axes[1].set_ylim(bottom=0)
-    axes[2].plot(shares, [run.steady.growth for run in runs], marker="o", **one_way)
-    reference_line(axes[2], 0.0, "neutral")
-    axes[2].set(ylabel="growth (1/s)", title="Growth of disturbances of the periodic state", xlabel=KAPPA)
-    return figure
+def _map(scope: Scope) -> Figure:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import TwoSlopeNorm
+    from matplotlib.figure import Figure
 
-
-def _needed(scope: Scope) -> Figure:
-    needed = needed_shares(scope)
-    neutral = needed.pop(NEUTRAL)
-    names = {
-        "monotonic temperature": f"{MONOTONIC_TEMPERATURE} K, one-way motions",
-        "periodic temperature": f"{PERIODIC_TEMPERATURE} K, periodic motion",
-        "their difference": f"{DIFFERENCE} % apart",
-        "central pressure, Example 2": f"{LARGEST_PRESSURE} MPa at the centre",
-    }
-    figure, (ax,) = panels(1, 2.4)
-    if neutral is not None:
-        ax.axvspan(neutral, max(scope.shares), color="0.9", linewidth=0)
-    for level, share in enumerate(needed.values()):
-        if share is None:
-            ax.annotate("none", (min(scope.shares), level), va="center")
-        else:
-            ax.plot(share, level, "o", color=BLUE)
-            ax.annotate(f"{share:.2f}", (share, level), xytext=(6, 0), textcoords="offset points", va="center")
-    ax.set_yticks(range(len(needed)), [names[key] for key in needed])
-    ax.set_ylim(len(needed) - 0.5, -0.5)
-    ax.set_xlim(min(scope.shares), max(scope.shares))
-    ax.set(xlabel=KAPPA)
+    maps, norm = stability_maps(scope), TwoSlopeNorm(0.0, -GROWTH, GROWTH)
+    figure = Figure(figsize=(9.0, 3.9), layout="constrained")
+    axes: list[Axes] = list(figure.subplots(1, len(maps), sharex=True, sharey=True))
+    for ax, one in zip(axes, maps, strict=True):
+        ax.contourf(one.conductance, one.share, np.clip(one.growth.T, -GROWTH, GROWTH),
+                    levels=np.linspace(-GROWTH, GROWTH, 25), cmap="RdBu_r", norm=norm)  # fmt: skip
+        ax.plot(one.conductance, one.neutral, color="black", linewidth=2, label="neutral stability")
+        ax.plot(one.conductance, one.one_way, color="black", linestyle="--", linewidth=1.2,
+                label=f"one-way motions {MONOTONIC_TEMPERATURE} K")  # fmt: skip
+        ax.plot(one.conductance, one.periodic, color="black", linestyle="-.", linewidth=1.2,
+                label=f"periodic state {PERIODIC_TEMPERATURE} K")  # fmt: skip
+        for reading in scope.readings:
+            if reading.point is not None and (reading.faces, reading.debris) == (one.faces, one.debris):
+                ax.plot(*reading.point, "o", color="black", markerfacecolor="white", zorder=3)
+                left = reading.point[0] < one.conductance[-1] / 2
+                ax.annotate(reading.name, reading.point, xytext=(8 if left else -8, -12), textcoords="offset points",
+                            ha="left" if left else "right", fontsize="small", in_layout=False)  # fmt: skip
+        ax.set(title=one.name, xlabel="conductance h_c (W/(m² K))", xlim=(one.conductance[0], one.conductance[-1]),
+               ylim=(one.share[0], one.share[-1]))  # fmt: skip
+        ax.title.set_fontsize("small")
+    axes[0].set_ylabel("kappa (1 - gamma_d) (-)")
+    figure.colorbar(ScalarMappable(norm, "RdBu_r"), ax=axes, label="growth (1/s)", extend="both")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
 def _runs(runs: Sequence[HeatRun]) -> Figure:
-    figure, axes = panels(3, 2.2)
+    figure, axes = panels(3, 2.6)
     quantities: tuple[tuple[str, Callable[[HeatRun], Array]], ...] = (
         ("pressure (MPa)", lambda run: run.middle_pressure),
         ("width (mm)", lambda run: run.width),
@@ -168,27 +154,30 @@ def _runs(runs: Sequence[HeatRun]) -> Figure:
     )
     for ax, (label, value) in zip(axes, quantities, strict=True):
         for number, run in enumerate(runs):
-            ax.plot(run.half_cycle[::2], value(run)[::2], linewidth=1, label=f"{run.share:g}", **run_style(number))
+            shown = run.half_cycle <= len(run.half_cycle)
+            ax.plot(run.half_cycle[shown][::2], value(run)[shown][::2], linewidth=1, label=run.reading.name,
+                    **run_style(number))  # fmt: skip
         ax.axvline(PEAK_HALF_CYCLE, color="0.5", linewidth=0.8, linestyle=":", label="_paper")
         ax.set(ylabel=label)
         ax.set_ylim(bottom=0)
-    axes[0].set_title("Largest pressure on the middle third, rightward half-cycles")
+    reference_line(axes[2], float(MONOTONIC_TEMPERATURE), "")
+    reference_line(axes[2], float(PERIODIC_TEMPERATURE), "")
+    axes[0].set_title("Largest pressure on the middle two thirds")
     axes[1].set_title("Width in contact")
     axes[2].set_title("Temperature at x = 0")
-    axes[2].set_xlabel("half-cycle")
-    legend_beside(axes[0], "kappa")
+    axes[2].set_xlabel("n")
+    _legend_below(figure, axes[0])
     return figure
 
 
 def _shapes(runs: Sequence[HeatRun]) -> Figure:
-    stable = [run for run in runs if run.steady.growth < 0]
-    unstable = [run for run in runs if run.steady.growth >= 0]
-    shown = [*stable[-1:], *unstable[-1:]]
+    split = [run for run in runs if run.opened is not None]
+    shown = [runs[0], *split[:1]]
     figure, axes = panels(len(shown), 2.6)
     for ax, run in zip(axes, shown, strict=True):
-        for number, half_cycle in enumerate(n for n in SHAPES_AT if n <= len(run.wear)):
+        for number, half_cycle in enumerate(SHAPES_AT):
             ax.plot(run.x, 1e3 * run.wear[run.at(half_cycle)], label=f"{half_cycle:,}", **run_style(number))
-        ax.set(title=f"kappa = {run.share:g}", ylabel="worn depth (µm)")
+        ax.set(title=run.reading.name, ylabel="worn depth (µm)")
         ax.invert_yaxis()
     legend_beside(axes[0], "half-cycle")
     axes[-1].set_xlabel(ALONG_CONTACT)
@@ -196,46 +185,41 @@ def _shapes(runs: Sequence[HeatRun]) -> Figure:
 
 
 def _central(runs: Sequence[HeatRun]) -> Figure:
-    figure, (ax,) = panels(1, 3.0)
+    figure, (ax,) = panels(1, 3.4)
     for number, run in enumerate(runs):
-        ax.plot(run.half_cycle[1:], run.central_pressure, linewidth=1, label=f"{run.share:g}", **run_style(number))
-    reference_line(ax, float(LARGEST_PRESSURE), "paper", at=0.42)  # where no line runs
-    ax.set(xlabel="half-cycle", ylabel="pressure (MPa)")
+        ax.plot(run.half_cycle[1:], run.central_pressure, linewidth=1, label=run.reading.name, **run_style(number))
+    reference_line(ax, float(LARGEST_PRESSURE), "paper", at=0.85)
+    ax.set(xlabel="n", ylabel="pressure (MPa)", xlim=(0, TEMPERATURE_HALF_CYCLE))
     ax.set_ylim(bottom=0)
-    legend_beside(ax, "kappa")
+    _legend_below(figure, ax)
     return figure
+
+
+def _legend_below(figure: Figure, ax: Axes) -> None:
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False)
 
 
 def _variants(variants: Sequence[Variant], reference: int = 0) -> Figure:
     """Draw what a choice changes: a row for each, a panel for each quantity."""
     from matplotlib.figure import Figure
 
-    names = list(dict.fromkeys((v.group, v.name) for v in variants))
-    shares = list(dict.fromkeys(v.share for v in variants))
     quantities: tuple[tuple[str, Callable[[Variant], float]], ...] = (
-        ("periodic\ntemperature (K)", lambda v: v.steady.periodic),
+        ("temperature\nat the end (K)", lambda v: v.late),
         ("growth\n(1/s)", lambda v: v.steady.growth),
         ("narrowest\ncontact (mm)", lambda v: v.narrowest),
         ("pressure in the\nmiddle (MPa)", lambda v: v.peak),
     )
-    figure = Figure(figsize=(9.0, 0.28 * len(names) + 1.4), layout="constrained")
+    figure = Figure(figsize=(9.0, 0.28 * len(variants) + 1.4), layout="constrained")
     axes: list[Axes] = list(figure.subplots(1, len(quantities), sharey=True))
-    levels = {name: level for level, name in enumerate(names)}
     for ax, (title, value) in zip(axes, quantities, strict=True):
-        for share, colour, marker in zip(shares, (BLUE, RED), "os", strict=False):
-            rows = [v for v in variants if v.share == share]
-            ax.plot([value(v) for v in rows], [levels[v.group, v.name] for v in rows], marker, color=colour,
-                    markersize=4, label=f"{share:g}")  # fmt: skip
-            for group in dict.fromkeys(v.group for v in rows):
-                members = [v for v in rows if v.group == group]
-                ends = sorted(levels[v.group, v.name] for v in (members[0], members[-1]))
-                ax.vlines(
-                    value(members[reference]), ends[0] - 0.4, ends[1] + 0.4, color=colour, linestyle=":", linewidth=1
-                )
+        ax.plot([value(v) for v in variants], range(len(variants)), "o", color=BLUE, markersize=4)
+        for group in dict.fromkeys(v.group for v in variants):
+            levels = [level for level, v in enumerate(variants) if v.group == group]
+            ax.vlines(value(variants[levels[reference]]), levels[0] - 0.4, levels[-1] + 0.4, color=BLUE,
+                      linestyle=":", linewidth=1)  # fmt: skip
         ax.set_title(title, fontsize="small")
         ax.spines[["top", "right"]].set_visible(False)
         ax.tick_params(labelsize="small")
-    axes[0].set_yticks(range(len(names)), [name for _, name in names])
+    axes[0].set_yticks(range(len(variants)), [v.name for v in variants])
     axes[0].invert_yaxis()
-    axes[-1].legend(title="kappa", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     return figure

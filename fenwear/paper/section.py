@@ -7,19 +7,35 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, get_args
 
+import numpy as np
+
+from fenwear.arrays import Array
 from fenwear.paper.figures import paper_figures
 from fenwear.paper.published import OPEN
-from fenwear.paper.rows import NEUTRAL, Row, Verdict, needed_shares, paper_rows, sensitivity_rows
-from fenwear.paper.study import FULL, Scope, Variant
+from fenwear.paper.readings import TRIED
+from fenwear.paper.rows import Row, Verdict, paper_rows, sensitivity_rows
+from fenwear.paper.study import FULL, HeatRun, Scope, StabilityMap, Variant, central_runs, heat_runs, stability_maps
 from fenwear.report.html_page import escape, figure
 
 COLUMNS = ("quantity", "paper", "fenwear", "verdict", "why")
-NUMBERS = ("kappa", "one-way (K)", "periodic (K)", "growth (1/s)", "narrowest (mm)", "middle (MPa)", "centre (MPa)")
+NUMBERS = (
+    "one-way (K)", "periodic (K)", "growth (1/s)", "at the end (K)", "narrowest (mm)", "middle (MPa)", "centre (MPa)",
+)  # fmt: skip
 LEGEND = (
     "One-way and periodic: temperature at x = 0 of the two one-way motions together and of the state that repeats. "
-    "Growth: of the least stable disturbance of that state. Narrowest: least width in contact of a run. Middle, "
-    "centre: its largest pressure on the middle third, and at x = 0 as mean of both directions, after the flat punch's "
-    "edges have worn off."
+    "Growth: of the least stable disturbance of that state. At the end: temperature at x = 0 of the run. Narrowest: "
+    "least width in contact of the run. Middle, centre: its largest pressure on the middle two thirds, and at x = 0 as "
+    "mean of both directions, after the flat punch's edges have worn off."
+)
+COURSE = (200, 800, 1400, 2200)  # values of the paper's n
+READING = (
+    "reading", "fitted", "against the paper", "one-way (K)", "periodic (K)", "growth (1/s)",
+    *(f"n = {n:,} (K)" for n in COURSE), "largest (MPa)", "at n", "splits at n", "width (mm)", "Example 2 (MPa)",
+)  # fmt: skip
+READING_LEGEND = (
+    "One-way: what stands beside 47.16 K. Periodic, growth: of the state that repeats, beside 50.11 K. Then the run: "
+    "temperature at x = 0, largest pressure on the middle two thirds and when, width in contact at its least and in "
+    "the end. Example 2: largest pressure at the centre, mean of both directions, beside 33.33 MPa."
 )
 
 
@@ -30,21 +46,26 @@ def write_section(scope: Scope = FULL) -> str:
     drawn = [figure(_png(p.figure), "png", f"{p.title}. {p.caption}", f"{p.title}. {p.caption}") for p in pictures]
     return "\n".join(
         [
-            f"<p>The paper leaves open: {escape('; '.join(OPEN))}. Nothing is fitted to its numbers. A number is "
-            "reproduced where ours agrees to one unit of the last digit printed, and under an assumption where that "
-            "needs a value that the paper does not give.</p>",
+            f"<p>The paper leaves open: {escape('; '.join(OPEN))}. Each number stands under several readings; what a "
+            "reading was fitted to is said. A number is reproduced where ours agrees to one unit of the last "
+            "digit printed under every reading, and under an assumption where it does under one that keeps to all that "
+            f"the paper gives. Some {TRIED} readings were tried: that one of them meets a number says little, that one "
+            "meets numbers it was not fitted to says more.</p>",
             f"<p>{escape(summary(rows))}</p>",
             table(rows),
-            f"<p>{escape(needed_text(needed_shares(scope)))}</p>",
+            "<h3>Readings</h3>",
+            f"<p>{escape(READING_LEGEND)} {escape(map_text(stability_maps(scope)))}</p>",
+            readings_table(heat_runs(scope), central_runs(scope)),
+            commands(heat_runs(scope)),
             *drawn[:-2],
-            "<h3>What the paper leaves open</h3>",
+            "<h3>What else the paper leaves open</h3>",
             f"<p>{escape(LEGEND)}</p>",
             drawn[-2],
             variants_table("choice", choices),
-            "<h3>Mesh and time step</h3>",
+            "<h3>Mesh, time step and coupling</h3>",
             f"<p>{escape(convergence_text(discretisations))}</p>",
             drawn[-1],
-            variants_table("mesh or time step", discretisations),
+            variants_table("mesh, time step or coupling", discretisations),
         ]
     )
 
@@ -55,37 +76,76 @@ def summary(rows: Sequence[Row]) -> str:
     return f"Of {len(rows)} rows {', '.join(counts)}."
 
 
-def needed_text(needed: dict[str, float | None]) -> str:
-    """Return which kappa each number needs, in a sentence."""
-    parts = [
-        f"{name} {'no kappa of ours' if s is None else f'{s:.3f}'}" for name, s in needed.items() if name != NEUTRAL
-    ]
-    neutral = needed[NEUTRAL]
-    beyond = "" if neutral is None else f" Above {neutral:.3f} the periodic state of Example 1 is unstable."
-    return f"The kappa that each number needs: {', '.join(parts)}.{beyond}"
+def map_text(maps: Sequence[StabilityMap]) -> str:
+    """Return where the paper's two temperatures and neutral stability lie on each map, in sentences."""
+    parts = []
+    for one in maps:
+        apart = one.periodic - one.one_way
+        cross = next((k for k in range(len(apart) - 1) if apart[k] * apart[k + 1] <= 0), None)
+        if cross is None:
+            meets = "no conductance of the map gives both temperatures"
+        else:
+            weight = apart[cross] / (apart[cross] - apart[cross + 1])
+            conductance, share, neutral = (
+                float(values[cross] + weight * (values[cross + 1] - values[cross]))
+                for values in (one.conductance, one.one_way, one.neutral)
+            )
+            beyond = "" if np.isnan(neutral) else f", where the state is stable up to {neutral:.2f}"
+            meets = f"both temperatures ask for h_c = {conductance:.0f} and a share of {share:.2f}{beyond}"
+        parts.append(f"With {one.name}, {meets}.")
+    return " ".join(parts)
+
+
+def readings_table(runs: Sequence[HeatRun], central: Sequence[HeatRun | None]) -> str:
+    """Return what every reading gives as an HTML table."""
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in READING)
+    body = "\n".join(
+        f'<tr><th scope="row">{escape(cells[0])}</th>'
+        + "".join(f"<td>{escape(text)}</td>" for text in cells[1:3])
+        + "".join(f'<td class="number">{escape(text)}</td>' for text in cells[3:])
+        + "</tr>"
+        for cells in (_reading_cells(run, two) for run, two in zip(runs, central, strict=True))
+    )
+    return (
+        '<div class="wide" role="region" aria-label="Readings" tabindex="0"><table class="comparison variants">\n'
+        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def readings_markdown(runs: Sequence[HeatRun], central: Sequence[HeatRun | None]) -> str:
+    """Return what every reading gives as a Markdown table."""
+    cells = [_reading_cells(run, two) for run, two in zip(runs, central, strict=True)]
+    return _markdown([READING, ("---",) * len(READING), *cells])
+
+
+def commands(runs: Sequence[HeatRun]) -> str:
+    """Return the command of each reading as HTML."""
+    lines = "\n".join(f"{run.reading.command}    # {run.reading.name}" for run in runs)
+    return f"<p>Each by one command, after <code>python3 -m fenwear</code>:</p><pre>{escape(lines)}</pre>"
 
 
 def convergence_text(variants: Sequence[Variant]) -> str:
-    """Return how far the finest of each group is from the one before it, in a sentence."""
+    """Return how far the last of each group is from the one before it, in sentences."""
     parts = []
     for group in dict.fromkeys(v.group for v in variants):
-        names = list(dict.fromkeys(v.name for v in variants if v.group == group))
-        before, last = ([v for v in variants if v.name == name] for name in names[-2:])
-        kelvin = max(abs(b.steady.periodic / a.steady.periodic - 1) for a, b in zip(before, last, strict=True))
-        growth = max(abs(b.steady.growth - a.steady.growth) for a, b in zip(before, last, strict=True))
+        before, last = [v for v in variants if v.group == group][-2:]
         parts.append(
-            f"From {names[-2]} to {names[-1]} the periodic temperatures change by at most {kelvin:.1g} of their value, "
-            f"the growth rates by {growth:.1g} 1/s."
+            f"From {before.name} to {last.name} the temperature at the end changes by "
+            f"{abs(last.late - before.late):.2g} K, the periodic one by "
+            f"{abs(last.steady.periodic - before.steady.periodic):.2g} K, the largest pressure in the middle by "
+            f"{abs(last.peak - before.peak):.2g} MPa, the growth rate by "
+            f"{abs(last.steady.growth - before.steady.growth):.1g} 1/s."
         )
     return " ".join(parts)
 
 
 def as_json(scope: Scope = FULL) -> dict[str, Any]:
-    """Return rows, the kappa that each number needs, and the variants, as JSON takes them; collective."""
+    """Return rows, readings, the map of stability and the variants, as JSON takes them; collective."""
     choices, discretisations = sensitivity_rows(scope)
     return {
         "rows": [asdict(row) for row in paper_rows(scope)],
-        "needed_partition": needed_shares(scope),
+        "readings": [_reading_json(run, two) for run, two in zip(heat_runs(scope), central_runs(scope), strict=True)],
+        "stability": [_map_json(one) for one in stability_maps(scope)],
         "convergence": [_variant_json(variant) for variant in discretisations],
         "open_choices": [_variant_json(variant) for variant in choices],
     }
@@ -131,8 +191,11 @@ def variants_table(what: str, variants: Sequence[Variant]) -> str:
 
 def markdown(rows: Sequence[Row]) -> str:
     """Return the rows as a Markdown table."""
-    found = [COLUMNS, ("---",) * len(COLUMNS), *(_cells(row) for row in rows)]
-    return "\n".join("| " + " | ".join(text.replace("|", "\\|") for text in line) + " |" for line in found)
+    return _markdown([COLUMNS, ("---",) * len(COLUMNS), *(_cells(row) for row in rows)])
+
+
+def _markdown(lines: Sequence[Sequence[str]]) -> str:
+    return "\n".join("| " + " | ".join(text.replace("|", "\\|") for text in line) + " |" for line in lines)
 
 
 def _png(canvas: Any) -> bytes:
@@ -147,24 +210,77 @@ def _cells(row: Row) -> tuple[str, ...]:
 
 def _numbers(v: Variant) -> tuple[str, ...]:
     return (
-        f"{v.share:g}",
         f"{v.steady.monotonic:.2f}",
         f"{v.steady.periodic:.2f}",
         f"{v.steady.growth:+.4f}",
+        f"{v.late:.2f}",
         f"{v.narrowest:.1f}",
         f"{v.peak:.1f}",
         f"{v.central:.1f}",
     )
 
 
+def _reading_cells(run: HeatRun, two: HeatRun | None) -> tuple[str, ...]:
+    reading = run.reading
+    return (
+        reading.name,
+        reading.fitted or "nothing",
+        reading.against or "nothing",
+        f"{run.one_way:.2f}",
+        f"{run.steady.periodic:.2f}",
+        f"{run.steady.growth:+.4f}",
+        *(f"{run.at_centre(n):.2f}" for n in COURSE),
+        f"{run.middle_pressure[run.bulged].max():.1f}",
+        f"{run.peak_half_cycle:,}",
+        "never" if run.opened is None else f"{run.opened:,}",
+        f"{run.width.min():.0f}, {run.width[-1]:.0f}",
+        "" if two is None else f"{two.central_pressure[two.bulged].max():.1f}",
+    )
+
+
+def _reading_json(run: HeatRun, two: HeatRun | None) -> dict[str, Any]:
+    reading = run.reading
+    return {
+        **{name: list(value) if isinstance(value, tuple) else value for name, value in asdict(reading).items()},
+        "command": reading.command,
+        "one_way_temperature": run.one_way,
+        "periodic_temperature": run.steady.periodic,
+        "growth_rate": run.steady.growth,
+        "temperature": {str(n): run.at_centre(n) for n in COURSE},
+        "middle_pressure": float(run.middle_pressure[run.bulged].max()),
+        "peak_half_cycle": run.peak_half_cycle,
+        "splits_at": run.opened,
+        "narrowest_contact": float(run.width.min()),
+        "contact_at_end": float(run.width[-1]),
+        "central_pressure": None if two is None else float(two.central_pressure[two.bulged].max()),
+    }
+
+
+def _map_json(one: StabilityMap) -> dict[str, Any]:
+    def numbers(values: Array) -> Any:
+        found = values.astype(object)
+        found[np.isnan(values)] = None  # JSON knows no NaN
+        return found.tolist()
+
+    return {
+        "name": one.name,
+        "conductance": one.conductance.tolist(),
+        "share": one.share.tolist(),
+        "growth_rate": numbers(one.growth),
+        "one_way_share": one.one_way.tolist(),
+        "periodic_share": one.periodic.tolist(),
+        "neutral_share": numbers(one.neutral),
+    }
+
+
 def _variant_json(v: Variant) -> dict[str, Any]:
     return {
         "group": v.group,
         "name": v.name,
-        "partition": v.share,
         "one_way_temperature": v.steady.monotonic,
         "periodic_temperature": v.steady.periodic,
         "growth_rate": v.steady.growth,
+        "late_temperature": v.late,
         "narrowest_contact": v.narrowest,
         "middle_pressure": v.peak,
         "central_pressure": v.central,

@@ -12,26 +12,29 @@ from markupsafe import Markup
 from mpi4py import MPI
 
 from fenwear.errors import CaseError, Problem
-from fenwear.paper import FULL, Scope, paper_rows, section
+from fenwear.paper import BRIEF, FULL, Scope, paper_rows, section
 from fenwear.parallel import on_root
 from fenwear.results.history import CASE, free_directory, make_directory
 from fenwear.verify.page import page
 from fenwear.verify.suite import Outcome, Row, VerificationCase, registered, run_cases
 from fenwear.versions import versions
 
-PAPER, PAPER_TITLE = "paper", "Every number of the paper beside fenwear's, with its verdict (about 3 minutes)"
+PAPER, PAPER_TITLE = "paper", "Every number of the paper beside fenwear's, under every reading (5 minutes)"
 PAGE, NUMBERS = "verification.html", "verification.json"
 DEFAULT = Path("results") / "verification"
 WIDTH = 78
 
 
 def choose(names: Sequence[str]) -> tuple[list[VerificationCase], Scope | None]:
-    """Return the cases of these names and how much of the comparison with the paper, by default all of both.
+    """Return the cases of these names and how much of the comparison with the paper.
+
+    By default all cases and the main readings of the paper; all of its readings where it is named.
 
     Raises:
         CaseError: a name that nothing has.
     """
-    return registered(names, besides=(PAPER,)), FULL if not names or PAPER in names else None
+    paper = FULL if PAPER in names else None if names else BRIEF
+    return registered(names, besides=(PAPER,)), paper
 
 
 def titles() -> dict[str, str]:

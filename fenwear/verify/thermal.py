@@ -216,7 +216,7 @@ def energy() -> Result:
         "jumps": lambda s: list(jump(s, 2000, tolerance=1e-2)),
     }
     for name, settings in EXCHANGES.items():
-        system = builtin("example1-heat", *COARSE, *settings)
+        system = builtin("example1-heat-unstable", *COARSE, *settings)
         work = 0.25 * 1e4 * (200 * 0.2 if name.startswith("one-way") else 2 * 1.5)
         for kind, run in runs.items():
             terms = np.concatenate([block.heat.terms for block in run(system)])

@@ -19,7 +19,7 @@ from fenwear.remedies import FULL_START, LINE_SEARCH, SHORTER_JUMPS, SMALLER_STE
 Assemble = Callable[..., Tribosystem]
 COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 # So much heat in a half-cycle that contact and heat taken together have no solution.
-HOT = (*COARSE, "motion.amplitude=20", "heat.partition=0.5")
+HOT = (*COARSE, "motion.amplitude=20", "heat.convecting_faces=true", "heat.debris=0")
 MEAN = 1e4 / 600
 
 

@@ -38,6 +38,21 @@ def test_limit_is_where_explicit_steps_fail(assembled: Callable[..., Tribosystem
     assert (change < -0.01 * MEAN).any()
 
 
+def test_limit_with_both_worn(assembled: Callable[..., Tribosystem]) -> None:
+    """On a closed track the strip recedes evenly, which disturbs nothing: a march fails at the limit all the same."""
+    one_way = "motion={kind='one-way', direction='leftward', speed=3, duration=1, track=1e4}"
+    grown = []
+    for number in (0.97, 1.03):
+        settings = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", one_way)
+        laws = [f"wear.{body}.coefficient=1e-7" for body in ("punch", "strip")]
+        start = stability_number(assembled("example1", *settings, *laws))
+        laws = [f"wear.{body}.coefficient={1e-7 * number / start!r}" for body in ("punch", "strip")]
+        *_, last = march(assembled("example1", *settings, *laws), 1000)
+        grown.append(float(np.abs(np.diff(last.pressure[-2:], axis=0)).max()))
+    assert grown[0] < 1e-6 * MEAN
+    assert grown[1] > 0.1 * MEAN
+
+
 def test_proportional_to_the_step(assembled: Callable[..., Tribosystem]) -> None:
     """The number is linear in beta~ and u0; with b, it grows as b p_m^(b - 1)."""
     one = stability_number(assembled("example1"))

@@ -21,7 +21,13 @@ from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., Tribosystem]
 MEAN = 1e4 / 600
-COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
+# Faces that convect and no debris: all losses, and a strong feedback.
+COARSE = (
+    "geometry.parameters.elements_along_contact=4",
+    "geometry.degree=2",
+    "heat.convecting_faces=true",
+    "heat.debris=0",
+)
 
 
 def run(system: Tribosystem, half_cycles: int, **options: Any) -> Block:

@@ -129,7 +129,14 @@ def test_one_step_shares_the_heat(blocks: Make, operator: str, inflow: float | N
     assert terms[TERMS.index("carried")] == pytest.approx(carried, rel=1e-5)
 
 
-COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2", "wear.punch.coefficient=4e-6")
+# Faces that convect and no debris: all losses, and a strong feedback.
+COARSE = (
+    "geometry.parameters.elements_along_contact=4",
+    "geometry.degree=2",
+    "wear.punch.coefficient=4e-6",
+    "heat.convecting_faces=true",
+    "heat.debris=0",
+)
 HELD = "strip.temperatures=[{on='strip_bottom', temperature=-30}, {on='strip_ends', temperature=12}]"
 EXCHANGES = {
     "as published": (),

@@ -13,7 +13,13 @@ from fenwear.cycle.coupled import cycle_heat
 from fenwear.heat.exchange import State
 from fenwear.heat.periodic import CycleHeat
 
-COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
+# Faces that convect and no debris: all losses, and a strong feedback.
+COARSE = (
+    "geometry.parameters.elements_along_contact=4",
+    "geometry.degree=2",
+    "heat.convecting_faces=true",
+    "heat.debris=0",
+)
 WARM = ("heat.initial=-10", "heat.ambient=35", "strip.temperatures=[{on='strip_bottom', temperature=-30}]")
 
 

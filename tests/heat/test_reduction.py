@@ -11,7 +11,13 @@ from fenwear import Tribosystem, march
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 
-COARSE = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
+# Faces that convect and no debris: all losses, and a strong feedback.
+COARSE = (
+    "geometry.parameters.elements_along_contact=4",
+    "geometry.degree=2",
+    "heat.convecting_faces=true",
+    "heat.debris=0",
+)
 WARM = (
     "heat.initial=-10",
     "heat.ambient=35",

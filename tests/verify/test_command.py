@@ -13,13 +13,23 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import CaseError
-from fenwear.paper import FULL, Scope
+from fenwear.paper import BRIEF, FULL, READINGS, Scope
 from fenwear.verify import registered
 from fenwear.verify.command import choose, verify
 
 Run = Callable[..., Any]
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
-SCOPE = Scope(COARSE, shares=(0.2, 0.5), cycles=2_000, variants=110, meshes=((8, 1), (8, 2)), steps=(5, 10))
+SCOPE = Scope(
+    COARSE,
+    readings=READINGS[:1],
+    central=110,
+    cycles=2_000,
+    variants=110,
+    meshes=((8, 1), (8, 2)),
+    steps=(5, 10),
+    conductances=(0, 80),
+    shares=(0.1, 0.3, 0.5),
+)
 QUICK = ("--only", "wear-volume", "--only", "time-steps")
 
 
@@ -87,8 +97,8 @@ def test_list(fenwear: Run, tmp_path: Path) -> None:
 
 
 def test_choice() -> None:
-    """Everything by default; the paper alone, a case alone, or both."""
-    assert choose([]) == (registered(), FULL)
+    """Everything by default, with the main readings of the paper; the paper alone, a case alone, or both."""
+    assert choose([]) == (registered(), BRIEF)
     assert choose(["paper"]) == ([], FULL)
     assert choose(["hertz"]) == (registered(["hertz"]), None)
     assert choose(["paper", "hertz"]) == (registered(["hertz"]), FULL)
@@ -113,7 +123,7 @@ def test_paper(tmp_path: Path) -> None:
         page = _Page()
         page.feed(content)
         assert page.loads == []
-        assert page.images == 1 + 8
+        assert page.images == 1 + 7
         assert '<section id="paper">' in content
         assert '<section id="time-steps">' in content
     MPI.COMM_WORLD.Barrier()

@@ -43,19 +43,15 @@ class Key:
     def text(self) -> str:
         """Return the key in words."""
         unit = f", in {self.unit} where it has no unit" if self.unit else ""
-        default = (
-            f"; {self.default}" if self.default == "required" else f"; default {self.default}" * bool(self.default)
-        )
+        default = "; required" if self.default == "required" else f"; default {self.default}" if self.default else ""
         kind = f' (kind "{self.kind}")' if self.kind else ""
         return f"{self.path}{kind}: {self.meaning}\n    {self.values}{unit}{default}"
 
 
 def all_keys() -> list[Key]:
     """Return every key of a case file, tables before what is in them."""
-    base = Key(
-        "base", "", "text", "", "a built-in case, or a .toml beside this file, whose keys hold where none is given"
-    )
-    return [base, *_keys(Case, "", "")]
+    about = "a built-in case, or a .toml beside this file: its keys hold where none is given"
+    return [Key("base", "", "text", "", about), *_keys(Case, "", "")]
 
 
 def find_keys(path: str) -> list[Key]:
@@ -72,9 +68,8 @@ def find_keys(path: str) -> list[Key]:
     if not found:
         known = list(dict.fromkeys(key.path for key in keys))
         last = path.rpartition(".")[2]
-        close = [key for key in known if key.rpartition(".")[2] == last] or difflib.get_close_matches(
-            path, known, 3, 0.5
-        )
+        same = [key for key in known if key.rpartition(".")[2] == last]
+        close = same or difflib.get_close_matches(path, known, 3, 0.5)
         hint = f"; did you mean {' or '.join(close[:3])}?" if close else "; fenwear info KEY explains one key or table"
         raise CaseError(Problem(path, f"no such key{hint}"))
     below = [key for key in keys if any(f.table and key.path.startswith(f"{f.path}.") for f in found)]

@@ -290,10 +290,12 @@ class WearLaw(_Part):
     energy of friction, `energy`, beta~ = energy mu.
     """
 
-    coefficient: _constant_or_dependence(float | None) = Field(  # type: ignore[valid-type]
+    coefficient: _constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
         default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
     )
-    beta: float | None = Field(default=None, description="beta, in the same unit; beta~ = beta mu^b")
+    beta: Annotated[float | None, Unit("")] = Field(
+        default=None, description="beta, in the same unit; beta~ = beta mu^b"
+    )
     archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
     hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H, with archard")
     energy: Annotated[float, *_quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
@@ -471,6 +473,7 @@ def _perfect_or_conductance(value: object) -> float | str:
 
 PerfectOrConductance = Annotated[
     float | Literal["perfect"],
+    Unit(CONDUCTANCE),
     BeforeValidator(_perfect_or_conductance),
     PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
 ]

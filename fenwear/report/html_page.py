@@ -5,12 +5,11 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
 
 import jinja2
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
-__all__ = ["Picture", "escape", "figure", "picture", "render", "time"]
+__all__ = ["Picture", "picture", "render", "time"]
 
 
 @dataclass(frozen=True)
@@ -53,9 +52,3 @@ _TEMPLATES.globals["time"] = time
 def render(template: str, **values: object) -> Markup:
     """Return a template with its values; every text among them that is no Markup is escaped."""
     return Markup(_TEMPLATES.get_template(template).render(values))
-
-
-def figure(image: bytes, suffix: str, alt: str, caption: str) -> Markup:
-    """Return an image inside the page."""
-    parts: Any = _TEMPLATES.get_template("parts.html").module
-    return Markup(parts.figure(picture(image, suffix, caption, alt)))

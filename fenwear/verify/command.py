@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from markupsafe import Markup
 from mpi4py import MPI
 
 from fenwear.errors import CaseError, Problem
@@ -71,7 +70,7 @@ def verify(
         begin = time.perf_counter()
         rows = paper_rows(paper)
         say("\n".join(section.lines(rows)))
-        beside = Markup(section.write_section(paper))
+        beside = section.write_section(paper)
         found["paper"] = {**section.as_json(paper), "seconds": round(time.perf_counter() - begin, 3)}
         say(section.summary(rows))
     on_root(comm, lambda: _write(directory, found, page(outcomes, beside, comm.size, versions())))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem, assemble, jump, march
+from fenwear import Tribosystem, jump, march
 from fenwear.cycle import Block
 from fenwear.errors import InterruptedRunError
 
@@ -58,7 +58,7 @@ def test_measures_do_not_depend_on_what_is_drawn(assembled: Callable[..., Tribos
     narrow, wide = (
         next(
             march(
-                assemble(
+                assembled(
                     "fretting",
                     "motion.positions=3",
                     f"geometry.parameters.contact_width={width}",

@@ -13,7 +13,7 @@ sys.path[:0] = [str(HERE.parent), str(HERE / "extensions")]
 import fenwear  # noqa: E402
 
 project = "fenwear"
-author = "the fenwear developers"
+author = "the fenwear authors"
 copyright = author  # noqa: A001  (Sphinx's name)
 version = release = fenwear.__version__
 
@@ -36,6 +36,8 @@ autodoc_preserve_defaults = True
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+
+smartquotes = False  # commands and TOML are copied from tables, too
 
 html_theme = "furo"
 html_title = f"fenwear {version}"

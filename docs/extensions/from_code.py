@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import typer
 from docutils import nodes
+from pydantic import BaseModel
 from sphinx.util.docutils import SphinxDirective
 
 from fenwear.bodies.mesh import meshes_folder
@@ -163,6 +164,20 @@ def _as_written(app: Any, what: str, name: str, thing: object, options: object, 
     lines[:] = found
 
 
+def _is_case(thing: object) -> bool:
+    return isinstance(thing, type) and issubclass(thing, BaseModel)
+
+
+def _short(app: Any, what: str, name: str, thing: object, options: object, signature: str, result: str) -> Any:
+    """Leave out the signatures of the tables of a case: the page of its keys has them."""
+    return ("", None) if _is_case(thing) else None
+
+
+def _leave_out(app: Any, what: str, name: str, thing: object, skip: bool, options: object) -> bool | None:
+    """Leave out what pydantic adds."""
+    return True if name.startswith("model_") else None
+
+
 def _indentation(lines: list[str]) -> int:
     last = next((line for line in reversed(lines) if line.strip()), "")
     return len(last) - len(last.lstrip())
@@ -180,4 +195,6 @@ def setup(app: Any) -> dict[str, bool]:
     ):
         app.add_directive(name, directive)
     app.connect("autodoc-process-docstring", _as_written, priority=400)
+    app.connect("autodoc-process-signature", _short)
+    app.connect("autodoc-skip-member", _leave_out)
     return {"parallel_read_safe": True}

@@ -18,7 +18,7 @@ copyright = author  # noqa: A001  (Sphinx's name)
 version = release = fenwear.__version__
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "mathml", "from_code"]
-exclude_patterns = ["_build", "extensions"]
+exclude_patterns = ["_build", "extensions", "static"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 nitpicky = True
 # Types in signatures: those of other libraries have no page here.
@@ -40,6 +40,8 @@ napoleon_use_ivar = True
 smartquotes = False  # commands and TOML are copied from tables, too
 
 html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["formulas.css"]
 html_title = f"fenwear {version}"
 html_show_sourcelink = False
 html_copy_source = False

@@ -58,7 +58,7 @@ class Keys(Written):
             if kind:
                 yield f'\n**kind = "{kind}"**\n'
             yield from _table(
-                ("key", "takes", "unit of a bare number", "default", "meaning"),
+                ("key", "takes", "default", "meaning"),
                 (self._cells(key, table) for key in below if key.kind == kind),
             )
 
@@ -70,7 +70,8 @@ class Keys(Written):
     def _cells(key: Key, table: str) -> tuple[str, ...]:
         default = key.default if key.default in ("", "required") else _code(key.default)
         name = key.path.removeprefix(f"{table}.")
-        return (_code(name), _plain(key.values), _plain(key.unit), default, _plain(key.meaning))
+        takes = f"{key.values} ({key.unit})" if key.unit else key.values
+        return (_code(name), _plain(takes), default, _plain(key.meaning))
 
 
 class Commands(Written):

@@ -23,6 +23,7 @@ NAMES = [
     "05_own_material_and_geometry",
     "06_the_paper",
     "07_fretting",
+    "08_measurement_to_life",
 ]
 SECONDS = 1800  # ends what hangs, however busy the machine
 

@@ -20,7 +20,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*(p for p in (ROOT / "docs").rglob("*.md") if "_build" not in p.parts), *ROOT.glob("*.md")])
 BLOCK = re.compile(
-    r"(?:<!-- (?P<mark>slow|not run: [^\n]+) -->\n)?^```(?P<kind>sh|console|python|toml|c)\n(?P<text>.*?)^```$",
+    r"(?:<!-- (?P<mark>slow|not run: [^\n]+) -->\n)?^```(?P<kind>sh|console|python|toml|text|c)\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
@@ -133,10 +133,10 @@ def test_every_block_is_run_or_says_why() -> None:
     for page in PAGES:
         text = page.read_text("utf-8")
         kinds = set(re.findall(r"^```([a-z]+)$", text, re.MULTILINE))
-        assert kinds <= {"sh", "console", "python", "toml", "c"}, page
+        assert kinds <= {"sh", "console", "python", "toml", "text", "c"}, page
         assert all(len(b.mark) > 15 for b in blocks(page) if b.mark.startswith("not run"))
         for block in blocks(page):
-            if block.kind in ("toml", "c") and page.name != "CHANGELOG.md":
+            if block.kind in ("toml", "text", "c") and page.name != "CHANGELOG.md":
                 assert block.saved, f"{page}: a file without a name:\n{block.text}"
 
 

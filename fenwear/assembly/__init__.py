@@ -1,10 +1,11 @@
 """The whole way from a case to bodies that are ready to slide, step by step.
 
-    bodies  = build_bodies(case)             meshes, stiffness, supports, loads, conduction
-    sliding = make_sliding(case)             motion, sliding field, friction, wear laws
-    placed  = place(bodies, sliding)         surfaces opposite each other in every phase, in equilibrium
-    system  = elastic(placed)                both bodies condensed and joined in every phase
-    system  = with_exchange(system)          heat: the steps of the motion, prepared
+    bodies  = build_bodies(case)                   meshes, stiffness, supports, loads, conduction
+    sliding = make_sliding(case)                   motion, sliding field, friction, wear laws
+    placed  = place(bodies, sliding, case.heat,    surfaces opposite each other in every phase, in equilibrium
+                    case=case)                     (the case gives the loads of each phase)
+    system  = elastic(placed)                      both bodies condensed and joined in every phase
+    system  = with_exchange(system)                heat: the steps of the motion, prepared
 
 `assemble` takes all of them. Each step returns plain data and is collective: every rank takes it. `vary`
 takes again what a changed case makes necessary, and keeps the rest.

@@ -140,13 +140,18 @@ class Placed:
         return self.sliding.wear[1] is not None
 
     @cached_property
+    def slid(self) -> Array:
+        """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
+        found = {id(pair): self.sliding.field.rate(pair.punch.x, pair.normal) for pair in self.pairs}
+        return np.array([found[id(pair)] for pair in self.pairs])
+
+    @cached_property
     def wear(self) -> Wear:
         """The wear rule of both bodies over the phases of the motion."""
-        rate = self.sliding.field.rate(self.pair.punch.x)
         slid = []
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
-            slid.append(self.motion.sliding(exponent)[:, None] * rate**exponent)
+            slid.append(self.motion.sliding(exponent)[:, None] * self.slid**exponent)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.sliding.track)
 
     @property
@@ -201,30 +206,34 @@ class Placed:
         return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
     def conditions(
-        self, phase: int, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
+        self, phase: int | None, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
         Args:
-            phase: Its number.
+            phase: Its number; None for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
+        if phase is None:
+            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
+        else:
+            speed = self.motion.phases[phase].speed * self.slid[phase]
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
-            self.motion.phases[phase].speed * self.sliding.field.rate(self.pair.punch.x),
+            speed,
             (initial, initial) if temperatures is None else temperatures,
         )
 
     def friction_ratio(self, direction: int) -> Array:
-        """Return tau (n, d) in the middle position at the mean pressure.
+        """Return tau (n, d) in the middle position at the mean pressure and speed.
 
         Args:
             direction: d, the sign of the sliding.
         """
-        mu = self.friction.values(self.conditions(0))
+        mu = self.friction.values(self.conditions(None))
         return in_model(self.friction.ratio(direction, mu, self.pair), self.pair.punch.dim)
 
     def phase_friction(self, phase: int, mu: Array) -> Array:
@@ -304,12 +313,15 @@ def place(
     pairs[0.0] = middle
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
+    made = {0.0: rigid}  # phases there and back share theirs
     rigids: list[RigidEquilibrium] = []
     for phase, own in zip(sliding.motion.phases, loaded, strict=True):
-        if phase.offset == 0.0 and own is bodies:
-            rigids.append(rigid)
-        else:
+        if own is not bodies:
             rigids.append(rigid_equilibrium(pairs[phase.offset], own.punch, own.strip))
+            continue
+        if phase.offset not in made:
+            made[phase.offset] = rigid_equilibrium(pairs[phase.offset], bodies.punch, bodies.strip)
+        rigids.append(made[phase.offset])
     placed = Placed(
         bodies=bodies,
         sliding=sliding,

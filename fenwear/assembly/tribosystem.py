@@ -245,7 +245,7 @@ def heating_friction(system: Placed, mu: Array | None = None) -> Array:
 
     Args:
         system: The placed bodies.
-        mu: (n,); by default at the mean pressure.
+        mu: (n,); by default at the mean pressure and speed.
     """
-    mu = system.friction.values(system.conditions(0)) if mu is None else mu
-    return mu * system.sliding.field.rate(system.pair.punch.x)
+    mu = system.friction.values(system.conditions(None)) if mu is None else mu
+    return mu * system.sliding.field.rate(system.pair.punch.x, system.pair.normal)

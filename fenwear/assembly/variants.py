@@ -76,7 +76,7 @@ def vary(system: Tribosystem, *settings: str) -> Tribosystem:
     return with_case(system, changed_case(system.case, *settings))
 
 
-def with_case(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
+def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     """Return the system of another case that shares all operators which the change leaves; collective.
 
     Loads, friction, wear, motion and the exchange of heat factor no stiffness again; another motion
@@ -85,7 +85,6 @@ def with_case(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
     Args:
         system: Of a case.
         case: The other one.
-        parts: Into which each phase of the motion is cut.
 
     Raises:
         CaseError: the punch would tip over.
@@ -93,13 +92,15 @@ def with_case(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
     before = system.case
     if not _same_bodies(before, case):
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
-    bodies, condensed = system.bodies, system.condensed
+    bodies, condensed, sliding = system.bodies, system.condensed, system.sliding
+    if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
+        sliding = make_sliding(case)
     if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
         bodies = bodies.under(case)
     conducts_alike = _same_conduction(before, case)
     if not conducts_alike:
         bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip))
-    placed = place(bodies, make_sliding(case, parts), case.heat, solver=case.contact.solver, case=case)
+    placed = place(bodies, sliding, case.heat, solver=case.contact.solver, case=case)
     if not same_frame(system, placed):
         condensed = condense_bodies(placed)
     elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
@@ -114,7 +115,10 @@ def with_case(system: Tribosystem, case: Case, parts: int = 1) -> Tribosystem:
 
 def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     """Return the system with each phase of the motion cut into parts of equal time; collective."""
-    return with_case(system, system.case, parts)
+    sliding = replace(system.sliding, motion=system.motion.in_parts(parts))
+    placed = place(system.bodies, sliding, system.heat, solver=system.solver, case=system.made_from)
+    cut = joined(placed, system.condensed)
+    return cut if system.exchange is None else with_exchange(cut, reduced=system.exchange.reduced)
 
 
 def _same_bodies(one: Case, other: Case) -> bool:

@@ -84,7 +84,12 @@ def condense(
         patterns: Share of each trace node in a unit force (N, q).
         directions: One unit vector for each pattern (q, d); by default all axes.
         thermal_coupling: G; needs one direction for each pattern.
+
+    Raises:
+        ValueError: a thermal coupling with all axes.
     """
+    if thermal_coupling is not None and directions is None:
+        raise ValueError("the response to temperature needs one direction for each pattern")
     q, d = patterns.shape[1], elastic.dim
     along = np.broadcast_to(np.eye(d), (q, d, d)) if directions is None else directions[:, :, None]
     count = along.shape[2]

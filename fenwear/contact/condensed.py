@@ -12,21 +12,19 @@ open, such as the wear of the step they belong to.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.contact.inequality import Bordered, BorderedInequality, DenseInequality
+from fenwear.contact.inequality import Inequality
+from fenwear.contact.operators import Phases
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedies
 
-DENSE = 400  # unknowns up to which one dense elimination beats one for each phase
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
@@ -106,8 +104,8 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
+        self._unit = np.concatenate([np.full(n, self._pressure_scale), self._rigid_scale])
         self._blocks = np.zeros((m, size, size))
-        self._elastic: Array | None = None
         self._offset = np.zeros((m, size))
         self._loads = np.array([phase.interface.load_gap for phase in self.phases])
         for phase, block, offset in zip(self.phases, self._blocks, self._offset, strict=True):
@@ -118,9 +116,11 @@ class CondensedContact:
             self._fill_friction(k, ratio)
         self._coupling: Array | None = None
         self._layer: Layer | None = None
-        self._filled = False
+        self._right: Array | None = None  # of the layer's border
+        self._elastic: Phases | None = None
+        self._operator: Phases | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
-        self._bounds = (lower, np.full(m * size, np.inf))
+        self.inequality = Inequality(lower, np.full(m * size, np.inf), self._residual, self._jacobian, PREFIX, NAME)
 
     def _fill_friction(self, k: int, ratio: Array) -> None:
         n, interface = self.shape[1], self.phases[k].interface
@@ -129,63 +129,41 @@ class CondensedContact:
         self._blocks[k, n:, :n] = balance * (self._pressure_scale / self._resultant_scale[:, None])
 
     def slide(self, ratios: Sequence[Array]) -> None:
-        """Set tau of each phase, (n,) each."""
+        """Set tau of each phase, (n, d) each."""
         for k, (ratio, before) in enumerate(zip(ratios, self._ratios, strict=True)):
             if ratio is not before and not np.array_equal(ratio, before):
                 self._fill_friction(k, ratio)
-                self._elastic, self._filled = None, False
+                self._elastic = self._operator = None
         self._ratios = list(ratios)
 
-    @cached_property
-    def _dense(self) -> DenseInequality:
-        return DenseInequality(*self._bounds, self._residual, self._dense_jacobian, PREFIX, NAME)
-
-    @cached_property
-    def _bordered(self) -> BorderedInequality:
-        m, n = self.shape
-        matrix = Bordered(self._blocks, np.zeros((m, n, 0)), np.zeros((m, 0, n)))
-        return BorderedInequality(*self._bounds, self._residual, self._bordered_jacobian, matrix, PREFIX, NAME)
-
-    def _pressures(self, x: Array) -> Array:
-        return x.reshape(self._offset.shape)[:, : self.shape[1]] * self._pressure_scale
-
-    def _residual(self, x: Array, f: Array) -> None:
-        n, parts = self.shape[1], f.reshape(self._offset.shape)
-        np.matmul(self._blocks, x.reshape(self._offset.shape)[:, :, None], out=parts[:, :, None])
-        parts += self._offset
-        if self._coupling is not None:
-            parts[:, :n] += np.tensordot(self._coupling, self._pressures(x), axes=2) / self._gap_scale
-        if self._layer is not None:
-            parts[:, :n] += self._layer.opening(self._pressures(x)) / self._gap_scale
-
-    def _dense_jacobian(self, x: Array, jacobian: Array) -> None:
-        if self._layer is None and self._filled:
-            return  # the operator alone, as the last time
-        jacobian[:] = self._operator()
-        self._filled = self._layer is None
+    def _residual(self, x: Array) -> Array:
+        f = self._linear.multiply(x)
+        f += self._offset.ravel()
         if self._layer is not None:
             m, n = self.shape
-            left, right = self._layer.border(self._pressures(x))
-            scale, size = self._pressure_scale / self._gap_scale, self._offset.shape[1]
-            for k in range(m):
-                for j in range(m):
-                    jacobian[k * size : k * size + n, j * size : j * size + n] += (left[k] @ right[j]) * scale
+            pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
+            f.reshape(m, -1)[:, :n] += self._layer.opening(pressure) / self._gap_scale
+        return f
 
-    def _operator(self) -> Array:
-        """Return the derivative of the residual without the layer (m size, m size)."""
-        (m, n), size = self.shape, self._offset.shape[1]
+    @property
+    def _linear(self) -> Phases:
+        """The derivative of the residual without the layer."""
         if self._elastic is None:
-            self._elastic = scipy.linalg.block_diag(*self._blocks)
-        if self._coupling is None:
-            return self._elastic
-        operator = self._elastic.copy()
-        operator.reshape(m, size, m, size)[:, :n, :, :n] += self._coupling * (self._pressure_scale / self._gap_scale)
-        return operator
+            coupling = self._coupling
+            scaled = None if coupling is None else coupling * (self._pressure_scale / self._gap_scale)
+            self._elastic = Phases(self._blocks, scaled)
+        return self._elastic
 
-    def _bordered_jacobian(self, x: Array, matrix: Bordered) -> None:
-        if self._layer is not None:
-            left, right = self._layer.border(self._pressures(x))
-            matrix.left, matrix.right = left, right * (self._pressure_scale / self._gap_scale)
+    def _jacobian(self, x: Array) -> Phases:
+        if self._layer is None:
+            return self._linear
+        m, n = self.shape
+        left, right = self._layer.border(x.reshape(m, -1)[:, :n] * self._pressure_scale)
+        if self._operator is None or self._right is None or not np.array_equal(right, self._right):
+            scale = self._pressure_scale / self._gap_scale
+            coupling = None if self._coupling is None else self._coupling * scale
+            self._right, self._operator = right, Phases(self._blocks, coupling, (left, right * scale))
+        return self._operator
 
     def solve(
         self,
@@ -206,42 +184,42 @@ class CondensedContact:
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        n = self.shape[1]
-        offset = self._offset
-        offset[:, :n] = (gap + self._loads) / self._gap_scale
+        m, n = self.shape
+        self._offset[:, :n] = (gap + self._loads) / self._gap_scale
         if coupling is not self._coupling:
-            self._coupling, self._filled = coupling, False
+            self._coupling, self._elastic, self._operator = coupling, None, None
         self._layer = layer
-        alone = coupling is None and layer is not None and offset.size > DENSE
-        inequality = self._bordered if alone else self._dense
-        x = self._solve(inequality, start).reshape(offset.shape)
-        pressure = np.where(x[:, :n] > ZERO, x[:, :n], 0.0) * self._pressure_scale
-        residual = np.empty_like(offset)
-        self._residual(x.ravel(), residual.ravel())
+        x = self._solve(start).reshape(m, -1)
+        pressure = x[:, :n] * self._pressure_scale
+        pressure[x[:, :n] <= ZERO] = 0.0
         return ContactState(
             pressure,
-            residual[:, :n] * self._gap_scale,
+            self.inequality.residual.reshape(m, -1)[:, :n] * self._gap_scale,
             x[:, n:] * self._rigid_scale,
-            inequality.iterations,
+            self.inequality.iterations,
         )
 
-    def _solve(self, inequality: DenseInequality | BorderedInequality, start: ContactState | None) -> Array:
+    def _solve(self, start: ContactState | None) -> Array:
         """Return the solution by the first way that finds it."""
-        n = self.shape[1]
-        full = np.zeros_like(self._offset)
-        full[:, :n] = 1.0
-        ways = [(full, False, FULL_START), (full, True, FULL_START_SEARCH)]
-        if start is not None:
-            near = np.concatenate([start.pressure / self._pressure_scale, start.rigid / self._rigid_scale], axis=1)
-            ways = [(near, False, ""), (near, True, LINE_SEARCH), *ways]
         failure: ConvergenceError | None = None
-        for guess, line_search, name in ways:
+        for guess, line_search, name in self._ways(start):
             try:
-                x = inequality.solve(guess.ravel(), line_search=line_search)
+                x = self.inequality.solve(guess.ravel(), near=not name and start is not None, line_search=line_search)
             except ConvergenceError as error:
                 failure = failure or error  # the usual way's says most
                 continue
             if failure is not None:
                 self._remedies.note(name)
             return x
-        raise failure or ConvergenceError(inequality.name)
+        raise failure or ConvergenceError(self.inequality.name)
+
+    def _ways(self, start: ContactState | None) -> Iterator[tuple[Array, bool, str]]:
+        """Yield where to start, whether with a line search, and the name of the remedy that this is."""
+        if start is not None:
+            near = np.concatenate([start.pressure, start.rigid], axis=1) / self._unit
+            yield near, False, ""
+            yield near, True, LINE_SEARCH
+        full = np.zeros_like(self._offset)
+        full[:, : self.shape[1]] = 1.0
+        yield full, False, FULL_START
+        yield full, True, FULL_START_SEARCH

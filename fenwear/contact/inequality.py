@@ -3,6 +3,10 @@
 Find x within its bounds with F_i(x) = 0 where x_i is free, F_i >= 0 where x_i is at its lower and
 F_i <= 0 where it is at its upper bound: reduced-space active-set Newton (vinewtonrsls). These
 systems are piecewise linear or nearly so, hence full steps, without line search unless asked for.
+
+SNES decides which unknowns are at their bounds. Solves that follow one another mostly end with the
+same ones: a start that is near is first taken on by Newton's method with its own set, whose factor is
+kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts.
 """
 
 from __future__ import annotations
@@ -12,15 +16,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.linalg
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.contact.operators import Indices, Operator, Solve
 from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
-ZERO_PIVOT = 71  # PETSC_ERR_MAT_LU_ZRPVT
+TOLERANCE = 1e-11  # of residuals, which are scaled to 1
+STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 
 
 def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None:
@@ -28,7 +32,7 @@ def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None
     snes.setOptionsPrefix(prefix)
     snes.setType("vinewtonrsls")
     # Residuals are scaled to 1 and need few steps; a step that changes nothing ends the iteration.
-    snes.setTolerances(rtol=0.0, atol=1e-11, stol=0.0, max_it=100)
+    snes.setTolerances(rtol=0.0, atol=TOLERANCE, stol=0.0, max_it=100)
     options = PETSc.Options()
     for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", 1e-12)):
         if not options.hasName(f"{prefix}{name}"):
@@ -51,222 +55,211 @@ def check(snes: PETSc.SNES, what: str) -> None:
         )
 
 
-class _Inequality:
-    """A variational inequality on one process, kept for many solves."""
+@dataclass(frozen=True)
+class _Kept:
+    """The factor of the free rows and columns of an operator.
+
+    Attributes:
+        operator: What is factored.
+        key: Which of all are free, as bytes.
+        free: Their numbers; a slice where all are free.
+        bounded: The others.
+        solve: The solution operator.
+    """
+
+    operator: Operator
+    key: bytes
+    free: Indices | slice
+    bounded: Indices
+    solve: Solve
+
+
+class Inequality:
+    """A variational inequality on one process, kept for many solves.
+
+    Args:
+        lower, upper: Bounds (size,); infinite where there is none.
+        residual: Returns F(x) (size,).
+        jacobian: Returns dF/dx as an operator; the same object as before where it has not changed.
+        prefix: Of the PETSc options.
+        name: What is solved, for error messages.
+
+    Attributes:
+        iterations: Newton iterations of the last solve.
+        residual: F at its solution (size,).
+    """
 
     def __init__(
         self,
         lower: Array,
         upper: Array,
-        residual: Callable[[Array, Array], None],
-        jacobian: PETSc.Mat,
-        fill: Callable[[Array], None],
+        residual: Callable[[Array], Array],
+        jacobian: Callable[[Array], Operator],
         prefix: str,
         name: str,
     ) -> None:
-        size, comm = len(lower), PETSc.COMM_SELF
-        self.iterations = 0  # of the last solve
-        self.x = np.zeros(size)
+        self.iterations = 0
+        self.residual: Array = np.zeros(len(lower))
         self.name = name
-        self._bounds = [np.clip(b, PETSc.NINFINITY, PETSc.INFINITY) for b in (lower, upper)]
-        self._x = PETSc.Vec().createWithArray(self.x, comm=comm)
-        self._residual, self._jacobian, self._fill, self._prefix = residual, jacobian, fill, prefix
-        self.snes = self._make(prefix, "basic")
+        self._function, self._jacobian, self._prefix = residual, jacobian, prefix
+        self._lower, self._upper = lower, upper
+        self._bounded_above = bool((upper < np.inf).any())
+        self._kept: _Kept | None = None
+        self._operator: Operator | None = None
+
+    @cached_property
+    def _full_steps(self) -> PETSc.SNES:
+        return self._make(self._prefix, "basic")
 
     @cached_property
     def _searching(self) -> PETSc.SNES:
         return self._make(f"{self._prefix}search_", "l2")
 
     def _make(self, prefix: str, line_search: str) -> PETSc.SNES:
-        comm = PETSc.COMM_SELF
+        comm, size = PETSc.COMM_SELF, len(self._lower)
         snes = PETSc.SNES().create(comm)
-        vector = PETSc.Vec().createSeq(len(self.x), comm=comm)
-        snes.setFunction(lambda snes, x, f: self._residual(x.array_r, f.array_w), vector)
+
+        def residual(_snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+            f.array_w[:] = self._function(x.array_r)
 
         def update(_snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, _P: PETSc.Mat) -> None:
-            self._fill(x.array_r)
+            self._operator = self._jacobian(x.array_r)
             J.assemble()
 
-        snes.setJacobian(update, self._jacobian)
+        snes.setFunction(residual, PETSc.Vec().createSeq(size, comm=comm))
+        snes.setJacobian(update, _shell(size, _Matrix(self)))
         configure(snes, prefix, line_search)
-        snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in self._bounds))
-        self._set_solver(snes.ksp.pc)
+        bounds = [np.clip(b, PETSc.NINFINITY, PETSc.INFINITY) for b in (self._lower, self._upper)]
+        snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in bounds))
+        snes.ksp.pc.setType("python")
+        snes.ksp.pc.setPythonContext(_Solver())
         snes.setFromOptions()
         return snes
 
-    def _set_solver(self, pc: PETSc.PC) -> None:
-        """Choose how the Newton steps are solved for."""
+    def multiply(self, x: Array) -> Array:
+        """Return the present derivative times x."""
+        if self._operator is None:
+            raise ConvergenceError(f"{self.name} has no derivative yet")
+        return self._operator.multiply(x)
 
-    def solve(self, start: Array, *, line_search: bool = False) -> Array:
-        """Return the solution (size,), valid until the next solve.
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of these rows and columns of the present derivative.
+
+        Raises:
+            LinAlgError: they are singular.
+        """
+        if self._operator is None:
+            raise ConvergenceError(f"{self.name} has no derivative yet")
+        free = np.zeros(len(self._lower), dtype=bool)
+        free[kept] = True
+        return self._factor(self._operator, free.tobytes()).solve
+
+    def _factor(self, operator: Operator, key: bytes) -> _Kept:
+        """Return the factor of an operator's free rows and columns; the last one is kept."""
+        last = self._kept
+        if last is None or last.operator is not operator or last.key != key:
+            self._kept = None
+            free = np.frombuffer(key, dtype=bool)
+            kept, bounded = (np.flatnonzero(one).astype(np.int32) for one in (free, ~free))
+            rows = kept if len(bounded) else slice(None)
+            last = self._kept = _Kept(operator, key, rows, bounded, operator.factor(kept))
+        return last
+
+    def solve(self, start: Array, *, near: bool = False, line_search: bool = False) -> Array:
+        """Return the solution (size,).
 
         Args:
             start: Where Newton starts (size,).
+            near: Whether the solution may well have the unknowns of the start at their bounds, and no others.
             line_search: Whether steps are cut to where the residual is least: slower, but it ends where
-                full steps go to and fro between two sets of nodes in contact.
+                full steps go to and fro between two sets of unknowns at their bounds.
 
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        snes = self._searching if line_search else self.snes
-        self.x[:] = start
+        x = self._on_set(start) if near else None
+        return self._by_snes(start, line_search) if x is None else x
+
+    def _on_set(self, start: Array) -> Array | None:
+        """Return the solution where it has the same free unknowns as the start, else None."""
+        key, x = self._free(start), start.copy()
         try:
-            snes.solve(None, self._x)
-        except PETSc.Error as error:
-            if error.ierr != ZERO_PIVOT:
+            # Whatever is kept: what a solution is found with does not depend on what was solved before.
+            kept = self._factor(self._jacobian(x), key)
+            for iteration in range(STEPS + 1):
+                f = self._function(x)
+                rest = f[kept.free]
+                if rest @ rest < TOLERANCE**2:
+                    break
+                if iteration == STEPS or (iteration and self._free(x) != key):
+                    return None
+                if iteration:
+                    kept = self._factor(self._jacobian(x), key)
+                x[kept.free] -= kept.solve(rest)
+        except np.linalg.LinAlgError:
+            return None
+        if self._free(x) != key:
+            return None
+        if not self._holds(x, f, kept.bounded):
+            return None
+        self.iterations, self.residual = iteration, f
+        return x
+
+    def _free(self, x: Array) -> bytes:
+        """Return which unknowns are within their bounds, as bytes."""
+        within = x > self._lower
+        return (within & (x < self._upper) if self._bounded_above else within).tobytes()
+
+    def _holds(self, x: Array, f: Array, bounded: Indices) -> bool:
+        """Return whether the residuals of unknowns at their bounds have the right signs."""
+        if not len(bounded):
+            return True
+        signed = f[bounded]
+        if self._bounded_above:
+            signed = np.where(x[bounded] == self._lower[bounded], signed, -signed)
+        return bool(signed.min() >= 0)
+
+    def _by_snes(self, start: Array, line_search: bool) -> Array:
+        snes = self._searching if line_search else self._full_steps
+        x: Array = start.copy()
+        try:
+            snes.solve(None, PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF))
+        except (np.linalg.LinAlgError, PETSc.Error) as error:  # PETSc passes on what its callbacks raise, or wraps it
+            if not isinstance(error.__cause__ or error, np.linalg.LinAlgError):
                 raise
             raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular") from None
-        except np.linalg.LinAlgError as error:
-            raise ConvergenceError(f"{self.name} did not converge: {error}") from None
         check(snes, self.name)
         self.iterations = snes.getIterationNumber()
-        return self.x
+        self.residual = self._function(x)
+        return x
 
 
-class DenseInequality(_Inequality):
-    """A variational inequality with a dense Jacobian.
-
-    Args:
-        lower, upper: Bounds (size,); infinite where there is none.
-        residual: Writes F(x) into its second argument.
-        jacobian: Writes dF/dx into its second argument (size, size).
-        prefix: Of the PETSc options.
-        name: What is solved, for error messages.
-    """
-
-    def __init__(
-        self,
-        lower: Array,
-        upper: Array,
-        residual: Callable[[Array, Array], None],
-        jacobian: Callable[[Array, Array], None],
-        prefix: str,
-        name: str,
-    ) -> None:
-        size = len(lower)
-        matrix = np.zeros((size, size), order="F")
-        dense = PETSc.Mat().createDense((size, size), array=matrix, comm=PETSc.COMM_SELF)
-        super().__init__(lower, upper, residual, dense, lambda x: jacobian(x, matrix), prefix, name)
+def _shell(size: int, context: _Matrix) -> PETSc.Mat:
+    shell = PETSc.Mat().createPython((size, size), context, comm=PETSc.COMM_SELF)
+    shell.setUp()
+    return shell
 
 
-@dataclass
-class Bordered:
-    """The matrix of blocks that meet in a few quantities only: diag(A_k) + L_k R_j.
+class _Matrix:
+    """PETSc's view of an operator, or of some of its rows and columns: what the active-set method asks of it."""
 
-    Attributes:
-        blocks: A_k (m, size, size).
-        left: L_k, on the first n unknowns of each block (m, n, q).
-        right: R_j, of the first n unknowns of each block (m, q, n).
-    """
-
-    blocks: Array
-    left: Array
-    right: Array
-
-    def multiply(self, x: Array) -> Array:
-        """Return the matrix times x (m size,)."""
-        parts = x.reshape(len(self.blocks), -1)
-        n = self.left.shape[1]
-        result = np.einsum("kij,kj->ki", self.blocks, parts)
-        result[:, :n] += self.left @ np.einsum("kqn,kn->q", self.right, parts[:, :n])
-        return result.ravel()
-
-    def factor(self, kept: NDArray[np.int32]) -> Callable[[Array], Array]:
-        """Return the solution operator of the rows and columns `kept`, by one small factor for each block.
-
-        With z_k = A_k^-1 b_k and Y_k = A_k^-1 L_k the quantities y between the blocks follow from
-        (I + sum of R_k Y_k) y = sum of R_k z_k, and x_k = z_k - Y_k y: the work grows with the number of
-        blocks, where an elimination of the whole would grow with its cube.
-
-        Raises:
-            LinAlgError: a block is singular.
-        """
-        m, n, q = self.left.shape
-        size = self.blocks.shape[1]
-        cuts = np.searchsorted(kept, np.arange(m + 1) * size)
-        factors, solved, rights = [], [], []
-        schur = np.eye(q)
-        for k in range(m):
-            own = kept[cuts[k] : cuts[k + 1]] - k * size
-            nodes = own[own < n]
-            block = self.blocks[k][np.ix_(own, own)]
-            factor = scipy.linalg.lu_factor(block, check_finite=False)
-            if not np.abs(np.diag(factor[0])).min(initial=np.inf) > 1e-14 * np.abs(block).max(initial=0.0):
-                raise np.linalg.LinAlgError("its Jacobian is singular")
-            columns = np.zeros((len(own), q))
-            columns[: len(nodes)] = self.left[k][nodes]
-            columns = scipy.linalg.lu_solve(factor, columns, check_finite=False)
-            right = self.right[k][:, nodes]
-            schur += right @ columns[: len(nodes)]
-            factors.append(factor)
-            solved.append(columns)
-            rights.append(right)
-        schur_factor = scipy.linalg.lu_factor(schur, check_finite=False)
-
-        def solve(b: Array) -> Array:
-            parts = [
-                scipy.linalg.lu_solve(factor, b[cuts[k] : cuts[k + 1]], check_finite=False)
-                for k, factor in enumerate(factors)
-            ]
-            between = sum(
-                (right @ part[: right.shape[1]] for right, part in zip(rights, parts, strict=True)), np.zeros(q)
-            )
-            y = scipy.linalg.lu_solve(schur_factor, between, check_finite=False)
-            return np.concatenate([part - columns @ y for part, columns in zip(parts, solved, strict=True)])
-
-        return solve
-
-
-class _BorderedMatrix:
-    """PETSc's view of a bordered matrix: what the active-set method asks of it."""
-
-    def __init__(self, matrix: Bordered, kept: NDArray[np.int32] | None = None) -> None:
-        self.matrix, self.kept = matrix, kept
+    def __init__(self, inequality: Inequality, kept: Indices | None = None) -> None:
+        self.inequality, self.kept = inequality, kept
 
     def mult(self, _mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.array[:] = self.matrix.multiply(x.array_r)
+        y.array_w[:] = self.inequality.multiply(x.array_r)
 
     def createSubMatrix(self, _mat: PETSc.Mat, rows: PETSc.IS, _columns: PETSc.IS, _out: object) -> PETSc.Mat:  # noqa: N802
         kept = rows.getIndices().copy()
-        sub = PETSc.Mat().createPython((len(kept), len(kept)), _BorderedMatrix(self.matrix, kept), PETSc.COMM_SELF)
-        sub.setUp()
-        return sub
+        return _shell(len(kept), _Matrix(self.inequality, kept))
 
 
-class _BorderedSolver:
-    """PETSc's preconditioner that solves with a bordered matrix."""
+class _Solver:
+    """PETSc's preconditioner that solves with the factor that the inequality keeps."""
 
     def setUp(self, pc: PETSc.PC) -> None:
         context = pc.getOperators()[1].getPythonContext()
-        self.solve = context.matrix.factor(context.kept)
+        self.solve = context.inequality.factor(context.kept)
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.array[:] = self.solve(x.array_r)
-
-
-class BorderedInequality(_Inequality):
-    """A variational inequality whose Jacobian is a bordered matrix; arguments as of `DenseInequality`.
-
-    Args:
-        jacobian: Updates the matrix at x.
-        matrix: The matrix.
-    """
-
-    def __init__(
-        self,
-        lower: Array,
-        upper: Array,
-        residual: Callable[[Array, Array], None],
-        jacobian: Callable[[Array, Bordered], None],
-        matrix: Bordered,
-        prefix: str,
-        name: str,
-    ) -> None:
-        size = len(lower)
-        shell = PETSc.Mat().createPython((size, size), _BorderedMatrix(matrix), comm=PETSc.COMM_SELF)
-        shell.setUp()
-        super().__init__(lower, upper, residual, shell, lambda x: jacobian(x, matrix), prefix, name)
-
-    def _set_solver(self, pc: PETSc.PC) -> None:
-        pc.setType("python")
-        pc.setPythonContext(_BorderedSolver())
+        y.array_w[:] = self.solve(x.array_r)

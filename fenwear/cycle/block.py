@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
-from fenwear.cycle.state import RunState, pressure_scale
+from fenwear.cycle.state import RunState, pressure_scales
 from fenwear.sliding.wear import Worn
 
 
@@ -141,20 +142,28 @@ class PhaseRecord:
     friction_ratio: Array
 
 
+class _Row(NamedTuple):
+    """One half-cycle, as it is added."""
+
+    half_cycle: int
+    phases: Sequence[PhaseRecord]
+    worn: Worn
+    retries: int
+
+
 @dataclass
 class Recorder:
-    """Collects half-cycles into blocks; one append a half-cycle, one copy a block."""
+    """Collects half-cycles into blocks: one append a half-cycle, all measures once a block."""
 
     system: Tribosystem
     size: int
-    _rows: list[tuple[object, ...]] = field(default_factory=list)
+    _rows: list[_Row] = field(default_factory=list)
     _heat: list[HalfCycleHeat] = field(default_factory=list)
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
-    _equilibria: dict[int, tuple[Array, Array]] = field(default_factory=dict)  # of each phase at its last friction
 
-    def add(self, half_cycle: int, phases: Sequence[PhaseRecord], worn: Worn, heat: HalfCycleHeat | None) -> float:
-        """Record one half-cycle and return its periodicity.
+    def add(self, half_cycle: int, phases: Sequence[PhaseRecord], worn: Worn, heat: HalfCycleHeat | None) -> None:
+        """Record one half-cycle.
 
         Args:
             half_cycle: Its number.
@@ -162,38 +171,24 @@ class Recorder:
             worn: Depths at its end.
             heat: Of all its phases.
         """
-        middle = phases[len(phases) // 2]
-        state, pressure = middle.contact, middle.contact.pressure[0]
-        scale = pressure_scale(self.system, np.array([p.contact.pressure[0] for p in phases]))
-        direction = self.system.motion.phases[middle.phase].direction
-        change = max(
-            float("nan") if p.before is None else float(np.abs(p.contact.pressure[0] - p.before).max()) / scale
-            for p in phases
-        )
-        distance = float(np.abs(pressure - self._optimum(direction, pressure)).max()) / scale
-        row = (half_cycle, direction, pressure, state.gap[0], worn.punch, worn.strip, state.rigid[0])
-        areas = np.sum([p.areas for p in phases], axis=0).tolist()
         taken = self.system.remedies.take()
-        self._remedies += taken
-        balance = max(self._balance(p) for p in phases)
-        self._rows.append((*row, *areas, distance, change, balance, taken.total()))
+        if taken:
+            self._remedies += taken
+        self._rows.append(_Row(half_cycle, phases, worn, taken.total()))
         if heat is not None:
             self._heat.append(heat)
-        return change
 
-    def _balance(self, record: PhaseRecord) -> float:
-        """Return the largest error of the force and moment balance relative to the contact force."""
-        equilibrium = self.system.interfaces[record.phase].rigid
-        force = float(equilibrium.pair.weights @ record.contact.pressure[0])
-        scale = self.system.mode_lengths * (force or np.abs(equilibrium.resultant).max(initial=0.0) or 1.0)
-        known = self._equilibria.get(record.phase)
-        if known is None or known[0] is not record.friction_ratio:
-            self._equilibria[record.phase] = known = (
-                record.friction_ratio,
-                equilibrium.equilibrium(record.friction_ratio),
-            )
-        balance = known[1] @ record.contact.pressure[0] + equilibrium.resultant
-        return float(np.abs(balance / scale).max(initial=0.0))
+    def change(self) -> float:
+        """Return the periodicity of the last half-cycle."""
+        return float(self._changes(self._rows[-1:])[0][0])
+
+    def _changes(self, rows: Sequence[_Row]) -> tuple[Array, Array]:
+        """Return the periodicity of half-cycles, and the scale of their pressures (k,), MPa."""
+        pressure = np.array([[p.contact.pressure[0] for p in row.phases] for row in rows])
+        unknown = np.full(pressure.shape[2], np.nan)
+        before = np.array([[unknown if p.before is None else p.before for p in row.phases] for row in rows])
+        scales = pressure_scales(self.system, pressure)
+        return np.abs(pressure - before).max(axis=(1, 2)) / scales, scales
 
     @property
     def full(self) -> bool:
@@ -202,17 +197,59 @@ class Recorder:
 
     def take(self, end: RunState) -> Block:
         """Return the block that ends with `end`, and begin the next one."""
-        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
+        rows, system = self._rows, self.system
+        changes, scales = self._changes(rows)
+        middles = [row.phases[len(row.phases) // 2] for row in rows]
+        directions = [system.motion.phases[middle.phase].direction for middle in middles]
+        pressure = np.concatenate([middle.contact.pressure for middle in middles])
+        areas = np.array([np.sum([p.areas for p in row.phases], axis=0) for row in rows])
+        optima = np.array([self._optimum(d, p) for d, p in zip(directions, pressure, strict=True)])
         heat = None
         if self._heat:
             names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
             heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
-        remedies = self._remedies
+        block = Block(
+            system,
+            np.array([row.half_cycle for row in rows]),
+            np.array(directions),
+            pressure,
+            np.concatenate([middle.contact.gap for middle in middles]),
+            np.array([row.worn.punch for row in rows]),
+            np.array([row.worn.strip for row in rows]),
+            np.concatenate([middle.contact.rigid for middle in middles]),
+            areas[:, 0],
+            areas[:, 1],
+            np.abs(pressure - optima).max(axis=1) / scales,
+            changes,
+            self._balances(),
+            np.array([row.retries for row in rows]),
+            heat=heat,
+            remedies=self._remedies,
+            end=end,
+        )
         self._rows, self._heat, self._remedies = [], [], Counter()
-        return Block(self.system, *columns, heat=heat, remedies=remedies, end=end)
+        return block
 
     def __bool__(self) -> bool:
         return bool(self._rows)
+
+    def _balances(self) -> Array:
+        """Return the largest error of the force and moment balance of each half-cycle relative to the contact force."""
+        groups: dict[tuple[int, int], list[tuple[int, PhaseRecord]]] = {}  # of a phase at one friction
+        for number, row in enumerate(self._rows):
+            for record in row.phases:
+                groups.setdefault((record.phase, id(record.friction_ratio)), []).append((number, record))
+        errors = np.zeros(len(self._rows))
+        for members in groups.values():
+            numbers, records = zip(*members, strict=True)
+            equilibrium = self.system.interfaces[records[0].phase].rigid
+            pressure = np.concatenate([record.contact.pressure for record in records])
+            force = pressure @ equilibrium.pair.weights
+            force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
+            balance = pressure @ equilibrium.equilibrium(records[0].friction_ratio).T + equilibrium.resultant
+            error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
+            np.maximum.at(errors, list(numbers), error)
+        return errors
 
     def _optimum(self, direction: int, pressure: Array) -> Array:
         """Return the optimal pressure on the present contact zone; solved anew only when that changes."""

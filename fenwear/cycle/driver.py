@@ -84,8 +84,8 @@ def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> I
             raise type(error)(f"half-cycle {state.half_cycle + 1}: {error}") from error
         periodic = state.periodic_phases
         for one in recorded:
-            change = recorder.add(one.number, one.phases, one.worn, one.heat)
-            repeats = course.periodic_within is not None and change < course.periodic_within
+            recorder.add(one.number, one.phases, one.worn, one.heat)
+            repeats = course.periodic_within is not None and recorder.change() < course.periodic_within
             periodic = periodic + 1 if repeats else 0
         state = replace(after, periodic_phases=periodic)
         finished = periodic >= system.motion.half_cycles or course.leave(state)

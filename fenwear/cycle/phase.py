@@ -46,6 +46,7 @@ class PhaseStep:
 
     def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
         self.system, self.phase, self.implicit = system, phase, implicit
+        self._constant = system.constant_coefficients
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
         self._contact = system.phase_contact((phase,))
@@ -67,7 +68,7 @@ class PhaseStep:
         """
         temperature = temperature or self._initial
         gap = self.system.gap(self.phase, worn)
-        if self.system.constant_coefficients:
+        if self._constant:
             return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
         start = before
 

@@ -66,6 +66,13 @@ def pressure_scale(system: Tribosystem, pressure: Array) -> float:
         system: The assembled problem.
         pressure: Of one or more phases (n,) or (m, n), MPa.
     """
+    return float(pressure_scales(system, np.atleast_2d(pressure)[None])[0])
+
+
+def pressure_scales(system: Tribosystem, pressure: Array) -> Array:
+    """Return the same of k half-cycles (k,), each of all its phases: pressures (k, m, n), MPa."""
     weights = system.pair.weights
-    force = float((np.abs(pressure) @ weights).sum())
-    return float((pressure**2 @ weights).sum()) / force if force > 0 else system.rigid.mean_pressure
+    force = (np.abs(pressure) @ weights).sum(axis=1)
+    carried = (pressure**2 @ weights).sum(axis=1)
+    loaded = force > 0
+    return np.where(loaded, carried / np.where(loaded, force, 1.0), system.rigid.mean_pressure)

@@ -91,8 +91,7 @@ def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HE
     normal = material @ strip_outward
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
-    if placement == HERE:
-        _check_facing(punch, normal, facing, axis)
+    _check_facing(punch, normal, facing, axis, placement)
     gap = np.einsum("ic,ic->i", normal, punch.spread.T @ punch.trace - transfer @ strip_trace)
     # Forces act along the common normal: a node's weight is its area seen along it.
     weights = punch.weights * facing
@@ -182,14 +181,15 @@ def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurfac
     )
 
 
-def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int) -> None:
+def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int, placement: Placement) -> None:
     """Raise where the surfaces look past each other."""
+    where = "" if placement == HERE else f" with the strip {placement}"
     if (facing < STEEPEST).any():
         worst = int(np.argmin(facing))
         angle = np.degrees(np.arccos(np.clip(facing[worst], -1, 1)))
         place = ", ".join(f"{c:g}" for c in punch.x[worst][: punch.dim - 1])
         _not_facing(
-            f"their outward normals do not point at each other at x = {place} mm: they are {angle:.0f} degrees off"
+            f"their outward normals do not point at each other at x = {place} mm{where}: they are {angle:.0f} degrees off"
         )
     if punch.dim == 2 and axis == 1 and normal[:, 1].mean() < 0:
         _not_facing("the punch lies below the strip; expected it above, with z upwards")

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.errors import CaseError, Problem
 from fenwear.interface.placement import ZERO, Placement, Vector, in_space
 
 
@@ -32,14 +33,22 @@ class SlidingField:
         """Return v of the counter-body's material at points x (n, d) for a unit of the stroke's law (n, 3)."""
         return np.array(self.shift) + np.cross(self.turn, in_space(x) - self.centre)
 
-    def rate(self, x: Array) -> Array:
-        """Return what each point slides for a unit of the stroke's law (n,): 1, or mm/rad."""
-        return np.linalg.norm(self.velocity(x), axis=1)
+    def __post_init__(self) -> None:
+        """Raise where it shifts and turns at once: its axis would have to move along."""
+        if self.shift != ZERO and self.turn != ZERO:
+            raise CaseError(Problem("motion", "expected a translation or a rotation of the counter-body, not both"))
+
+    def rate(self, x: Array, normal: Array) -> Array:
+        """Return what each point slides for a unit of the stroke's law (n,): 1, or mm/rad; e_n (n, d) its normal."""
+        return np.linalg.norm(self._tangential(x, normal), axis=1)
+
+    def _tangential(self, x: Array, normal: Array) -> Array:
+        v, n = self.velocity(x), in_space(normal)
+        return v - np.einsum("ic,ic->i", v, n)[:, None] * n
 
     def direction(self, x: Array, normal: Array) -> Array:
         """Return e_v (n, 3), the unit direction of sliding within the contact of normal e_n (n, d), or zero."""
-        v, n = self.velocity(x), in_space(normal)
-        tangential = v - np.einsum("ic,ic->i", v, n)[:, None] * n
+        tangential = self._tangential(x, normal)
         size = np.linalg.norm(tangential, axis=1, keepdims=True)
         still = size <= 1e-12 * size.max(initial=1e-300)
         return np.where(still, 0.0, tangential / np.where(still, 1.0, size))

@@ -141,11 +141,15 @@ class PhasesWear:
 
     def worn_area(self, pressure: Array) -> tuple[float, float]:
         """Return the cross-sections worn off punch and strip, mm²."""
-        weights = np.array([pair.weights for pair in self.pairs])
         areas = [
-            0.0 if body is None else float((body.depth(pressure) * weights).sum()) for body in (self.punch, self.strip)
+            0.0 if body is None else float(np.vdot(body.depth(pressure), self._weights))
+            for body in (self.punch, self.strip)
         ]
         return areas[0], areas[1]
+
+    @cached_property
+    def _weights(self) -> Array:
+        return np.array([pair.weights for pair in self.pairs])
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def full_against_condensed(system: Tribosystem, half_cycles: int = 100) -> None:
 
 def without_heat() -> None:
     """Marches, jumps and the steady state of Example 1."""
-    timed(lambda: assemble(load_case("example1")).prepare())  # compiles the forms
+    timed(lambda: assemble(load_case("example1")))  # compiles the forms
     seconds, system = timed(lambda: _prepared("example1"))
     mean = system.rigid.mean_pressure
     print(f"set-up, {len(system.pair.x)} contact nodes | {seconds:.2f} s")

@@ -11,7 +11,7 @@ import pytest
 
 from fenwear import ConvergenceError, Tribosystem, jump, march
 from fenwear.contact import CondensedContact, ContactState
-from fenwear.contact.inequality import DenseInequality
+from fenwear.contact.inequality import Inequality
 from fenwear.cycle import Block
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.remedies import FULL_START, LINE_SEARCH, SHORTER_JUMPS, SMALLER_STEPS
@@ -119,15 +119,15 @@ def test_contact_by_another_way(assembled: Assemble, monkeypatch: pytest.MonkeyP
     """With the first ways closed the next ones find the same contact; which one is noted."""
     system = assembled("example1", *COARSE)
     usual = run(system, 6)
-    original, closed = DenseInequality.solve, [0]
+    original, closed = Inequality.solve, [0]
 
-    def solve(self: DenseInequality, start: Any, *, line_search: bool = False) -> Any:
+    def solve(self: Inequality, start: Any, *, near: bool = False, line_search: bool = False) -> Any:
         if closed[0] < ways:
             closed[0] += 1
             raise ConvergenceError("closed")
-        return original(self, start, line_search=line_search)
+        return original(self, start, near=near, line_search=line_search)
 
-    monkeypatch.setattr(DenseInequality, "solve", solve)
+    monkeypatch.setattr(Inequality, "solve", solve)
     contact = system.contact((1,))
     assert isinstance(contact, CondensedContact)
     start = ContactState(usual.pressure[-2:-1], usual.gap[-2:-1], usual.rigid[-2:-1], 0)

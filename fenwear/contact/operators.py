@@ -1,0 +1,299 @@
+"""Square matrices as an active-set method needs them: a product, and factors of some of their rows and columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+
+Indices = NDArray[np.int32]
+Solve = Callable[[Array], Array]
+SINGULAR = 1e-14  # of the largest entry: a pivot that is rounding
+LARGE = 300  # unknowns above which a factor follows its set; below it a new one costs as little
+UPDATES = 0.1  # of the unknowns of a factor: what may have come and gone before a new one is made
+DENSE = 400  # unknowns up to which one elimination of the whole beats one for each block
+
+
+class Operator(Protocol):
+    """A square matrix."""
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x."""
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`, ascending.
+
+        Raises:
+            LinAlgError: they are singular.
+        """
+
+
+@dataclass(frozen=True)
+class _Base:
+    """A set that was eliminated, and where each of its unknowns stands in it (size,), -1 for the others."""
+
+    kept: Indices
+    place: NDArray[np.int64]
+    solve: Solve
+
+
+class Updating:
+    """Factors of sets that differ by a few unknowns from one that was eliminated.
+
+    With K the set that was eliminated, i what has come since and o what has gone, the rows and columns
+    kept now are solved by the bordered system
+
+        A_KK x + A_Ki y + E_o z = b_K,    A_iK x + A_ii y = b_i,    E_o^T x = 0,
+
+    whose Schur complement has as many rows as unknowns have come and gone. Columns once solved for are kept.
+
+    Args:
+        entries: Returns the numbers of some rows and columns.
+
+    Attributes:
+        base: What was eliminated last.
+    """
+
+    def __init__(self, entries: Callable[[Indices, Indices], Array]) -> None:
+        self._entries = entries
+        self.base: _Base | None = None
+        self._columns: dict[int, Array] = {}  # solutions by the base of what has come or gone
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`.
+
+        Raises:
+            LinAlgError: they are singular.
+        """
+        base = self.base
+        if base is not None:
+            into = np.setdiff1d(kept, base.kept, assume_unique=True)
+            out = np.setdiff1d(base.kept, kept, assume_unique=True)
+            if not len(into) + len(out):
+                return base.solve
+            if len(into) + len(out) <= UPDATES * len(base.kept):
+                return self._updated(base, kept, into, out)
+        self.base, self._columns = None, {}
+        solve = eliminate(self._entries(kept, kept))
+        place = np.full(int(kept.max(initial=0)) + 1, -1)
+        place[kept] = np.arange(len(kept))
+        self.base = _Base(kept, place, solve)
+        return solve
+
+    def _updated(self, base: _Base, kept: Indices, into: Indices, out: Indices) -> Solve:
+        size, come = len(base.kept), len(into)
+        gone = base.place[out]
+        come_new = [i for i in map(int, into) if i not in self._columns]
+        gone_new = [i for i in map(int, out) if i not in self._columns]
+        if come_new or gone_new:
+            right = np.zeros((size, len(come_new) + len(gone_new)), order="F")
+            right[:, : len(come_new)] = self._entries(base.kept, np.array(come_new, dtype=np.int32))
+            right[base.place[gone_new], len(come_new) + np.arange(len(gone_new))] = 1.0
+            self._columns.update(zip((*come_new, *gone_new), base.solve(right).T, strict=True))
+        columns = np.array([self._columns[int(i)] for i in np.concatenate([into, out])]).T
+        rows = self._entries(into, base.kept)
+        schur = np.zeros((come + len(out), come + len(out)))
+        schur[:come, :come] = self._entries(into, into)
+        schur[:come] -= rows @ columns
+        schur[come:] -= columns[gone]
+        solve_schur = eliminate(schur)
+        from_base = np.searchsorted(kept, np.delete(base.kept, gone))
+        stayed, from_new = np.delete(np.arange(size), gone), np.searchsorted(kept, into)
+
+        def solve(b: Array) -> Array:
+            first: Array = np.zeros(size)
+            first[stayed] = b[from_base]
+            first = base.solve(first)
+            y = solve_schur(np.concatenate([b[from_new] - rows @ first, -first[gone]]))
+            x = np.empty_like(b)
+            x[from_base] = (first - columns @ y)[stayed]
+            x[from_new] = y[:come]
+            return x
+
+        return solve
+
+
+class Dense:
+    """A matrix of numbers (size, size)."""
+
+    def __init__(self, matrix: Array) -> None:
+        self.matrix = matrix
+        self._updating = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)])
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x."""
+        return self.matrix @ x
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`."""
+        if len(kept) > LARGE:
+            return self._updating.factor(kept)
+        return eliminate(self.matrix[np.ix_(kept, kept)])
+
+
+def eliminate(matrix: Array) -> Solve:
+    """Return the solution operator of a matrix, for one right-hand side or columns of them.
+
+    Raises:
+        LinAlgError: it is singular.
+    """
+    if not len(matrix):
+        return np.zeros_like
+    lu, pivots, _ = dgetrf(matrix)
+    if not np.abs(np.diagonal(lu)).min() > SINGULAR * np.abs(matrix).max():
+        raise np.linalg.LinAlgError("singular matrix")
+
+    def solve(b: Array) -> Array:
+        x: Array = dgetrs(lu, pivots, b)[0]
+        return x
+
+    return solve
+
+
+class WornShape(Dense):
+    """The derivative of the cyclic steady state, whose unknowns are p of m phases, the shape omega, and a few more.
+
+    Rows of phase k hold omega_i once, with the factor 1; rows of the wear balance hold p_ki once a phase where
+    wear is local. A node that touches gives both: omega_i by its gap in the phase that wears it most, and p
+    there by the wear balance. What is left to eliminate are the pressures of the other phases: (m - 1) n and
+    a few unknowns in place of (m + 1) n. For two phases that is a 27th of the work.
+
+    Args:
+        matrix: Its numbers (size, size), the phases' p first, then omega.
+        phases: m.
+        nodes: n.
+    """
+
+    def __init__(self, matrix: Array, phases: int, nodes: int) -> None:
+        super().__init__(matrix)
+        self.shape = (phases, nodes)
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`."""
+        (m, n), matrix = self.shape, self.matrix
+        free = np.zeros(len(matrix), dtype=bool)
+        free[kept] = True
+        nodes, balance = np.arange(n), m * n + np.arange(n)
+        wear = np.abs(matrix[balance, np.arange(m * n).reshape(m, n)]) * free[: m * n].reshape(m, n)
+        most = wear.argmax(axis=0)
+        shaped = free[balance] & (wear.max(axis=0) > 0) & (matrix[balance, balance] == 0)
+        gap = (most * n + nodes)[shaped].astype(np.int32)  # rows of the gap, and columns of the pressure in it
+        shape = balance[shaped].astype(np.int32)  # rows of the wear balance, and columns of omega
+        local = csr_array(matrix[np.ix_(shape, gap)])
+        if not len(gap) or local.nnz != len(gap):  # what one node wears opens others, too
+            return super().factor(kept)
+        rest = np.setdiff1d(kept, np.concatenate([gap, shape]))
+        by_pressure, by_shape = matrix[np.ix_(rest, gap)], csr_array(matrix[np.ix_(rest, shape)])
+        # p = p_0 - Q z and omega = omega_0 - O z, with z what is left.
+        slope = matrix[shape, gap]
+        compliance = matrix[np.ix_(gap, gap)]
+        pressures = csr_array(csr_array(matrix[np.ix_(shape, rest)]) / slope[:, None])
+        shapes = matrix[np.ix_(gap, rest)] - compliance @ pressures
+        solve_rest = eliminate(matrix[np.ix_(rest, rest)] - by_pressure @ pressures - by_shape @ shapes)
+        where = np.searchsorted(kept, np.concatenate([gap, shape, rest]))
+        at_gap, at_shape, at_rest = np.split(where, np.cumsum([len(gap), len(shape)]))
+
+        def solve(b: Array) -> Array:
+            x = np.empty_like(b)
+            pressure = b[at_shape] / slope
+            omega = b[at_gap] - compliance @ pressure
+            z = solve_rest(b[at_rest] - by_pressure @ pressure - by_shape @ omega)
+            x[at_gap], x[at_shape], x[at_rest] = pressure - pressures @ z, omega - shapes @ z, z
+            return x
+
+        return solve
+
+
+class Phases:
+    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + L_k R_j.
+
+    Args:
+        blocks: A_k (m, size, size).
+        coupling: C (m, n, m, n) on the first n unknowns of each block; None where there is none.
+        border: L (m, n, q) and R (m, q, n), on the same; None where there is none.
+    """
+
+    def __init__(self, blocks: Array, coupling: Array | None = None, border: tuple[Array, Array] | None = None) -> None:
+        m, size, _ = blocks.shape
+        self.blocks, self.border = blocks, border
+        self._whole: Dense | None = None
+        if m == 1 and coupling is None and border is None:
+            self._whole = Dense(blocks[0])
+        elif m == 1 or coupling is not None or m * size <= DENSE:
+            self._whole = Dense(_whole(blocks, coupling, border))
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x (m size,)."""
+        if self._whole is not None:
+            return self._whole.multiply(x)
+        parts = x.reshape(len(self.blocks), -1)
+        result = np.matmul(self.blocks, parts[:, :, None])[:, :, 0]
+        if self.border is not None:
+            left, right = self.border
+            n = left.shape[1]
+            result[:, :n] += left @ np.einsum("kqn,kn->q", right, parts[:, :n])
+        return result.ravel()
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`.
+
+        With z_k = A_k^-1 b_k and Y_k = A_k^-1 L_k the quantities y between the blocks follow from
+        (I + sum of R_k Y_k) y = sum of R_k z_k, and x_k = z_k - Y_k y: the work grows with the number of
+        blocks, where an elimination of the whole would grow with its cube.
+        """
+        if self._whole is not None:
+            return self._whole.factor(kept)
+        m, size, _ = self.blocks.shape
+        cuts = list(np.searchsorted(kept, np.arange(m + 1) * size))
+        own: list[Indices] = [kept[cuts[k] : cuts[k + 1]] - k * size for k in range(m)]
+        solves = [eliminate(self.blocks[k][np.ix_(rows, rows)]) for k, rows in enumerate(own)]
+        if self.border is None:
+            return lambda b: np.concatenate([solve(b[cuts[k] : cuts[k + 1]]) for k, solve in enumerate(solves)])
+        left, right = self.border
+        n, q = left.shape[1:]
+        columns: list[Array] = []
+        rights: list[Array] = []
+        schur: Array = np.eye(q)
+        for k, (solve_block, rows) in enumerate(zip(solves, own, strict=True)):
+            nodes = rows[rows < n]
+            by_between = np.zeros((len(rows), q))
+            by_between[: len(nodes)] = left[k][nodes]
+            columns.append(solve_block(by_between))
+            rights.append(right[k][:, nodes])
+            schur = schur + rights[k] @ columns[k][: len(nodes)]
+        solve_schur = eliminate(schur)
+
+        def solve(b: Array) -> Array:
+            parts = [solve_block(b[cuts[k] : cuts[k + 1]]) for k, solve_block in enumerate(solves)]
+            between = np.zeros(q)
+            for at, part in zip(rights, parts, strict=True):
+                between += at @ part[: at.shape[1]]
+            y = solve_schur(between)
+            return np.concatenate([part - by @ y for part, by in zip(parts, columns, strict=True)])
+
+        return solve
+
+
+def _whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None) -> Array:
+    """Return the matrix as one (m size, m size)."""
+    m, size, _ = blocks.shape
+    matrix: Array = blocks[0].copy() if m == 1 else scipy.linalg.block_diag(*blocks)
+    view = matrix.reshape(m, size, m, size)
+    if coupling is not None:
+        n = coupling.shape[1]
+        view[:, :n, :, :n] += coupling
+    if border is not None:
+        lefts, right = [csr_array(left) for left in border[0]], border[1]  # next to diagonal
+        n = right.shape[2]
+        for k, left in enumerate(lefts):
+            for j in range(m):
+                view[k, :n, j, :n] += left @ right[j]
+    return matrix

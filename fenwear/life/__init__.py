@@ -1,0 +1,52 @@
+"""From a measurement to a life: quantities of interest, sensitivities, calibration, life with scatter.
+
+From Python:
+
+    from fenwear import load_case
+    from fenwear.life import calibrate, lifetime, read_data, sensitivity
+
+    case = load_case("case.toml")
+    fit = calibrate(case, [read_data("profile.csv", case)], ["wear.punch.coefficient"])
+    life = lifetime(case, "depth 0.2 mm", fit.scatter())
+"""
+
+from fenwear.life.calibrate import Calibration, LeastSquares, Unknown, between, calibrate, repeated, without_values
+from fenwear.life.data import DataSet, Series, measured_folder, read_data
+from fenwear.life.lifetime import Lifetime, lifetime
+from fenwear.life.model import Model, Snapshot
+from fenwear.life.posterior import Posterior, posterior
+from fenwear.life.quantities import Quantity, evaluate, parse_quantity
+from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
+from fenwear.life.sensitivity import Sensitivity, sensitivity
+from fenwear.life.sobol import SobolIndices, sobol_design, sobol_indices
+
+__all__ = [
+    "Calibration",
+    "DataSet",
+    "LeastSquares",
+    "Lifetime",
+    "Model",
+    "Posterior",
+    "Quantity",
+    "Scatter",
+    "Sensitivity",
+    "Series",
+    "Snapshot",
+    "SobolIndices",
+    "Unknown",
+    "between",
+    "calibrate",
+    "evaluate",
+    "lifetime",
+    "load_scatter",
+    "measured_folder",
+    "parse_quantity",
+    "parse_scatter",
+    "posterior",
+    "read_data",
+    "repeated",
+    "sensitivity",
+    "sobol_design",
+    "sobol_indices",
+    "without_values",
+]

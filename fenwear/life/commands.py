@@ -1,0 +1,286 @@
+"""What the commands sensitivity, calibrate and life do: compute, write into a folder, say where."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from fenwear.case import Case
+from fenwear.errors import CaseError, Problem
+from fenwear.life.calibrate import (
+    Calibration,
+    LeastSquares,
+    between,
+    between_as_json,
+    calibrate,
+    parse_unknown,
+)
+from fenwear.life.data import read_data
+from fenwear.life.lifetime import SAMPLES, Lifetime, lifetime
+from fenwear.life.model import Model
+from fenwear.life.pictures import life_figure, residuals, save, tornado
+from fenwear.life.posterior import Posterior, posterior
+from fenwear.life.quantities import UNITS, cycles_of, parse_amount, parse_quantity
+from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
+from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
+from fenwear.parallel import on_root
+from fenwear.results.disk import write_text
+from fenwear.results.history import CASE, free_directory, make_directory
+
+Log = Callable[[str], None]
+
+
+def _need(package: str, what: str) -> None:
+    """Check that an optional package is there.
+
+    Raises:
+        CaseError: it is not.
+    """
+    if find_spec(package) is None:
+        raise CaseError(Problem(what, f"needs the package {package}: on Debian, install python3-{package}"))
+
+
+def _folder(output: Path | None, what: str, name: str, comm: MPI.Comm) -> Path:
+    """Return the new folder of the results."""
+
+    def make() -> Path:
+        path = output or free_directory(Path("results") / f"{what}-{name}")
+        make_directory(path)
+        return path
+
+    return on_root(comm, make)
+
+
+def _write_case(folder: Path, case: Case) -> None:
+    write_text(folder / CASE, case.to_toml())
+
+
+def _counter(log: Log, what: str) -> Callable[[int, int], None]:
+    """Return what tells of progress, at most a hundred times."""
+    told = [-1]
+
+    def tell(done: int, total: int) -> None:
+        share = 100 * done // max(total, 1)
+        if share > told[0]:
+            told[0] = share
+            log(f"{what} {done:,} of {total:,}")
+
+    return tell
+
+
+def run_sensitivity(
+    case: Case,
+    name: str,
+    quantities: Sequence[str],
+    keys: Sequence[str],
+    spread: float,
+    output: Path | None,
+    log: Log,
+    *,
+    differences: bool = False,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> tuple[list[Sensitivity], Path]:
+    """Compute sensitivities; write sensitivity.json and tornado.png; collective."""
+    method: Method | None = "differences" if differences else None
+    found = sensitivity(case, quantities, keys, spread=spread, method=method, comm=comm, progress=_counter(log, "keys"))
+    folder = _folder(output, "sensitivity", name, comm)
+
+    def write() -> None:
+        _write_case(folder, case)
+        write_text(folder / "sensitivity.json", json.dumps([one.as_json() for one in found], indent=1))
+        if spread > 0:
+            save(tornado(found), folder / "tornado.png")
+
+    on_root(comm, write)
+    return found, folder
+
+
+def run_calibrate(
+    case: Case,
+    name: str,
+    files: Sequence[Path],
+    unknowns: Sequence[str],
+    baseline: Sequence[str],
+    steps: int | None,
+    output: Path | None,
+    log: Log,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> tuple[Calibration, Posterior | None, Path]:
+    """Calibrate; write calibration.json, residuals.csv and residuals.png, and on request posterior.csv; collective.
+
+    Raises:
+        CaseError: as `calibrate`; or an unknown ends at its bound: what was found is in the folder.
+    """
+    _need("lmfit", "calibrate")
+    asked = [parse_unknown(case, text) for text in unknowns]
+    data = on_root(comm, lambda: [read_data(path, case) for path in files])
+    found = calibrate(case, data, asked, baseline=baseline, comm=comm, progress=log)
+    folder = _folder(output, "calibrate", name, comm)
+
+    def write() -> None:
+        _write_case(folder, case)
+        write_text(folder / "calibration.json", json.dumps(found.as_json(), indent=1))
+        write_text(folder / "residuals.csv", _residual_table(found))
+        save(residuals(found), folder / "residuals.png")
+
+    on_root(comm, write)
+    sample: Posterior | None = None
+    if steps is not None:
+        log("sampling the posterior")
+        drawn = posterior(LeastSquares(case, data, asked, baseline, MPI.COMM_SELF), found, steps)
+        on_root(
+            comm,
+            lambda: write_text(folder / "posterior.csv", _table(list(drawn.keys), [list(row) for row in drawn.values])),
+        )
+        sample = drawn
+    if found.at_bound:
+        raise CaseError(
+            [
+                Problem(f"--unknown {key}", "the data want a value beyond its bound; expected bounds that hold it "
+                        f"(what was found is in {folder})")
+                for key in found.at_bound
+            ]
+        )  # fmt: skip
+    return found, sample, folder
+
+
+def run_calibrate_each(
+    case: Case,
+    name: str,
+    files: Sequence[Path],
+    unknowns: Sequence[str],
+    baseline: Sequence[str],
+    output: Path | None,
+    log: Log,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> tuple[list[Calibration], Scatter, Path]:
+    """Calibrate every file alone; write calibration.json with the scatter between them; collective."""
+    _need("lmfit", "calibrate")
+    _need("openturns", "--each")
+    asked = [parse_unknown(case, text) for text in unknowns]
+    data = on_root(comm, lambda: [read_data(path, case) for path in files])
+    found = []
+    for one in data:
+        log(one.name)
+        found.append(calibrate(case, [one], asked, baseline=baseline, comm=comm, progress=log))
+    scatter = between(found)
+    folder = _folder(output, "calibrate", name, comm)
+
+    def write() -> None:
+        _write_case(folder, case)
+        write_text(folder / "calibration.json", json.dumps(each_as_json(found, scatter), indent=1))
+        for one, calibration in zip(data, found, strict=True):
+            save(residuals(calibration), folder / f"residuals_{Path(one.name).stem}.png")
+
+    on_root(comm, write)
+    return found, scatter, folder
+
+
+def each_as_json(found: Sequence[Calibration], scatter: Scatter) -> dict[str, Any]:
+    """Return what `fenwear calibrate --each --json` prints; `fenwear life --from` reads it."""
+    return {**between_as_json(found), "scatter": list(scatter.text), "tests": [one.as_json() for one in found]}
+
+
+def _table(heading: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(heading)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _residual_table(found: Calibration) -> str:
+    rows: list[list[object]] = []
+    for trace in found.traces:
+        series = trace.series
+        for k, row in enumerate(series.rows):
+            rows.append(
+                [trace.name, row, series.quantity, "" if series.x is None else float(series.x[k]),
+                 float(series.after[k]), series.counted, float(series.values[k]), float(trace.predicted[k]),
+                 UNITS[series.quantity]]
+            )  # fmt: skip
+    heading = ["file", "row", "quantity", "x (mm)", "after", "counted in", "measured", "fitted", "unit"]
+    return _table(heading, rows)
+
+
+def run_life(
+    case: Case,
+    name: str,
+    until: str,
+    scatters: Sequence[str],
+    calibration: Path | None,
+    samples: int,
+    seed: int,
+    wanted: str | None,
+    output: Path | None,
+    log: Log,
+    *,
+    resume: bool = False,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+) -> tuple[Lifetime, Path]:
+    """Compute lives; write samples.csv, life.json and life.png; collective."""
+    _need("openturns", "life")
+    quantity = parse_quantity(until, "--until")
+    scatter: Scatter | None = None if calibration is None else load_scatter(calibration, case)
+    for text in scatters:
+        one = parse_scatter(case, text)
+        scatter = one if scatter is None else scatter.and_also(one)
+    if scatter is None:
+        raise CaseError(Problem("--scatter", "expected the distribution of at least one key, or --from a calibration"))
+    scatter.check(case)
+    if resume and output is None:
+        raise CaseError(Problem("--resume", "expected the folder of the sampling to go on with, as -o DIR"))
+    level = None if wanted is None else _wanted(case, quantity.life, wanted)
+    folder = output if resume and output is not None else _folder(output, "life", name, comm)
+    if resume:
+        on_root(comm, lambda: _check_folder(folder, case))
+    on_root(comm, lambda: _write_case(folder, case))
+    for line in scatter.text:
+        log(line)
+    found = lifetime(
+        case, quantity, scatter, samples=samples, seed=seed, wanted=level, folder=folder, resume=resume, comm=comm,
+        progress=_counter(log, "samples"),
+    )  # fmt: skip
+
+    def write() -> None:
+        write_text(folder / "life.json", json.dumps(found.as_json(), indent=1))
+        save(life_figure(found), folder / "life.png")
+
+    on_root(comm, write)
+    return found, folder
+
+
+def _check_folder(folder: Path, case: Case) -> None:
+    """Check that a folder holds samples of the same case.
+
+    Raises:
+        CaseError: it does not.
+    """
+    if not (folder / SAMPLES).is_file():
+        raise CaseError(Problem("--resume", f"{folder} holds no {SAMPLES} to go on with"))
+    try:
+        before = (folder / CASE).read_text("utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise CaseError(Problem("--resume", f"{folder / CASE} cannot be read")) from None
+    if before != case.to_toml():
+        raise CaseError(Problem("--resume", f"the case differs from {folder / CASE}, of which the samples are"))
+
+
+def _wanted(case: Case, life: str, text: str) -> float:
+    """Return a wanted life in the unit of the lives."""
+    amount = parse_amount(text, "--wanted")
+    measures = Model(case).cycle_measures()
+    factor = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}[life]
+    return cycles_of(amount, *measures) * factor
+
+
+def as_json(found: Sequence[Sensitivity]) -> dict[str, Any]:
+    """Return what `fenwear sensitivity --json` prints."""
+    return {"sensitivities": [one.as_json() for one in found]}

@@ -1,0 +1,109 @@
+"""Numeric keys of a case: their values and units, read and set by their paths."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fenwear.case import Case, changed_case
+from fenwear.errors import CaseError, Problem
+
+EXPONENTS = ("pressure_exponent", "speed_exponent")
+
+
+@dataclass(frozen=True)
+class Key:
+    """A number of a case.
+
+    Attributes:
+        path: Such as wear.punch.coefficient, or punch.loads.0.force.1 for the second number of a list.
+        value: In `unit`.
+        unit: The internal one; "" for a pure number.
+    """
+
+    path: str
+    value: float
+    unit: str
+
+
+def numeric_keys(case: Case) -> dict[str, Key]:
+    """Return every key of a case that holds a real number, by its path."""
+    return {key.path: key for key in _walk(case.resolved(), ())}
+
+
+def _walk(part: Any, path: tuple[str, ...]) -> Iterator[Key]:
+    if isinstance(part, dict):
+        for name, value in part.items():
+            yield from _walk(value, (*path, name))
+    elif isinstance(part, list):
+        for place, value in enumerate(part):
+            yield from _walk(value, (*path, str(place)))
+    elif isinstance(part, float):
+        yield Key(".".join(path), part, "")
+    elif isinstance(part, str):
+        number, _, unit = part.partition(" ")
+        try:
+            yield Key(".".join(path), float(number), unit)
+        except ValueError:
+            return
+
+
+def find_key(case: Case, path: str, option: str = "") -> Key:
+    """Return a key of a case.
+
+    Args:
+        path: Its path.
+        option: Of the command line, for the message.
+
+    Raises:
+        CaseError: the case has no such number; names near ones.
+    """
+    keys = numeric_keys(case)
+    if path in keys:
+        return keys[path]
+    near = difflib.get_close_matches(path, keys, n=3)
+    hint = f"; did you mean {' or '.join(near)}?" if near else "; `fenwear check` prints all keys"
+    raise CaseError(Problem(f"{option} {path}".strip(), f"the case has no such key with a real number{hint}"))
+
+
+def settings_of(case: Case, values: Mapping[str, float]) -> list[str]:
+    """Return overrides `key.path=value` that give keys these values, in their internal units.
+
+    A wear coefficient's unit follows from its exponents: where only an exponent changes, the
+    coefficient keeps its number.
+    """
+    keys = numeric_keys(case)
+    filled = dict(values)
+    for path in values:
+        body, _, name = path.rpartition(".")
+        if name in EXPONENTS:
+            for coefficient in (f"{body}.coefficient", f"{body}.beta"):
+                if coefficient in keys:
+                    filled.setdefault(coefficient, keys[coefficient].value)
+    return [f"{path}={float(value)!r}" for path, value in filled.items()]
+
+
+def with_values(case: Case, values: Mapping[str, float], settings: Sequence[str] = ()) -> Case:
+    """Return the case with further overrides and with keys at these values.
+
+    Raises:
+        CaseError: a value is not possible; names its key.
+    """
+    changed = changed_case(case, *settings) if settings else case
+    return changed_case(changed, *settings_of(changed, values)) if values else changed
+
+
+def value_of(case: Case, path: str, text: str, option: str = "") -> float:
+    """Return a number with or without unit in the internal unit of a key.
+
+    Raises:
+        CaseError: not a number, of another kind, or not possible for this key.
+    """
+    find_key(case, path, option)
+    try:
+        number = float(text)
+    except ValueError:
+        return find_key(changed_case(case, f'{path}="{text.strip()}"'), path).value
+    return find_key(with_values(case, {path: number}), path).value

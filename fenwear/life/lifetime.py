@@ -1,0 +1,354 @@
+"""Life with scatter: samples of keys, a run for each, and what their lives have in common.
+
+Every sample is appended to samples.csv as soon as it is computed, so that nothing is lost and a sampling can
+go on later. Quantiles come with the interval of order statistics that holds them with 95 %, whatever
+the distribution (binomial); a reliability with that of Clopper and Pearson.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from scipy import stats
+
+from fenwear.arrays import Array
+from fenwear.case import Case
+from fenwear.errors import CaseError, ConvergenceError, FenwearError, Problem
+from fenwear.life.model import Model
+from fenwear.life.quantities import LIMIT, Quantity, check_quantity, evaluate, parse_quantity
+from fenwear.life.ranks import in_chunks
+from fenwear.life.scatter import Scatter
+from fenwear.life.sobol import LEVEL, SobolIndices, sobol_design, sobol_indices
+from fenwear.parallel import on_root
+from fenwear.results.disk import writing
+
+SAMPLES = "samples.csv"
+QUANTILES = (0.01, 0.05, 0.1, 0.5, 0.9, 0.95)
+MOST_FAILED = 0.05  # of the samples, beyond which what is left says nothing of all
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number estimated from a sample, with the interval that holds the true one with 95 %.
+
+    Attributes:
+        level: Of the quantile, or the life wanted.
+        value: The quantile, or the reliability.
+        low, high: Ends of the interval; infinite where the sample is too small for one.
+    """
+
+    level: float
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Lifetime:
+    """Lives of a sample.
+
+    Attributes:
+        quantity: What was counted.
+        unit: Of the lives.
+        keys: That scatter.
+        samples: Their values (n, d), in internal units.
+        lives: (n,); infinite where the level is never reached, NaN where a run did not converge.
+        quantiles: Of the lives; those of level q are reached before by a share q of the parts.
+        reliability: Share of parts that live as long as was wanted; None if that was not asked for.
+        sobol: Indices of the logarithm of the life; None where inputs depend on each other or only one scatters.
+        failures: What went wrong, by its sample.
+        seed: Of the sample.
+    """
+
+    quantity: str
+    unit: str
+    keys: tuple[str, ...]
+    samples: Array
+    lives: Array
+    quantiles: tuple[Estimate, ...]
+    reliability: Estimate | None
+    sobol: SobolIndices | None
+    failures: dict[int, str]
+    seed: int
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what --json prints and life.json holds."""
+
+        def row(one: Estimate, name: str) -> dict[str, Any]:
+            interval = [end if np.isfinite(end) else None for end in (one.low, one.high)]
+            return {name: one.level, "value": one.value if np.isfinite(one.value) else None, "interval_95": interval}
+
+        return {
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "samples": len(self.lives),
+            "failed": len(self.failures),
+            "never_reached": int(np.isinf(self.lives).sum()),
+            "quantiles": [row(one, "level") for one in self.quantiles],
+            "reliability": None if self.reliability is None else row(self.reliability, "wanted"),
+            "sobol": None if self.sobol is None else self.sobol.as_json(),
+            "seed": self.seed,
+        }
+
+    def text(self) -> str:
+        """Return a table for people."""
+        unit = self.unit or ("cycles" if self.quantity.startswith("cycles") or " until " not in self.quantity else "")
+        lines = [f"{self.quantity}: {len(self.lives)} samples"]
+        if self.failures:
+            lines.append(f"  {len(self.failures)} of them did not converge and are left out")
+        if np.isinf(self.lives).any():
+            lines.append(f"  {np.isinf(self.lives).sum()} of them never get there")
+        lines.append(f"  {'share that fails before':24} {'life':>12} {'95 % interval':>27}  {unit}".rstrip())
+        lines += [f"  {one.level:24.0%} {one.value:12.5g} {one.low:13.5g} {one.high:13.5g}" for one in self.quantiles]
+        if self.reliability is not None:
+            one = self.reliability
+            lines.append(
+                f"  a share of {one.value:.4f} ({one.low:.4f} to {one.high:.4f}) lives for {one.level:.6g} {unit}"
+            )
+        if self.sobol is not None:
+            lines.append("  share of the variance of the life's logarithm: alone, with interactions")
+            lines += [
+                f"    {name:36} {first:7.3f} ({a[0]:.3f} to {a[1]:.3f})  {total:7.3f} ({b[0]:.3f} to {b[1]:.3f})"
+                for name, first, total, a, b in self.sobol.rows()
+            ]  # fmt: skip
+        return "\n".join(lines)
+
+
+def quantile(values: Array, level: float) -> Estimate:
+    """Return a quantile and its interval by order statistics.
+
+    The number of values below the true quantile is binomial (n, level), whatever the distribution: the values
+    number l and u enclose it with the probability P(l <= B < u) >= 95 %. Where n is too small for
+    that, the end of the interval is zero or infinite: the true quantile may be beyond every value.
+    """
+    ordered, n = np.sort(values), len(values)
+    below = stats.binom(n, level)
+    low, high = int(below.ppf((1 - LEVEL) / 2)), int(below.ppf((1 + LEVEL) / 2)) + 1
+    if below.cdf(low - 1) > (1 - LEVEL) / 2:  # of a discrete distribution: never less than asked for
+        low -= 1
+    return Estimate(
+        level,
+        float(ordered[min(n - 1, int(np.ceil(n * level)) - 1 if level > 0 else 0)]),
+        float(ordered[low - 1]) if low >= 1 else 0.0,
+        float(ordered[high - 1]) if high <= n else float("inf"),
+    )
+
+
+def reliability(lives: Array, wanted: float) -> Estimate:
+    """Return the share of lives as long as wanted, and its interval of Clopper and Pearson."""
+    n, good = len(lives), int((lives >= wanted).sum())
+    outside = (1 - LEVEL) / 2
+    low = float(stats.beta.ppf(outside, good, n - good + 1)) if good > 0 else 0.0
+    high = float(stats.beta.ppf(1 - outside, good + 1, n - good)) if good < n else 1.0
+    return Estimate(wanted, good / n, low, high)
+
+
+def lifetime(
+    case: Case,
+    until: str | Quantity,
+    scatter: Scatter,
+    *,
+    samples: int = 200,
+    seed: int = 0,
+    wanted: float | None = None,
+    limit: int = LIMIT,
+    folder: Path | None = None,
+    resume: bool = False,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Lifetime:
+    """Return the distribution of the life of parts whose keys scatter; collective, one sample on each rank.
+
+    Args:
+        case: The problem.
+        until: Such as "depth 0.2 mm", or "distance until volume 3 mm^3".
+        scatter: Distribution of keys.
+        samples: Size n of the sample; with several independent keys n (d + 2) runs also give Sobol indices.
+        seed: Of the sample.
+        wanted: A life whose reliability is asked for, in the unit of the lives.
+        limit: Cycles after which a level counts as never reached.
+        folder: Where samples.csv is kept; None for nowhere.
+        resume: Go on with the samples that are there.
+        comm: The ranks.
+        progress: Told of the samples done and of all.
+
+    Raises:
+        CaseError: what is asked for makes no sense; samples.csv belongs to another sampling.
+        ConvergenceError: more than 5 % of the runs did not converge; their samples are in samples.csv.
+        OutputError: samples.csv cannot be written.
+    """
+    quantity = parse_quantity(until, "--until") if isinstance(until, str) else until
+    if quantity.kind != "life":
+        raise CaseError(
+            Problem("--until", f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}")
+        )
+    check_quantity(quantity, case, "--until")
+    if samples < 2:
+        raise CaseError(Problem("--samples", f"expected two or more, got {samples}"))
+    scatter.check(case)
+    with_indices = len(scatter.keys) > 1 and not scatter.correlated
+    design = _design(scatter, samples, seed, with_indices=with_indices)
+    record = _Record(folder, scatter.keys, quantity.text, design) if folder is not None else None
+    done = on_root(comm, lambda: {} if record is None else record.begin(resume=resume))
+    lives, failures = _run(case, quantity, scatter.keys, design, done, record, limit, comm, progress)
+    return _summary(quantity, scatter.keys, design, lives, failures, samples, wanted, seed, with_indices=with_indices)
+
+
+def _design(scatter: Scatter, samples: int, seed: int, *, with_indices: bool) -> Array:
+    import openturns as ot
+
+    if with_indices:
+        return sobol_design(scatter.distribution, samples, seed)
+    ot.RandomGenerator.SetSeed(seed)
+    return np.array(scatter.distribution.getSample(samples))
+
+
+def _run(
+    case: Case,
+    quantity: Quantity,
+    keys: Sequence[str],
+    design: Array,
+    done: dict[int, tuple[float, str]],
+    record: _Record | None,
+    limit: int,
+    comm: MPI.Comm,
+    progress: Callable[[int, int], None],
+) -> tuple[Array, dict[int, str]]:
+    """Compute what is not done yet; return lives and failures."""
+    model = Model(case)
+    lives = np.full(len(design), np.nan)
+    failures: dict[int, str] = {}
+
+    def note(number: int, life: float, trouble: str) -> None:
+        lives[number] = life
+        if trouble:
+            failures[number] = trouble
+
+    for number, (life, trouble) in done.items():
+        note(number, life, trouble)
+    left = [number for number in range(len(design)) if number not in done]
+
+    def one(number: int) -> float:
+        values = dict(zip(keys, design[number].tolist(), strict=True))
+        return evaluate(model, quantity, values, limit=limit)[0]
+
+    begin = 0
+    progress(len(done), len(design))
+    for outcomes in in_chunks(comm, left, one):
+        rows: list[tuple[int, float, str]] = []
+        for number, outcome in zip(left[begin : begin + len(outcomes)], outcomes, strict=True):
+            if isinstance(outcome, FenwearError):
+                rows.append((number, float("nan"), " ".join(str(outcome).split())))
+            else:
+                rows.append((number, outcome, ""))
+        begin += len(outcomes)
+        on_root(comm, lambda rows=rows: None if record is None else record.add(rows))  # type: ignore[misc]
+        for row in rows:
+            note(*row)
+        progress(len(done) + begin, len(design))
+    return lives, failures
+
+
+class _Record:
+    """samples.csv: heading, then a row for each sample as it is computed."""
+
+    def __init__(self, folder: Path, keys: Sequence[str], quantity: str, design: Array) -> None:
+        self.folder, self.path, self.design = folder, folder / SAMPLES, design
+        self.heading = ["sample", *keys, quantity, "trouble"]
+
+    def begin(self, *, resume: bool) -> dict[int, tuple[float, str]]:
+        """Make the file, or read what it holds.
+
+        Raises:
+            CaseError: the file exists, or belongs to another sampling.
+        """
+        if not resume and self.path.exists():
+            raise CaseError(Problem("-o", f"{self.path} exists already; expected a new folder, or --resume"))
+        with writing(self.path):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            if not self.path.exists():
+                self.path.write_text("", "utf-8")
+                self._append([self.heading])
+                return {}
+        return self._read()
+
+    def add(self, rows: Sequence[tuple[int, float, str]]) -> None:
+        """Append samples."""
+        with writing(self.path):
+            self._append(
+                [[number, *(repr(float(v)) for v in self.design[number]), repr(float(life)), trouble]
+                 for number, life, trouble in rows]
+            )  # fmt: skip
+
+    def _append(self, rows: Sequence[Sequence[object]]) -> None:
+        with self.path.open("a", encoding="utf-8", newline="") as file:
+            csv.writer(file).writerows(rows)
+
+    def _read(self) -> dict[int, tuple[float, str]]:
+        try:
+            text = self.path.read_bytes().decode("utf-8")
+        except (OSError, UnicodeDecodeError):
+            raise CaseError(Problem("--resume", f"{self.path} cannot be read")) from None
+        whole = text[: text.rfind("\n") + 1]  # an interrupted write leaves half a row behind
+        rows = list(csv.reader(whole.splitlines()))
+        if not rows or rows[0] != self.heading:
+            raise CaseError(Problem("--resume", f"{self.path} is of another sampling: expected the heading "
+                                    f"{', '.join(self.heading)}"))  # fmt: skip
+        done: dict[int, tuple[float, str]] = {}
+        for line, row in enumerate(rows[1:], 2):
+            try:
+                number, *values, life = int(row[0]), *map(float, row[1:-1])
+            except (ValueError, IndexError):
+                raise CaseError(
+                    Problem("--resume", f"{self.path}: row {line}: is damaged; remove it and go on")
+                ) from None
+            if not 0 <= number < len(self.design) or not np.array_equal(values, self.design[number]):
+                raise CaseError(Problem("--resume", f"{self.path}: row {line} is of another sample: expected the same "
+                                        "--seed, --samples and --scatter"))  # fmt: skip
+            done[number] = (life, row[-1])
+        if whole != text:
+            with writing(self.path):
+                self.path.write_text(whole, "utf-8")
+        return done
+
+
+def _summary(
+    quantity: Quantity,
+    keys: tuple[str, ...],
+    design: Array,
+    lives: Array,
+    failures: dict[int, str],
+    samples: int,
+    wanted: float | None,
+    seed: int,
+    *,
+    with_indices: bool,
+) -> Lifetime:
+    if len(failures) > MOST_FAILED * len(lives):
+        first = next(iter(failures.values()))
+        raise ConvergenceError(
+            f"{len(failures)} of {len(lives)} samples did not converge, too many for a distribution; the first: {first}"
+        )
+    plain = lives[: 2 * samples] if with_indices else lives  # two independent samples stand first in the design
+    known = plain[~np.isnan(plain)]
+    indices = None
+    if with_indices and np.isfinite(lives).all() and np.ptp(lives) > 0:
+        indices = sobol_indices(keys, design, np.log(lives), samples, seed)
+    return Lifetime(
+        quantity.text,
+        quantity.unit,
+        keys,
+        design,
+        lives,
+        tuple(quantile(known, level) for level in QUANTILES),
+        None if wanted is None else reliability(known, wanted),
+        indices,
+        failures,
+        seed,
+    )

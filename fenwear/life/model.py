@@ -1,0 +1,289 @@
+"""What a case gives for values of its keys: runs by cycle jumps and steady states, on one process.
+
+The one module of this package that knows how a system is assembled and integrated. Each rank has its
+own systems, so that samples can be shared out among ranks and no result depends on their number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, assemble, with_case
+from fenwear.case import Case
+from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
+from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.state import RunState, beginning, joined
+from fenwear.life.keys import with_values
+
+BODIES = ("punch", "strip")
+RECENT = 8  # systems kept, as a run and its measures ask for the same one
+ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop
+NEAR_THE_END = 0.01  # of the mean pressure: where the run-in is over
+
+
+@dataclass(frozen=True)
+class WornSurface:
+    """The worn surface of a body.
+
+    Attributes:
+        x: Nodes, ascending (n,), mm.
+        weights: Length that each stands for (n,), mm.
+        depth: Worn depth (n,), mm; None in a steady state, whose depth grows without end.
+        rate: Depth worn in a cycle (n,), mm.
+    """
+
+    x: Array
+    weights: Array
+    depth: Array | None
+    rate: Array
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The end of a cycle, or the cyclic steady state.
+
+    Attributes:
+        cycle: Its number; infinite for the steady state.
+        surfaces: Worn surface of each body.
+        x: Contact nodes (n,), mm.
+        weights: Length that each stands for (n,), mm.
+        pressure: In each phase of the motion (m, n), MPa.
+        temperature: Of the contact surfaces at the end of each phase that is known (phases, 2, n), K; None without
+            heat.
+        friction: Mean friction coefficient of the cycle, weighted by the pressure.
+        velocity: Rigid-body wear per cycle of each mode, mm and rad; empty in a run.
+        distance: Slid in a cycle, mm.
+        period: Duration of a cycle, s.
+        thickness: mm.
+    """
+
+    cycle: float
+    surfaces: Mapping[str, WornSurface]
+    x: Array
+    weights: Array
+    pressure: Array
+    temperature: Array | None
+    friction: float
+    velocity: Mapping[str, float]
+    distance: float
+    period: float
+    thickness: float
+
+    def at_cycle(self, cycle: float) -> Snapshot:
+        """Return the snapshot with its depths carried on to a cycle nearby, at the rate of its last one."""
+        moved = {
+            body: replace(own, depth=None if own.depth is None else own.depth + own.rate * (cycle - self.cycle))
+            for body, own in self.surfaces.items()
+        }
+        return replace(self, cycle=cycle, surfaces=moved)
+
+
+@dataclass
+class Model:
+    """A case, ready to be asked for other values of its keys.
+
+    Runs are made by cycle jumps with the case's run.jump_tolerance, whatever run.integration says.
+
+    Attributes:
+        case: The case.
+        evaluations: Runs and steady states computed so far.
+    """
+
+    case: Case
+    evaluations: int = 0
+    _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
+    _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
+
+    def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:
+        """Return the assembled problem with keys at these values; what does not change is shared.
+
+        Raises:
+            CaseError: a value is not possible.
+        """
+        base = self._base(tuple(settings))
+        if not values:
+            return base
+        key = (tuple(settings), tuple(sorted(values.items())))
+        if key not in self._recent:
+            while len(self._recent) >= RECENT:
+                self._recent.pop(next(iter(self._recent)))
+            self._recent[key] = with_case(base, with_values(base.case, values))
+        return self._recent[key]
+
+    def _base(self, settings: tuple[str, ...]) -> Tribosystem:
+        if settings not in self._bases:
+            first = next(iter(self._bases.values()), None)
+            case = with_values(self.case, {}, settings)
+            base = assemble(case, MPI.COMM_SELF, heat="reduced") if first is None else with_case(first, case)
+            self._bases[settings] = base
+        return self._bases[settings]
+
+    def cycle_measures(
+        self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()
+    ) -> tuple[float, float]:
+        """Return the distance slid in a cycle, mm, and its duration, s."""
+        motion = self.system(values, settings).motion
+        return float(sum(phase.distance for phase in motion.phases)), motion.period
+
+    def run(
+        self,
+        values: Mapping[str, float],
+        cycles: int,
+        *,
+        settings: Sequence[str] = (),
+        stops: Sequence[int] = (),
+        sequence: Sequence[int] | None = None,
+        until: Callable[[Snapshot], bool] = lambda _: False,
+    ) -> Iterator[Snapshot]:
+        """Yield the end of every jump, from the first to the last.
+
+        Args:
+            values: Of keys, in their internal units.
+            cycles: How many at most.
+            settings: Overrides `key.path=value` besides.
+            stops: Cycles at whose end a jump ends in any case.
+            sequence: Cycles at whose ends the jumps end, and nowhere else: with the sequence of another run the
+                results are smooth functions of the values.
+            until: Ends the run at the first snapshot for which it is true.
+
+        Raises:
+            CaseError: a value is not possible.
+            ConvergenceError: a jump did not converge.
+        """
+        system = self.system(values, settings)
+        self.evaluations += 1
+        strokes, case = system.motion.half_cycles, system.case
+        tolerance = case.run.jump_tolerance if sequence is None else np.inf
+        ends = frozenset(strokes * end for end in (stops if sequence is None else sequence))
+
+        def integrate(on: Tribosystem, reached: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
+            start = reached
+            if sequence is not None:
+                heat = cycle_heat(on)
+                start = start or beginning(on, None if heat is None else heat.exchange.initial())
+                start = replace(start, jump_length=ONE_STEP)
+            return jump(on, strokes * cycles, tolerance=tolerance, block=strokes, start=start, stops=ends, leave=leave)
+
+        # The elements' heights are the base's wherever the geometry is: no need to measure them anew.
+        base = self._base(tuple(settings))
+        watch = base if base.case.geometry == case.geometry else system
+        reached: RunState | None = None
+        for block in integrate(system, None, lambda now: watch.outworn(now.worn)):
+            reached = block.end
+            snapshot = _of_block(block)
+            yield snapshot
+            if until(snapshot):
+                return
+        if reached is None or reached.half_cycle >= strokes * cycles:
+            return
+        for block in follow(system, integrate, lambda on: on.exchange, reached):
+            snapshot = _of_block(block)
+            yield snapshot
+            if until(snapshot):
+                return
+
+    def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
+        """Return the cyclic steady state.
+
+        Raises:
+            CaseError: a value is not possible.
+            ConvergenceError: there is none, or it was not found.
+        """
+        system = self.system(values, settings)
+        self.evaluations += 1
+        state = steady(system)
+        return steady_snapshot(system, state.phase_pressure, state.velocity)
+
+    def run_in(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
+        """Return after how many cycles the pressure is within 1 % of the mean pressure of its end; infinite if never.
+
+        Raises:
+            ConvergenceError: there is no steady state.
+        """
+        system = self.system(values, settings)
+        self.evaluations += 1
+        cycles = cycles_to_reach(system, steady(system), NEAR_THE_END)
+        return np.inf if cycles is None else float(cycles)
+
+    def critical_speed(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
+        """Return the speed above which full contact is thermo-elastically unstable in either direction, mm/s.
+
+        Raises:
+            CaseError: the case has no heat.
+        """
+        system = self.system(values, settings)
+        self.evaluations += 1
+        return min(critical_speed(system, d) for d in sorted(set(system.motion.directions)))
+
+
+def _surfaces(system: Tribosystem, depths: Mapping[str, Array] | None, pressure: Array) -> dict[str, WornSurface]:
+    """Return both bodies' worn surfaces, nodes ascending along x."""
+    facing = system.pair
+    nodes = {"punch": (facing.x, facing.weights), "strip": (facing.strip.x[:, 0], facing.strip.weights)}
+    worn = system.phases_wear.worn(pressure)
+    surfaces = {}
+    for body, (x, weights) in nodes.items():
+        order = np.argsort(x, kind="stable")
+        depth = None if depths is None else depths[body][order]
+        surfaces[body] = WornSurface(x[order], weights[order], depth, getattr(worn, body)[order])
+    return surfaces
+
+
+def _snapshot(
+    system: Tribosystem,
+    cycle: float,
+    pressure: Array,
+    depths: Mapping[str, Array] | None,
+    temperature: Array | None,
+    velocity: Mapping[str, float],
+) -> Snapshot:
+    motion, weights = system.motion, system.pair.weights
+    lasts = np.array([phase.distance for phase in motion.phases])[:, None]
+    latest = None if temperature is None else (temperature[-1, 0], temperature[-1, 1])
+    states = [system.conditions(k, np.asarray(pressure[k]), latest) for k in range(len(pressure))]
+    mu = np.array([system.friction.values(state) for state in states])
+    carried = float((lasts * pressure * weights).sum())
+    return Snapshot(
+        cycle,
+        _surfaces(system, depths, pressure),
+        system.pair.x,
+        weights,
+        pressure,
+        temperature,
+        float((lasts * mu * pressure * weights).sum()) / carried if carried > 0 else 0.0,
+        velocity,
+        float(lasts.sum()),
+        motion.period,
+        system.case.model.thickness,
+    )
+
+
+def _of_block(block: Block) -> Snapshot:
+    """Return the end of the last cycle of a block."""
+    system, contacts = block.system, joined(block.end.contacts)
+    pressure = block.pressure if contacts is None else contacts.pressure
+    depths = {"punch": block.end.worn.punch, "strip": block.end.worn.strip}
+    heat, temperature = block.heat, None
+    if heat is not None:
+        temperature = np.stack([heat.temperature_punch, heat.temperature_strip], axis=1)
+    cycle = int(block.half_cycle[-1]) // system.motion.half_cycles
+    return _snapshot(system, float(cycle), pressure, depths, temperature, {})
+
+
+def steady_snapshot(system: Tribosystem, pressure: Array, velocity: Mapping[str, float]) -> Snapshot:
+    """Return the steady state of these pressures (m, n) of the phases."""
+    heat, temperature = cycle_heat(system), None
+    if heat is not None:
+        end = heat.jump(heat.initial(), np.inf, heat.conductances(pressure))
+        parts, rows = heat.parts(end.state(pressure)), []
+        for phase in range(len(pressure)):
+            p = np.asarray(pressure[phase])
+            parts, _ = heat.exchange.half_cycle(parts, phase, p, heat.exchange.conductance(p))
+            rows.append(np.stack(heat.exchange.contact_temperatures(parts)))
+        temperature = np.array(rows)
+    return _snapshot(system, np.inf, pressure, None, temperature, velocity)

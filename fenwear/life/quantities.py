@@ -1,0 +1,409 @@
+"""Quantities of interest: named numbers with units, of the end of any cycle, of a steady state, or of a whole run.
+
+    depth of strip at 3 mm after 3600 m      steady pressure      cycles until depth 0.2 mm      run-in distance
+
+A quantity is written as: [steady] NAME [of punch|strip] [at X] [after AMOUNT], or
+cycles|distance|time until NAME [of punch|strip] [at X] LEVEL.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
+
+from fenwear.arrays import Array
+from fenwear.case import Case
+from fenwear.case.units import convert
+from fenwear.errors import CaseError, Problem
+from fenwear.life.model import Model, Snapshot, WornSurface
+
+EDGE = 0.01  # of the largest depth: where a scar ends
+LIMIT = 10_000_000  # cycles after which a level counts as never reached
+
+UNITS = {
+    "depth": "mm",
+    "volume": "mm^3",
+    "scar_width": "mm",
+    "contact_width": "mm",
+    "pressure": "MPa",
+    "temperature": "K",
+    "friction": "",
+    "volume_rate": "mm^3",
+    "lambda_F": "mm",
+    "lambda_M": "rad",
+}
+MEANINGS = {
+    "depth": "worn depth, the largest or at x",
+    "volume": "worn volume",
+    "scar_width": "width over which the depth is beyond a hundredth of its largest",
+    "contact_width": "width in contact, of the phase with the widest",
+    "pressure": "largest contact pressure, or at x",
+    "temperature": "largest temperature of the contact surfaces, or at x",
+    "friction": "mean friction coefficient of a cycle",
+    "volume_rate": "volume worn in a cycle",
+    "lambda_F": "approach of the bodies by wear in a cycle, of a steady state",
+    "lambda_M": "rotation of the punch by wear in a cycle, of a steady state",
+}
+OF_A_BODY = ("depth", "volume", "scar_width", "volume_rate")
+AT_A_PLACE = ("depth", "pressure", "temperature")
+GROWING = ("depth", "volume", "scar_width")  # what a life can be counted to
+OF_RUNS = ("depth", "volume", "scar_width")  # grow without end: no steady state knows them
+LIVES = {"cycles": "", "distance": "mm", "time": "s"}
+WHOLE = {"run-in cycles": "", "run-in distance": "mm", "critical speed": "mm/s"}
+
+_PLAIN = re.compile(
+    r"(?P<steady>steady )?(?P<name>[A-Za-z_]+)( of (?P<body>\w+))?( at (?P<at>.+?))?( after (?P<after>.+))?"
+)
+_UNTIL = re.compile(
+    r"((?P<life>\w+) until )?(?P<name>\w+)( of (?P<body>\w+))?( at (?P<at>.+?) to)? (?P<level>[\d.+-].*)"
+)
+Kind = Literal["snapshot", "steady", "life", "whole"]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity of interest.
+
+    Attributes:
+        text: As it was written.
+        name: Of the quantity.
+        kind: snapshot: of the end of a cycle; steady; life: until a level; whole: of the case.
+        unit: Of its value.
+        body: punch or strip.
+        at: Position x, mm; None for the largest.
+        after: Cycles, distance (mm) or time (s) at which it is taken, with what it is; None for the end of the run.
+        level: Up to which a life counts.
+        life: Whether that is counted in cycles, distance or time.
+    """
+
+    text: str
+    name: str
+    kind: Kind
+    unit: str
+    body: str = "punch"
+    at: float | None = None
+    after: tuple[float, str] | None = None
+    level: float = 0.0
+    life: str = "cycles"
+
+    @property
+    def title(self) -> str:
+        """Its text with its unit."""
+        return f"{self.text} ({self.unit or '-'})"
+
+    def of_snapshot(self, snapshot: Snapshot) -> float:
+        """Return its value at the end of a cycle or in a steady state.
+
+        Raises:
+            CaseError: the snapshot does not know it.
+        """
+        return _VALUES[self.name](self, snapshot)
+
+    def rate(self, snapshot: Snapshot) -> float:
+        """Return its growth in a cycle, for depth and volume; NaN for what has no simple rate."""
+        surface = snapshot.surfaces[self.body]
+        if self.name == "volume":
+            return float(surface.weights @ surface.rate) * snapshot.thickness
+        if self.name == "depth" and surface.depth is not None:
+            if self.at is not None:
+                return _at(surface.x, surface.rate, self.at, self.text)
+            return float(surface.rate[int(np.argmax(surface.depth))])
+        return float("nan")
+
+
+def parse_amount(text: str, option: str) -> tuple[float, str]:
+    """Return an amount of cycles (a pure number), sliding distance (mm) or time (s), with what it is.
+
+    Raises:
+        CaseError: none of them.
+    """
+    stripped = re.sub(r"\s*cycles?$", "", text.strip())
+    for unit, what in (("", "cycles"), ("mm", "distance"), ("s", "time")):
+        try:
+            if unit and re.fullmatch(r"[-+\d.eE]+", stripped):
+                continue  # a number alone is a number of cycles
+            amount = convert(stripped, unit)
+        except ValueError:
+            continue
+        if amount <= 0:
+            raise CaseError(Problem(option, f"expected more than zero, got {text!r}"))
+        return amount, what
+    raise CaseError(Problem(option, f"expected cycles, a distance or a time such as '3600 m', got {text!r}"))
+
+
+def parse_quantity(text: str, option: str = "--of") -> Quantity:
+    """Return the quantity that a text names.
+
+    Raises:
+        CaseError: it names none; says what is known.
+    """
+    words = " ".join(text.split())
+    if words in WHOLE:
+        return Quantity(words, words, "whole", WHOLE[words])
+    match = _UNTIL.fullmatch(words)
+    if match is not None and match["name"] in UNITS:
+        return _life(words, match, option)
+    match = _PLAIN.fullmatch(words)
+    if match is None or match["name"] not in UNITS:
+        known = ", ".join([*UNITS, *WHOLE])
+        examples = "'depth of punch at 3 mm after 3600 m', 'steady pressure' or 'cycles until depth 0.2 mm'"
+        raise CaseError(Problem(option, f"expected a quantity such as {examples}, got {text!r}; known are {known}"))
+    name, is_steady = match["name"], match["steady"] is not None
+    if is_steady and (name in OF_RUNS or match["after"]):
+        raise CaseError(Problem(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
+    if name.startswith("lambda_") and not is_steady:
+        raise CaseError(Problem(option, f"expected 'steady {name}', got {words!r}"))
+    body, at = _place(name, match, words, option)
+    after = None if match["after"] is None else parse_amount(match["after"], option)
+    return Quantity(words, name, "steady" if is_steady else "snapshot", UNITS[name], body, at, after)
+
+
+def _life(words: str, match: re.Match[str], option: str) -> Quantity:
+    name, life = match["name"], match["life"] or "cycles"
+    if life not in LIVES:
+        raise CaseError(Problem(option, f"expected cycles, distance or time until a level, got {words!r}"))
+    if name not in GROWING:
+        raise CaseError(Problem(option, f"expected one of {', '.join(GROWING)} with a level, got {words!r}"))
+    body, at = _place(name, match, words, option)
+    try:
+        level = convert(match["level"], UNITS[name])
+    except ValueError as error:
+        raise CaseError(Problem(option, f"{words!r}: {error}")) from None
+    if re.fullmatch(r"[-+\d.eE]+", match["level"]):
+        raise CaseError(Problem(option, f"expected a level with its unit, such as '0.2 mm', got {words!r}"))
+    if level <= 0:
+        raise CaseError(Problem(option, f"expected a level above zero, got {words!r}"))
+    return Quantity(words, name, "life", LIVES[life], body, at, None, level, life)
+
+
+def _place(name: str, match: re.Match[str], words: str, option: str) -> tuple[str, float | None]:
+    body = match["body"] or "punch"
+    if body not in ("punch", "strip") or (match["body"] and name not in OF_A_BODY):
+        raise CaseError(
+            Problem(option, f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
+        )
+    if match["at"] is None:
+        return body, None
+    if name not in AT_A_PLACE:
+        raise CaseError(Problem(option, f"expected a place behind {', '.join(AT_A_PLACE)} only, got {words!r}"))
+    try:
+        return body, convert(match["at"], "mm")
+    except ValueError as error:
+        raise CaseError(Problem(option, f"{words!r}: {error}")) from None
+
+
+def check_quantity(quantity: Quantity, case: Case, option: str = "--of") -> None:
+    """Check that a case knows the quantity.
+
+    Raises:
+        CaseError: it needs heat, or the wear of a body that does not wear.
+    """
+    if quantity.name in ("temperature", "critical speed") and case.heat is None:
+        raise CaseError(Problem(option, f"{quantity.text!r} needs the table heat, which the case does not have"))
+    if quantity.name in OF_A_BODY and getattr(case.wear, quantity.body) is None:
+        other = "strip" if quantity.body == "punch" else "punch"
+        message = f"{quantity.text!r}: the case has no wear.{quantity.body}; expected it 'of {other}'"
+        raise CaseError(Problem(option, message))
+
+
+# ---- Values of a snapshot ---------------------------------------------------------------------
+
+
+def _at(x: Array, values: Array, place: float, text: str) -> float:
+    slack = 1e-9 * (x[-1] - x[0])
+    if not x[0] - slack <= place <= x[-1] + slack:
+        raise CaseError(Problem(text, f"x = {place:g} mm is not on the contact, from {x[0]:g} to {x[-1]:g} mm"))
+    return float(np.interp(place, x, values))
+
+
+def _worn(quantity: Quantity, snapshot: Snapshot) -> tuple[WornSurface, Array]:
+    surface = snapshot.surfaces[quantity.body]
+    if surface.depth is None:
+        raise CaseError(Problem(quantity.text, "a steady state knows no worn depth: it grows without end"))
+    return surface, surface.depth
+
+
+def _depth(quantity: Quantity, snapshot: Snapshot) -> float:
+    surface, depth = _worn(quantity, snapshot)
+    return float(depth.max()) if quantity.at is None else _at(surface.x, depth, quantity.at, quantity.text)
+
+
+def _volume(quantity: Quantity, snapshot: Snapshot) -> float:
+    surface, depth = _worn(quantity, snapshot)
+    return float(surface.weights @ depth) * snapshot.thickness
+
+
+def scar_edges(x: Array, depth: Array) -> tuple[float, float]:
+    """Return where the depth passes a hundredth of its largest, linear between the nodes, mm."""
+    level = EDGE * float(depth.max())
+    inside = np.flatnonzero(depth > level)
+    if not len(inside):
+        return 0.0, 0.0
+    first, last = int(inside[0]), int(inside[-1])
+    left, right = float(x[first]), float(x[last])
+    if first > 0:
+        left = float(np.interp(level, depth[first - 1 : first + 1], x[first - 1 : first + 1]))
+    if last + 1 < len(x):
+        right = float(np.interp(-level, -depth[last : last + 2], x[last : last + 2]))
+    return left, right
+
+
+def _scar_width(quantity: Quantity, snapshot: Snapshot) -> float:
+    surface, depth = _worn(quantity, snapshot)
+    left, right = scar_edges(surface.x, depth)
+    return right - left
+
+
+def _contact_width(_: Quantity, snapshot: Snapshot) -> float:
+    return float(((snapshot.pressure > 0) @ snapshot.weights).max())
+
+
+def _pressure(quantity: Quantity, snapshot: Snapshot) -> float:
+    highest = snapshot.pressure.max(axis=0)
+    return float(highest.max()) if quantity.at is None else _at(snapshot.x, highest, quantity.at, quantity.text)
+
+
+def _temperature(quantity: Quantity, snapshot: Snapshot) -> float:
+    if snapshot.temperature is None:
+        raise CaseError(Problem(quantity.text, "needs the table heat, which the case does not have"))
+    highest = snapshot.temperature.max(axis=(0, 1))
+    return float(highest.max()) if quantity.at is None else _at(snapshot.x, highest, quantity.at, quantity.text)
+
+
+def _volume_rate(quantity: Quantity, snapshot: Snapshot) -> float:
+    surface = snapshot.surfaces[quantity.body]
+    return float(surface.weights @ surface.rate) * snapshot.thickness
+
+
+def _velocity(quantity: Quantity, snapshot: Snapshot) -> float:
+    if quantity.name not in snapshot.velocity:
+        known = " and ".join(snapshot.velocity) or "none"
+        raise CaseError(Problem(quantity.text, f"the punch does not move so; its rigid motions are {known}"))
+    return snapshot.velocity[quantity.name]
+
+
+_VALUES: Mapping[str, Callable[[Quantity, Snapshot], float]] = {
+    "depth": _depth,
+    "volume": _volume,
+    "scar_width": _scar_width,
+    "contact_width": _contact_width,
+    "pressure": _pressure,
+    "temperature": _temperature,
+    "friction": lambda _, snapshot: snapshot.friction,
+    "volume_rate": _volume_rate,
+    "lambda_F": _velocity,
+    "lambda_M": _velocity,
+}
+
+# ---- Values of a run ---------------------------------------------------------------------------
+
+
+def cycles_of(amount: tuple[float, str], distance: float, period: float) -> float:
+    """Return the cycles of an amount, for the distance (mm) and the time (s) of one."""
+    value, what = amount
+    return value / {"cycles": 1.0, "distance": distance, "time": period}[what]
+
+
+@dataclass(frozen=True)
+class Path:
+    """How a quantity is computed again for other values, so that its values are smooth: the ends of the jumps."""
+
+    sequence: tuple[int, ...] = ()
+
+
+def evaluate(
+    model: Model,
+    quantity: Quantity,
+    values: Mapping[str, float],
+    settings: Sequence[str] = (),
+    path: Path | None = None,
+    limit: int = LIMIT,
+) -> tuple[float, Path]:
+    """Return a quantity for values of keys, and the path on which to compute it for values nearby.
+
+    Args:
+        model: The case.
+        quantity: What is wanted.
+        values: Of keys, in their internal units.
+        settings: Overrides besides.
+        path: Of an evaluation nearby.
+        limit: Cycles after which a life counts as infinite.
+
+    Raises:
+        CaseError: a value is not possible.
+        ConvergenceError: a run or a steady state did not converge.
+    """
+    if quantity.kind == "steady":
+        return quantity.of_snapshot(model.steady(values, settings)), Path()
+    distance, period = model.cycle_measures(values, settings)
+    if quantity.kind == "whole":
+        return _whole(model, quantity, values, settings, distance), Path()
+    if quantity.kind == "life":
+        return _until(model, quantity, values, settings, path, limit, (distance, period))
+    if quantity.after is None:
+        half_cycles = model.system(values, settings).motion.half_cycles
+        wanted = float(max(1, model.case.run.half_cycles // half_cycles))
+    else:
+        wanted = cycles_of(quantity.after, distance, period)
+    last = max(1, round(wanted)) if path is None else path.sequence[-1]
+    sequence = None if path is None else path.sequence
+    snapshots = list(model.run(values, last, settings=settings, sequence=sequence))
+    made = Path(tuple(int(s.cycle) for s in snapshots))
+    return quantity.of_snapshot(snapshots[-1].at_cycle(wanted)), made
+
+
+def _whole(
+    model: Model, quantity: Quantity, values: Mapping[str, float], settings: Sequence[str], distance: float
+) -> float:
+    if quantity.name == "critical speed":
+        return model.critical_speed(values, settings)
+    cycles = model.run_in(values, settings)
+    return cycles * distance if quantity.name == "run-in distance" else cycles
+
+
+def _until(
+    model: Model,
+    quantity: Quantity,
+    values: Mapping[str, float],
+    settings: Sequence[str],
+    path: Path | None,
+    limit: int,
+    measures: tuple[float, float],
+) -> tuple[float, Path]:
+    """Run until the level is passed, and count to where a cubic through depths and rates meets it."""
+    taken: list[tuple[float, float, float]] = [(0.0, 0.0, float("nan"))]
+    sequence = None if path is None else path.sequence
+    passed = 0
+
+    def enough(_: Snapshot) -> bool:
+        return passed > 1  # one jump more, so that values nearby find their level on the same path
+
+    for snapshot in model.run(values, limit if path is None else path.sequence[-1], settings=settings,
+                              sequence=sequence, until=enough):  # fmt: skip
+        taken.append((snapshot.cycle, quantity.of_snapshot(snapshot), quantity.rate(snapshot)))
+        passed += taken[-1][1] >= quantity.level
+    made = Path(tuple(int(cycle) for cycle, _, _ in taken[1:]))
+    cycles = _crossing(np.array(taken), quantity.level)
+    factor = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}[quantity.life]
+    return cycles * factor, made
+
+
+def _crossing(taken: Array, level: float) -> float:
+    """Return where values (cycle, value, growth in a cycle) first reach a level; infinite if they do not."""
+    cycles, values, rates = taken.T
+    beyond = np.flatnonzero(values >= level)
+    if not len(beyond):
+        return float("inf")
+    k = int(beyond[0])
+    pair = slice(k - 1, k + 1)
+    slopes = rates[pair].copy()
+    secant = (values[k] - values[k - 1]) / (cycles[k] - cycles[k - 1])
+    slopes[~np.isfinite(slopes)] = secant
+    spline = CubicHermiteSpline(cycles[pair], values[pair], slopes)
+    return float(brentq(lambda cycle: spline(cycle) - level, cycles[k - 1], cycles[k], xtol=1e-12, rtol=1e-14))

@@ -1,0 +1,218 @@
+"""Distributions of keys of a case, by OpenTURNS: given one by one, or together by a calibration.
+
+wear.punch.coefficient = lognormal(4e-8 1/MPa, 50 %)    median and coefficient of variation
+contact.friction = normal(0.25, 0.02)                   mean and standard deviation, or its percentage of the mean
+motion.amplitude = uniform(1.4 mm, 1.6 mm)              ends
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.case import Case
+from fenwear.errors import CaseError, Problem
+from fenwear.life.keys import find_key, value_of, with_values
+
+if TYPE_CHECKING:
+    import openturns as ot
+
+RARE = 1e-6  # probability below which an impossible value does not count
+_FORM = re.compile(
+    r"(?P<kind>\w+)\s*\((?P<first>[^,()]+(\([^()]*\)[^,()]*)?),(?P<second>[^,()]+(\([^()]*\)[^,()]*)?)\)"
+)
+KINDS = ("normal", "lognormal", "uniform")
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """The joint distribution of keys.
+
+    Attributes:
+        keys: Their paths.
+        distribution: OpenTURNS' distribution of their values, in internal units.
+        correlated: Whether they depend on each other.
+        text: For people, one line for each key.
+    """
+
+    keys: tuple[str, ...]
+    distribution: ot.Distribution
+    correlated: bool
+    text: tuple[str, ...]
+
+    @classmethod
+    def joint(
+        cls, keys: Sequence[str], values: Sequence[float], covariance: Array, logarithmic: Sequence[bool]
+    ) -> Scatter:
+        """Return the normal distribution of keys, or of their logarithms.
+
+        Args:
+            keys: Their paths.
+            values: Mean, or median where logarithmic.
+            covariance: Of the values, or of their logarithms (m, m).
+            logarithmic: Of each key.
+        """
+        import openturns as ot
+
+        errors = np.sqrt(np.diag(covariance))
+        rounded = np.clip(covariance / np.outer(errors, errors), -1.0, 1.0)
+        np.fill_diagonal(rounded, 1.0)
+        correlation = ot.CorrelationMatrix(rounded.tolist())
+        marginals = [
+            ot.LogNormal(float(np.log(value)), float(error)) if log else ot.Normal(float(value), float(error))
+            for value, error, log in zip(values, errors, logarithmic, strict=True)
+        ]
+        text = tuple(
+            f"{key}: {'lognormal, median' if log else 'normal, mean'} {value:.6g}, "
+            + (f"standard deviation of the logarithm {error:.3g}" if log else f"standard deviation {error:.3g}")
+            for key, value, error, log in zip(keys, values, errors, logarithmic, strict=True)
+        )
+        coupled = len(keys) > 1 and bool((np.abs(np.array(correlation) - np.eye(len(keys))) > 1e-12).any())
+        joined = ot.JointDistribution if hasattr(ot, "JointDistribution") else ot.ComposedDistribution
+        return cls(tuple(keys), joined(marginals, ot.NormalCopula(correlation)), coupled, text)
+
+    def and_also(self, other: Scatter) -> Scatter:
+        """Return both, independent of each other.
+
+        Raises:
+            CaseError: a key is in both.
+        """
+        import openturns as ot
+
+        twice = [key for key in self.keys if key in other.keys]
+        if twice:
+            raise CaseError([Problem(f"--scatter {key}", "has a distribution already") for key in twice])
+        return Scatter(
+            (*self.keys, *other.keys),
+            ot.BlockIndependentDistribution([self.distribution, other.distribution]),
+            self.correlated or other.correlated,
+            (*self.text, *other.text),
+        )
+
+    def check(self, case: Case) -> None:
+        """Check that no key gets impossible values.
+
+        Raises:
+            CaseError: names the key, the value and how probable it is.
+        """
+        problems = []
+        for number, key in enumerate(self.keys):
+            find_key(case, key, "--scatter")
+            marginal = self.distribution.getMarginal(number)
+            for level in (RARE, 0.5, 1 - RARE):
+                value = float(marginal.computeQuantile(level)[0])
+                try:
+                    with_values(case, {key: value})
+                except CaseError as error:
+                    share = self._share_of_impossible(case, key, marginal)
+                    problems.append(
+                        Problem(
+                            f"--scatter {key}",
+                            f"gives impossible values with a probability of {share:.2g}, such as {value:.4g} "
+                            f"({error.problems[0].message}); expected one of possible values, such as lognormal",
+                        )
+                    )
+                    break
+        if problems:
+            raise CaseError(problems)
+
+    @staticmethod
+    def _share_of_impossible(case: Case, key: str, marginal: Any) -> float:
+        """Return the probability of impossible values, which lie below or above a limit, by bisection."""
+
+        def possible(level: float) -> bool:
+            try:
+                with_values(case, {key: float(marginal.computeQuantile(level)[0])})
+            except CaseError:
+                return False
+            return True
+
+        if not possible(0.5):
+            return 0.5
+        share = 0.0
+        for outer in (RARE, 1 - RARE):
+            if possible(outer):
+                continue
+            inner, limit = 0.5, outer
+            for _ in range(30):
+                middle = (inner + limit) / 2
+                inner, limit = (middle, limit) if possible(middle) else (inner, middle)
+            share += limit if limit < 0.5 else 1 - limit
+        return share
+
+
+def parse_scatter(case: Case, text: str) -> Scatter:
+    """Return the distribution of one key from KEY=KIND(FIRST, SECOND), the numbers with units.
+
+    Raises:
+        CaseError: no such key or kind, or numbers that make no distribution.
+    """
+    import openturns as ot
+
+    path, equals, form = (part.strip() for part in text.partition("="))
+    match = _FORM.fullmatch(form)
+    name = f"--scatter {path}"
+    if not equals or match is None or match["kind"].lower() not in KINDS:
+        raise CaseError(Problem("--scatter", f"expected KEY=KIND(FIRST, SECOND) with {', '.join(KINDS)}, got {text!r}"))
+    find_key(case, path, "--scatter")
+    kind, first, second = match["kind"].lower(), match["first"].strip(), match["second"].strip()
+    middle = value_of(case, path, first, "--scatter")
+    if kind == "uniform":
+        high = value_of(case, path, second, "--scatter")
+        if not middle < high:
+            raise CaseError(Problem(name, f"expected ends that rise, got {form!r}"))
+        return Scatter((path,), ot.Uniform(middle, high), False, (f"{path}: uniform from {middle:.6g} to {high:.6g}",))
+    spread = _spread(case, path, name, middle, second)
+    if kind == "normal":
+        line = f"{path}: normal, mean {middle:.6g}, standard deviation {spread:.4g}"
+        return Scatter((path,), ot.Normal(middle, spread), False, (line,))
+    if middle <= 0:
+        raise CaseError(Problem(name, f"expected a median above zero, got {first!r}"))
+    variation = spread / middle
+    width = float(np.sqrt(np.log1p(variation**2)))
+    line = f"{path}: lognormal, median {middle:.6g}, coefficient of variation {100 * variation:.3g} %"
+    return Scatter((path,), ot.LogNormal(float(np.log(middle)), width), False, (line,))
+
+
+def _spread(case: Case, path: str, name: str, middle: float, text: str) -> float:
+    """Return a standard deviation, given as such or as a percentage."""
+    percentage = re.fullmatch(r"([\d.eE+-]+)\s*%", text)
+    try:
+        spread = abs(middle) * float(percentage[1]) / 100 if percentage else value_of(case, path, text, "--scatter")
+    except ValueError:
+        raise CaseError(Problem(name, f"expected a percentage such as 50 %, got {text!r}")) from None
+    if not spread > 0:
+        raise CaseError(Problem(name, f"expected a spread above zero, got {text!r}"))
+    return spread
+
+
+def load_scatter(path: Path, case: Case) -> Scatter:
+    """Return the joint distribution that a calibration has left in its calibration.json.
+
+    Raises:
+        CaseError: the file is none, or its data do not determine the unknowns.
+    """
+    place = path / "calibration.json" if path.is_dir() else path
+    try:
+        found = json.loads(place.read_text("utf-8"))
+        rows, covariance = found["unknowns"], found["covariance"]
+        keys, values = [row["key"] for row in rows], [float(row["value"]) for row in rows]
+        logarithmic = [bool(row["logarithmic"]) for row in rows]
+        not_known = list(found["not_known"])
+    except OSError as error:
+        raise CaseError(Problem(f"--from {place}", f"cannot be read: {error.strerror}")) from None
+    except (ValueError, KeyError, TypeError):
+        raise CaseError(Problem(f"--from {place}", "is not what `fenwear calibrate` writes")) from None
+    if not_known or covariance is None:
+        lines = not_known or ["its unknowns have no standard errors"]
+        raise CaseError([Problem(f"--from {place}", f"gives no distribution: {line}") for line in lines])
+    for key in keys:
+        find_key(case, key, f"--from {place}:")
+    return Scatter.joint(keys, values, np.array(covariance, dtype=float), logarithmic)

@@ -1,0 +1,224 @@
+"""Calibration: exact standard errors, coverage, what data cannot tell, and measured scars (rows 31 and 38)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from fenwear import Case, CaseError, load_case
+from fenwear.life import (
+    DataSet,
+    LeastSquares,
+    Model,
+    Series,
+    Unknown,
+    between,
+    calibrate,
+    measured_folder,
+    posterior,
+    read_data,
+    repeated,
+)
+
+BETA, LOAD, AMPLITUDE = 3.926990816987242e-8, 1e4, 1.5
+K, B = "wear.punch.coefficient", "wear.punch.pressure_exponent"
+RING = measured_folder()
+
+
+def volumes(after: Sequence[float], values: Sequence[float], sigma: Sequence[float], *settings: str) -> DataSet:
+    """Return worn volumes after numbers of cycles."""
+    series = Series("volume", "punch", None, np.array(after), "cycles", np.array(values), np.array(sigma),
+                    tuple(range(1, 1 + len(after))))  # fmt: skip
+    return DataSet("volumes", settings, (series,))
+
+
+def test_standard_error_of_archards_coefficient_is_exact(small: Callable[..., Case]) -> None:
+    """V = k F s: k = sum V_i F s_i / sum (F s_i)^2 and its error sigma / sqrt(sum (F s_i)^2), from any start."""
+    after, sigma = np.array([100.0, 200.0, 300.0]), 0.01
+    work = LOAD * 4 * AMPLITUDE * after
+    measured = BETA * work + np.array([0.012, -0.007, 0.004])
+    case = small("example2", f"{K}=9e-8")
+    found = calibrate(case, [volumes(after, measured, [sigma] * 3)], [K])
+    fitted = found.fitted[0]
+    assert fitted.value == pytest.approx(measured @ work / (work @ work), rel=1e-7)
+    assert fitted.standard_error == pytest.approx(sigma / np.sqrt(work @ work), rel=1e-6)
+    ratio = np.exp(stats.norm.ppf(0.975) * fitted.standard_error / fitted.value)
+    assert (fitted.low, fitted.high) == pytest.approx((fitted.value / ratio, fitted.value * ratio), rel=1e-6)
+    assert (found.not_known, found.at_bound, found.degrees_of_freedom) == ((), (), 2)
+    unweighted = volumes(after, measured, [1.0] * 3)
+    series = (DataSet("volumes", (), (Series(**{**vars(unweighted.series[0]), "sigma": None}),)),)
+    rest = measured - fitted.value * work
+    expected = np.sqrt(rest @ rest / 2 / (work @ work))
+    assert calibrate(case, series, [K]).fitted[0].standard_error == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.slow
+def test_the_exponent_from_two_loads_has_the_error_of_two_logarithms(small: Callable[..., Case]) -> None:
+    """Var b = 2 sigma^2 / ln^2(p2 / p1), sigma of ln w of each load, where the pressure is uniform (row 38)."""
+    case = small("example2", "contact.friction=0.0", f"{K}=4e-7")
+    after, share, ratio = [99_900.0, 100_000.0, 100_100.0], 0.01, 4.0
+    data = []
+    for factor in (1.0, ratio):
+        setting = f"punch.loads.0.force=[0.0, {-LOAD * factor!r}]"
+        exact = 4e-7 * LOAD * factor * 4 * AMPLITUDE * np.array(after)
+        data.append(volumes(after, exact, share * exact, setting))
+    found = calibrate(case, data, [K, B])
+    assert found.values[B] == pytest.approx(1.0, abs=1e-5)
+    expected = np.sqrt(2 * share**2 / 3) / np.log(ratio)  # three measurements at each load
+    assert found.fitted[1].standard_error == pytest.approx(expected, rel=5e-3)
+    assert found.not_known == ()
+
+
+@pytest.mark.parametrize("kind", ["volumes", "profile"])
+def test_coefficient_and_exponent_from_one_load_are_not_known(
+    small: Callable[..., Case], profile: Callable[..., Path], kind: str
+) -> None:
+    case = small("example2")
+    if kind == "volumes":
+        after = [1000.0, 1100.0, 1200.0]
+        exact = BETA * LOAD * 4 * AMPLITUDE * np.array(after)
+        data = volumes(after, exact, 0.02 * exact)
+    else:
+        data = read_data(profile(case, 1300, 2e-4, lines=["# sigma = 0.2 um"]), case)
+    assert LeastSquares(case, [data], [Unknown(K), Unknown(B)]).cannot_tell()
+    found = calibrate(case, [data], [K, B])
+    assert found.not_known
+    assert all(K in line and B in line and "another load" in line for line in found.not_known)
+    with pytest.raises(CaseError, match="gives no distribution"):
+        found.scatter()
+
+
+def test_offset_and_tilt_of_a_trace_are_found(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
+    case = small("example2")
+
+    def trace(x: Any, depth: Any) -> Any:
+        return depth + 5e-3 + 1e-4 * x
+
+    path = profile(case, 600, 1e-5, change=trace, lines=["# sigma = 0.01 um"])
+    found = calibrate(case, [read_data(path, case)], [K], baseline=["offset", "tilt"])
+    fitted = found.fitted[0]
+    assert abs(fitted.value - BETA) < 4 * fitted.standard_error
+    assert found.traces[0].offset == pytest.approx(5e-3, abs=2e-3)
+    x = found.traces[0].series.x
+    assert found.traces[0].tilt == pytest.approx(1e-4, abs=4 * 1e-5 / np.sqrt(x @ x))  # its standard error, four times
+
+
+def coverage(problem: LeastSquares, repetitions: int) -> None:
+    """Check that 95 % intervals hold the truth so often, within what chance allows; and that errors are as wide."""
+    m = len(problem.unknowns)
+    deviations, errors = repeated(problem, [0.0] * m, repetitions)
+    held = (np.abs(deviations) <= stats.norm.ppf(0.975) * errors).sum(axis=0)
+    chance = stats.binom(repetitions, 0.95)
+    outside = 1e-3 / m  # probability that a right program fails
+    for count in held:
+        assert chance.ppf(outside) <= count <= chance.ppf(1 - outside) or count == repetitions
+    spread = (deviations / errors).std(axis=0)
+    assert spread == pytest.approx(1.0, abs=4 / np.sqrt(2 * repetitions))
+
+
+def test_twin_experiments_of_one_unknown(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
+    case = small("example2")
+    data = read_data(profile(case, 200, 0.0, lines=["# sigma = 0.1 um"]), case)
+    coverage(LeastSquares(case, [data], [Unknown(K)]), 40)
+
+
+@pytest.mark.slow
+def test_twin_experiments_of_three_unknowns(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
+    """Coefficient, exponent and friction from profiles at two loads; the full number is in tests/benchmarks."""
+    case = small("example2")
+    data = []
+    for name, load in (("one.csv", 10), ("two.csv", 40)):
+        lines = [f'# set punch.loads.0.force = ["0 N", "-{load} kN"]', "# sigma = 0.1 um"]
+        data.append(read_data(profile(case, 200, 0.0, name=name, lines=lines), case))
+    coverage(LeastSquares(case, data, [Unknown(K), Unknown(B), Unknown("contact.friction")]), 40)
+
+
+def test_correlated_residuals_widen_the_errors(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
+    case = small("example2")
+    wave = profile(case, 400, 1e-6, change=lambda x, depth: depth + 1e-4 * np.sin(x / 12))
+    found = calibrate(case, [read_data(wave, case)], [K])
+    assert found.inflation > 2
+    assert "neighbouring places" in found.remarks[0]
+
+
+def test_what_makes_no_sense_is_refused(small: Callable[..., Case]) -> None:
+    case = small("example2")
+    data = [volumes([100.0, 200.0, 300.0], [1.0, 2.0, 3.0], [0.1] * 3)]
+    for unknowns, expected in (
+        ([], "at least one key"),
+        (["wear.punch.coeficient"], "did you mean wear.punch.coefficient"),
+        ([K, K], "given twice"),
+        ([K, "output.checkpoint"], "output.checkpoint: has no influence"),
+        ([Unknown(K, 2e-8, 1e-8)], "bounds that rise"),
+        ([K, B, "contact.friction"], "3 measurements for 3 unknowns"),
+        ([Unknown(K, 5e-8, 6e-8, start=1e-8)], "outside of its bounds"),
+    ):
+        with pytest.raises(CaseError, match=expected):
+            calibrate(case, data, unknowns)
+    for sets, baseline, expected in (
+        ([], (), "at least one file"),
+        (data, ("slope",), "expected offset or tilt"),
+        (data, ("offset",), "profiles only"),
+        ([volumes([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], [0.1] * 3, f"{K}=3e-8")], (), "is an unknown of the calibration"),
+    ):
+        with pytest.raises(CaseError, match=expected):
+            calibrate(case, sets, [K], baseline=baseline)
+
+
+def test_bounds_that_exclude_the_data_are_told(small: Callable[..., Case]) -> None:
+    work = LOAD * 4 * AMPLITUDE * np.array([100.0, 200.0, 300.0])
+    data = [volumes([100.0, 200.0, 300.0], BETA * work, 0.01 * BETA * work)]
+    found = calibrate(small("example2"), data, [Unknown(K, 5e-8, 6e-8)])
+    assert found.at_bound == (K,)
+    assert found.values[K] == pytest.approx(5e-8, rel=1e-4)
+    assert "beyond it" in found.text()
+
+
+@pytest.mark.slow
+def test_a_posterior_of_one_unknown_is_that_of_least_squares(small: Callable[..., Case]) -> None:
+    """Linear in k with normal noise: the posterior is normal with the mean and the error of least squares."""
+    pytest.importorskip("emcee", reason="emcee is optional")
+    work = LOAD * 4 * AMPLITUDE * np.array([10.0, 20.0, 30.0])
+    case, data = small("example2"), [volumes([10.0, 20.0, 30.0], BETA * work, 0.05 * BETA * work)]
+    found = calibrate(case, data, [K])
+    sample = posterior(LeastSquares(case, data, [Unknown(K)]), found, 150).values[:, 0]
+    assert sample.mean() == pytest.approx(BETA, rel=0.015)
+    assert sample.std() == pytest.approx(found.fitted[0].standard_error, rel=0.35)
+
+
+def test_block_on_ring_depths_are_those_published() -> None:
+    """Cruzado 2010: 16.155 um after 800 m, 25.709 um after 1,600 m, of a level-set model (row 31)."""
+    case = load_case(RING / "block_on_ring.toml")
+    depths = {int(s.cycle): s.surfaces["punch"] for s in Model(case).run({}, 3200, stops=[1600])}
+    for cycles, published in ((1600, 16.155e-3), (3200, 25.709e-3)):
+        surface = depths[cycles]
+        assert surface.depth is not None
+        area = 2e-9 * (65 / 6) * cycles * 500.0
+        assert surface.weights @ surface.depth == pytest.approx(area, rel=1e-9)
+        assert surface.depth.max() == pytest.approx(published, rel=3e-3)
+        assert surface.depth.max() == pytest.approx((1.5 * 20 * area) ** (2 / 3) / 40, rel=3e-3)  # two rigid bodies
+
+
+@pytest.mark.slow
+def test_three_measured_scars() -> None:
+    """K of each scar is that of its area, which needs no model; the three scatter by more than their errors."""
+    case = load_case(RING / "block_on_ring.toml", ["geometry.parameters.elements_along_contact=30"])
+    found = []
+    for number in (1, 2, 3):
+        data = read_data(RING / f"block_on_ring_{number}.csv", case)
+        one = calibrate(case, [data], [K], baseline=["offset"])
+        x, depth = data.series[0].x, data.series[0].values - one.traces[0].offset
+        assert x is not None
+        area = float(((depth[1:] + depth[:-1]) / 2) @ np.diff(x))
+        assert one.values[K] == pytest.approx(area / (65 / 6 * 3.6e6), rel=1e-2)
+        found.append(one)
+    values = np.array([one.values[K] for one in found])
+    assert values.mean() == pytest.approx(2e-9, rel=0.05)  # what the published model takes
+    scatter = between(found)
+    assert float(scatter.distribution.computeQuantile(0.5)[0]) == pytest.approx(stats.gmean(values), rel=1e-9)
+    assert np.log(values).std(ddof=1) > 3 * found[2].fitted[0].standard_error / values[2]

@@ -1,0 +1,152 @@
+"""Life with scatter: exact distributions, intervals that hold what they say, Sobol indices, resuming, ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import openturns as ot
+import pytest
+from mpi4py import MPI
+from scipy import stats
+
+from fenwear import Case, CaseError
+from fenwear.life import Scatter, lifetime, load_scatter, parse_scatter, sobol_design, sobol_indices
+from fenwear.life.lifetime import quantile, reliability
+
+K = "wear.punch.coefficient"
+UNTIL = "volume 3 mm^3"
+
+
+def test_indices_of_ishigamis_function() -> None:
+    """sin x1 + 7 sin^2 x2 + 0.1 x3^4 sin x1: known first-order and total indices (row 39)."""
+    size, a, b = 20_000, 7.0, 0.1
+    distribution = ot.JointDistribution([ot.Uniform(-np.pi, np.pi)] * 3)
+    x = sobol_design(distribution, size, 1)
+    y = np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
+    parts = np.array([0.5 * (1 + b * np.pi**4 / 5) ** 2, a**2 / 8, 0.0])
+    together = b**2 * np.pi**8 * (1 / 18 - 1 / 50)
+    variance = parts.sum() + together
+    found = sobol_indices(("x1", "x2", "x3"), x, y, size)
+    first, total = parts / variance, (parts + together * np.array([1, 0, 1])) / variance
+    assert found.first == pytest.approx(first, abs=0.02)
+    assert found.total == pytest.approx(total, abs=0.02)
+    for exact, intervals in ((first, found.first_interval), (total, found.total_interval)):
+        assert (np.abs(exact - intervals.mean(axis=1)) < np.diff(intervals, axis=1)[:, 0]).all()  # twice as wide
+        assert (np.diff(intervals, axis=1) < 0.06).all()
+
+
+@pytest.mark.parametrize("level", [0.05, 0.5])
+def test_intervals_of_quantiles_hold_them_as_often_as_they_say(level: float) -> None:
+    """Whatever the distribution: at least 95 %, and not far more."""
+    generator = np.random.default_rng(3)
+    estimates = [quantile(generator.exponential(size=100), level) for _ in range(2000)]
+    held = np.mean([one.low <= -np.log1p(-level) <= one.high for one in estimates])
+    assert 0.94 < held < 0.985
+
+
+def test_a_sample_too_small_for_a_quantile_says_so() -> None:
+    one = quantile(np.arange(1.0, 11.0), 0.01)
+    assert (one.low, one.value) == (0.0, 1.0)
+    assert quantile(np.arange(1.0, 11.0), 0.99).high == np.inf
+
+
+def test_reliability_is_of_clopper_and_pearson() -> None:
+    """None of 59 has failed: the reliability is above 0.9394 with 97.5 % (0.025^(1/59))."""
+    one = reliability(np.full(59, 2.0), 1.0)
+    assert (one.value, one.high) == (1.0, 1.0)
+    assert one.low == pytest.approx(0.025 ** (1 / 59))
+
+
+def test_life_of_a_lognormal_coefficient_is_lognormal(small: Callable[..., Case]) -> None:
+    """N = V / (k F s): each life is that of its sample exactly, and the median in its interval."""
+    case = small("example2")
+    scatter = parse_scatter(case, f"{K}=lognormal(4e-8 1/MPa, 50 %)")
+    found = lifetime(case, UNTIL, scatter, samples=60, wanted=1000.0, comm=MPI.COMM_SELF)
+    assert found.lives == pytest.approx(3.0 / (found.samples[:, 0] * 1e4 * 6.0), rel=1e-8)
+    width = np.sqrt(np.log1p(0.25))
+    middle = next(one for one in found.quantiles if one.level == 0.5)
+    assert middle.low <= 3.0 / (4e-8 * 6e4) <= middle.high
+    assert found.reliability is not None
+    exact = stats.norm.cdf(np.log(3.0 / (4e-8 * 6e4) / 1000.0) / width)
+    assert found.reliability.low <= exact <= found.reliability.high
+    assert found.sobol is None
+
+
+def test_indices_of_a_life_of_two_keys(small: Callable[..., Case]) -> None:
+    """ln N = const - ln k - ln F: the shares of the variance are those of the two logarithms."""
+    case = small("example2")
+    first = parse_scatter(case, f"{K}=lognormal(4e-8 1/MPa, 40 %)")
+    scatter = first.and_also(parse_scatter(case, "motion.amplitude=lognormal(1.5 mm, 20 %)"))
+    found = lifetime(case, UNTIL, scatter, samples=60, comm=MPI.COMM_SELF)
+    assert found.sobol is not None
+    variances = np.log1p(np.array([0.4, 0.2]) ** 2)
+    for exact, interval in zip(variances / variances.sum(), found.sobol.first_interval, strict=True):
+        assert interval[0] - 0.1 <= exact <= interval[1] + 0.1
+
+
+def test_an_interrupted_sampling_goes_on(small: Callable[..., Case], tmp_path: Path) -> None:
+    case = small("example2")
+    scatter = parse_scatter(case, f"{K}=lognormal(4e-8 1/MPa, 50 %)")
+    whole = lifetime(case, UNTIL, scatter, samples=8, folder=tmp_path, comm=MPI.COMM_SELF)
+    path = tmp_path / "samples.csv"
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:4]) + lines[4][:20])  # the write of the fourth sample was cut short
+    told: list[int] = []
+    again = lifetime(case, UNTIL, scatter, samples=8, folder=tmp_path, resume=True, comm=MPI.COMM_SELF,
+                     progress=lambda done, _: told.append(done))  # fmt: skip
+    np.testing.assert_array_equal(again.lives, whole.lives)
+    assert told[0] == 3
+    assert path.read_text().splitlines() == [line.rstrip() for line in lines]
+    for change, expected in (({"seed": 1}, "another sample"), ({"until": "volume 2 mm^3"}, "another sampling")):
+        arguments = {"until": UNTIL, "samples": 8, **change}
+        with pytest.raises(CaseError, match=expected):
+            lifetime(case, scatter=scatter, folder=tmp_path, resume=True, comm=MPI.COMM_SELF, **arguments)
+    with pytest.raises(CaseError, match="exists already"):
+        lifetime(case, UNTIL, scatter, samples=8, folder=tmp_path, comm=MPI.COMM_SELF)
+
+
+@pytest.mark.mpi
+def test_every_number_of_ranks_gives_the_same_lives(small: Callable[..., Case]) -> None:
+    case = small("example2")
+    scatter = parse_scatter(case, f"{K}=lognormal(4e-8 1/MPa, 50 %)")
+    shared = lifetime(case, UNTIL, scatter, samples=5)
+    alone = lifetime(case, UNTIL, scatter, samples=5, comm=MPI.COMM_SELF)
+    np.testing.assert_array_equal(shared.lives, alone.lives)
+
+
+def test_what_makes_no_sense_is_refused(small: Callable[..., Case], tmp_path: Path) -> None:
+    case = small("example2")
+    for text, expected in (
+        (f"{K}=normal(4e-8, 50 %)", "impossible values with a probability of 0.023"),
+        (f"{K}=uniform(-1e-8 1/MPa, 1e-8 1/MPa)", "expected a finite number, zero or larger"),
+        (f"{K}=weibull(1, 2)", "normal, lognormal, uniform"),
+        (f"{K}=normal(4e-8 kg, 5 %)", "coefficient"),
+        (f"{K}=normal(4e-8, 0 %)", "spread above zero"),
+        (f"{K}=uniform(2e-8, 1e-8)", "ends that rise"),
+        ("wear.strip.coefficient=normal(1, 2)", "no such key"),
+    ):
+        with pytest.raises(CaseError, match=expected):
+            parse_scatter(case, text).check(case)
+    scatter = parse_scatter(case, f"{K}=lognormal(4e-8, 50 %)")
+    with pytest.raises(CaseError, match="has a distribution already"):
+        scatter.and_also(scatter)
+    for until, expected in (("steady pressure", "--until"), ("depth of strip 1 mm", "no wear.strip")):
+        with pytest.raises(CaseError, match=expected):
+            lifetime(case, until, scatter)
+    (tmp_path / "calibration.json").write_text('{"unknowns": 3}')
+    with pytest.raises(CaseError, match="is not what"):
+        load_scatter(tmp_path, case)
+
+
+def test_a_joint_distribution_has_the_correlation_of_its_calibration() -> None:
+    covariance = np.array([[0.04, 0.015], [0.015, 0.01]])
+    scatter = Scatter.joint([K, "contact.friction"], [4e-8, 0.25], covariance, [True, False])
+    ot.RandomGenerator.SetSeed(1)
+    sample = np.array(scatter.distribution.getSample(20_000))
+    sample[:, 0] = np.log(sample[:, 0] / 4e-8)
+    assert np.cov(sample.T) == pytest.approx(covariance, abs=1e-3)
+    assert scatter.correlated
+    with pytest.raises(CaseError, match="independent"):
+        sobol_design(scatter.distribution, 10, 0)

@@ -1,0 +1,92 @@
+"""Quantities of interest: what is exact of them, and what they refuse."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenwear import Case, CaseError, assemble
+from fenwear.cycle import critical_speed
+from fenwear.life import Model, evaluate, parse_quantity
+from fenwear.life.quantities import check_quantity
+
+LOAD, AMPLITUDE, BETA = 1e4, 1.5, 3.926990816987242e-8  # N, mm, 1/MPa of Example 2
+
+
+def value(case: Case, text: str) -> float:
+    return evaluate(Model(case), parse_quantity(text), {})[0]
+
+
+def test_volume_and_the_life_to_a_volume_are_archards(small: Callable[..., Case]) -> None:
+    """V = beta~ F s for a = b = 1, whatever the pressure: in cycles, distance and time."""
+    case = small("example2")
+    volume = BETA * LOAD * 4 * AMPLITUDE * 100
+    assert value(case, "volume after 100 cycles") == pytest.approx(volume, rel=1e-9)
+    assert value(case, "volume after 600 mm") == pytest.approx(volume, rel=1e-9)
+    level = 3.0  # mm^3
+    cycles = level / (BETA * LOAD * 4 * AMPLITUDE)
+    assert value(case, "cycles until volume 3 mm^3") == pytest.approx(cycles, rel=1e-9)
+    assert value(case, "distance until volume 3 mm^3") == pytest.approx(cycles * 4 * AMPLITUDE, rel=1e-9)
+    assert value(case, "time until volume 3 mm^3") == pytest.approx(cycles * 2 * np.pi / 10, rel=1e-9)
+
+
+def test_a_life_is_where_a_run_to_it_reaches_the_level(small: Callable[..., Case]) -> None:
+    case = small("example2")
+    life = value(case, "cycles until depth 0.01 mm")
+    assert value(case, f"depth after {life} cycles") == pytest.approx(0.01, rel=1e-4)
+    assert value(case, f"depth after {0.99 * life} cycles") < 0.01
+
+
+def test_the_steady_state(small: Callable[..., Case]) -> None:
+    """Translating punch: the largest pressure is twice the mean, the approach that of the mean pressure (row 11)."""
+    case = small("example2")
+    mean = LOAD / 600
+    assert value(case, "steady pressure") == pytest.approx(2 * mean, rel=1e-9)
+    assert value(case, "steady lambda_F") == pytest.approx(BETA * mean * 4 * AMPLITUDE, rel=1e-9)
+    assert value(case, "steady volume_rate") == pytest.approx(BETA * LOAD * 4 * AMPLITUDE, rel=1e-9)
+    assert value(case, "steady friction") == pytest.approx(0.25, rel=1e-12)
+
+
+def test_run_in_and_critical_speed(small: Callable[..., Case]) -> None:
+    case = small("example2")
+    assert value(case, "run-in distance") == pytest.approx(4 * AMPLITUDE * value(case, "run-in cycles"))
+    hot = small("example1-heat")
+    speeds = [critical_speed(assemble(hot), d) for d in (-1, 1)]
+    assert value(hot, "critical speed") == pytest.approx(min(speeds), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("dept", "known are depth"),
+        ("depth of ring", "'of punch' or 'of strip'"),
+        ("pressure of strip", "behind depth, volume"),
+        ("volume at 3 mm", "a place behind depth"),
+        ("depth at 3 kg", "another kind"),
+        ("depth after -3 m", "more than zero"),
+        ("depth after 3 kg", "cycles, a distance or a time"),
+        ("steady depth", "lasts for ever"),
+        ("lambda_F", "steady lambda_F"),
+        ("cycles until depth 0.2", "with its unit"),
+        ("cycles until pressure 3 MPa", "depth, volume, scar_width"),
+        ("hours until depth 1 mm", "cycles, distance or time"),
+        ("cycles until depth 0 mm", "above zero"),
+    ],
+)
+def test_what_is_no_quantity_is_refused(text: str, expected: str) -> None:
+    with pytest.raises(CaseError, match=expected):
+        parse_quantity(text)
+
+
+def test_what_a_case_does_not_know_is_refused(small: Callable[..., Case]) -> None:
+    for text, expected in (
+        ("steady temperature", "heat"),
+        ("critical speed", "heat"),
+        ("depth of strip", "wear.strip"),
+    ):
+        with pytest.raises(CaseError, match=expected):
+            check_quantity(parse_quantity(text), small("example2"))
+    with pytest.raises(CaseError, match="not on the contact"):
+        value(small("example2"), "depth at 31 mm after 10 cycles")

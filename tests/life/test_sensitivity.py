@@ -1,0 +1,125 @@
+"""Derivatives against differences of states solved anew, and against exact ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from mpi4py import MPI
+
+from fenwear import Case, CaseError, load_case
+from fenwear.life import Model, evaluate, parse_quantity, sensitivity
+
+ONE_WORN = ("contact.friction", "punch.loads.0.force.1", "materials.composite.young", "wear.punch.pressure_exponent",
+            "motion.amplitude")  # fmt: skip
+TWO_WORN = (
+    "contact.friction",
+    "punch.loads.0.force.1",
+    "wear.punch.coefficient",
+    "wear.strip.coefficient",
+    "motion.track",
+)
+HOT = ("contact.friction", "punch.loads.0.force.1", "heat.partition", "heat.conductance", "motion.amplitude")
+STRIP = ('wear.strip.coefficient="5e-6 1/MPa"', 'motion.track="500 mm"')
+
+
+def central(case: Case, text: str, key: str, value: float, relative: float = 1e-4) -> float:
+    """Return a plain central difference of the quantity."""
+    model, quantity, h = Model(case), parse_quantity(text), relative * abs(value)
+    ends = [evaluate(model, quantity, {key: value + sign * h})[0] for sign in (-1, 1)]
+    return (ends[1] - ends[0]) / (2 * h)
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "keys", "quantity"),
+    [
+        ("example1", (), ONE_WORN, "steady pressure at 12 mm"),
+        ("example1", (), ONE_WORN, "steady lambda_F"),
+        ("monotonic-lz20", STRIP, TWO_WORN, "steady lambda_F"),
+        ("monotonic-lz20", STRIP, TWO_WORN, "steady pressure at 12 mm"),
+        ("example1-heat", (), HOT, "steady pressure at 12 mm"),
+        ("example1-heat", (), HOT, "steady temperature"),
+    ],
+)
+def test_implicit_derivatives_are_those_of_differences(
+    small: Callable[..., Case], name: str, settings: tuple[str, ...], keys: tuple[str, ...], quantity: str
+) -> None:
+    """One and two worn bodies, with and without heat: within 1e-5 of central differences, for five keys."""
+    case = small(name, *settings)
+    found = sensitivity(case, [quantity], keys, spread=0, comm=MPI.COMM_SELF)[0]
+    influential = 0
+    for row in found.derivatives:
+        assert row.method == "implicit"
+        expected = central(case, quantity, row.key, row.key_value)
+        size = abs(found.value / row.key_value)  # derivatives of no influence are small against this
+        assert row.derivative == pytest.approx(expected, rel=1e-5, abs=1e-7 * size)
+        influential += abs(row.derivative) > 1e-3 * size
+    assert influential >= 2
+
+
+def test_life_to_a_volume_has_exact_derivatives(small: Callable[..., Case]) -> None:
+    """N = V / (beta~ F 4 u0): elasticities of -1, and none to friction; by differences of runs."""
+    keys = ("wear.punch.coefficient", "punch.loads.0.force.1", "motion.amplitude", "contact.friction")
+    found = sensitivity(small("example2"), ["cycles until volume 3 mm^3"], keys, spread=0.1)[0]
+    for row, expected in zip(found.derivatives, (-1.0, -1.0, -1.0, 0.0), strict=True):
+        assert row.method == "differences"
+        assert row.elasticity == pytest.approx(expected, abs=1e-7)
+        assert row.error <= 1e-4 * abs(found.value / row.key_value)
+        if expected:
+            assert row.low == pytest.approx(found.value / 0.9, rel=1e-9)
+            assert row.high == pytest.approx(found.value / 1.1, rel=1e-9)
+
+
+def test_the_depth_of_a_run_scales_with_load_and_modulus(small: Callable[..., Case]) -> None:
+    """Without heat loads and moduli times a factor leave the shape: depth(E, F) = F times a function of F / E ...
+
+    ... and of beta~ E, so that the elasticities to load, coefficient and both moduli obey e_F = 1, e_beta = 1 + e_E.
+    """
+    case = small("example2")
+    keys = ("punch.loads.0.force.1", "wear.punch.coefficient", "materials.steel.young", "materials.composite.young")
+    load, beta, steel, composite = (
+        row.elasticity for row in sensitivity(case, ["depth after 30 cycles"], keys, spread=0)[0].derivatives
+    )
+    assert load == pytest.approx(1.0, rel=1e-7)
+    assert beta < 0.999
+    assert beta == pytest.approx(1.0 + steel + composite, rel=1e-6)
+
+
+def test_two_worn_bodies_that_slide_to_and_fro() -> None:
+    """No steady state: the volume of each body follows its own coefficient alone; depths obey a similarity.
+
+    Loads and moduli times a factor, coefficients over it, leave all displacements: e_k1 + e_k2 = e_E + e_F.
+    """
+    case = load_case("fretting", ["geometry.parameters.elements_along_contact=16", "motion.positions=3"])
+    keys = ("wear.punch.coefficient", "wear.strip.coefficient", "materials.steel.young", "punch.loads.0.force.1")
+    wanted = ["volume of strip after 200 cycles", "depth of strip after 200 cycles"]
+    volume, depth = sensitivity(case, wanted, keys, spread=0)
+    assert [row.elasticity for row in volume.derivatives] == pytest.approx([0.0, 1.0, 0.0, 1.0], abs=1e-7)
+    punch, strip, modulus, load = (row.elasticity for row in depth.derivatives)
+    assert abs(modulus) > 0.01
+    assert punch + strip == pytest.approx(modulus + load, rel=1e-5)
+
+
+def test_a_key_at_the_end_of_its_range(small: Callable[..., Case]) -> None:
+    """A partition of 1 has values on one side only: the derivative is that to this side."""
+    case = small("example1-heat", "heat.partition=1.0")
+    row = sensitivity(case, ["steady temperature"], ["heat.partition"], spread=0)[0].derivatives[0]
+    model, quantity = Model(case), parse_quantity("steady temperature")
+    values = [evaluate(model, quantity, {"heat.partition": 1 - k * 1e-3})[0] for k in (0, 1, 2)]
+    assert row.derivative == pytest.approx((3 * values[0] - 4 * values[1] + values[2]) / 2e-3, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "key", "expected"),
+    [
+        ("steady pressure", "contact.fricton", "did you mean contact.friction"),
+        ("steady pressure", "run.half_cycles", "no such key"),
+        ("steady temperature", "contact.friction", "needs the table heat"),
+        ("steady lambda_M", "contact.friction", "rigid motions are lambda_F"),
+        ("cycles until depth 1 mm", "wear.punch.coefficient", "never reached"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(small: Callable[..., Case], quantity: str, key: str, expected: str) -> None:
+    case = small("example2") if "depth" not in quantity else small("example2", "wear.punch.coefficient=0.0")
+    with pytest.raises(CaseError, match=expected):
+        sensitivity(case, [quantity], [key], spread=0)

@@ -307,7 +307,7 @@ def test_convergence_in_words() -> None:
 
 @pytest.mark.slow
 def test_the_full_comparison() -> None:
-    """The numbers that the README prints, on the built-in cases' own meshes."""
+    """The numbers that docs/paper.md prints, on the built-in cases' own meshes."""
     scope = Scope(readings=tuple(r for r in READINGS if r.name in FULL_NUMBERS), central=300)
     for run, two in zip(heat_runs(scope), central_runs(scope), strict=True):
         one_way, periodic, late, central = FULL_NUMBERS[run.reading.name]

@@ -11,7 +11,8 @@ import numpy as np
 from markupsafe import Markup
 
 from fenwear.arrays import Array
-from fenwear.paper.figures import Picture as Drawing, paper_figures
+from fenwear.paper.figures import Picture as Drawing
+from fenwear.paper.figures import paper_figures
 from fenwear.paper.published import OPEN
 from fenwear.paper.readings import TRIED
 from fenwear.paper.rows import Row, Verdict, paper_rows, sensitivity_rows

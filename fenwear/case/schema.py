@@ -88,12 +88,13 @@ class Geometry(_Part):
     parameters: dict[str, Annotated[float, Unit("mm"), BeforeValidator(_parameter)]] = Field(
         default={}, description="values of parameters of the .geo, by their names"
     )
-    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(default=4, description="of the elements")
+    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(default=4, description="of the elements, 1 to 8")
     order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
         default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
     )
     follow_wear: Annotated[Number, Field(gt=0)] | None = Field(
-        default=0.5, description="worn depth over the elements' height above which the mesh follows the worn surface"
+        default=0.5,
+        description="worn depth over the elements' height above which the mesh follows the worn surface; or never",
     )
 
     @model_validator(mode="before")
@@ -151,7 +152,8 @@ class Load(_Part):
     force: tuple[Force, Force] | None = Field(default=None, description="resultant [x, z], spread evenly")
     traction: tuple[Stress, Stress] | None = Field(default=None, description="or the traction [x, z] itself")
     over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
-        default=None, description="(fraction of the cycle, factor) pairs: the load varies linearly between them"
+        default=None,
+        description="[fraction of the cycle, factor] pairs from 0 to 1: the load varies linearly between them",
     )
 
     @model_validator(mode="after")
@@ -206,9 +208,9 @@ class Body(_Part):
 class Dependence(_Part):
     """A coefficient that depends on T (K), p (MPa) or v (mm/s): an expression, or a table with straight lines."""
 
-    expression: str | None = Field(default=None, description="arithmetic on T, p and v")
+    expression: str | None = Field(default=None, description="arithmetic on T (K), p (MPa) and v (mm/s)")
     table: tuple[tuple[Number, Number], ...] | None = Field(
-        default=None, description="(argument, value) pairs; beyond its ends the end values hold"
+        default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
     of: Literal["T", "p", "v"] = Field(default="T", description="argument of the table")
     unit: str = Field(default="", description="unit of the values")
@@ -488,7 +490,8 @@ class Heat(_Part):
     debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
     conductance: PerfectOrConductance = Field(
         default="perfect",
-        description="h_c between punch and strip where they touch; by default 0 where partition is given",
+        description="h_c between punch and strip where they touch, 1 W/(m² K) = 0.001; "
+        "by default 0 where partition is given",
     )
     conductance_per_pressure: tuple[Annotated[float, *_quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
         default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
@@ -497,10 +500,10 @@ class Heat(_Part):
         default="closed", description="the nodes that conduct: those in contact, or the whole nominal interface"
     )
     convection: Annotated[Conductance, Field(ge=0)] = Field(
-        default=0.0, description="h on all other boundaries and on the two faces of the plane model"
+        default=0.0, description="h on all other boundaries and on the two faces of the plane model, 1 W/(m² K) = 0.001"
     )
     convecting_faces: bool = Field(default=True, description="whether the faces of the plane model convect, too")
-    ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings")
+    ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings, from any zero")
     inflow: Temperature | None = Field(
         default=None,
         description="of the strip's material that enters through free ends; by default, sliding one way, the "
@@ -566,7 +569,7 @@ class Output(_Part):
         default=1, description="keep every k-th cycle in history.nc, and always the last one"
     )
     fields_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = Field(
-        default=None, description="half-cycles whose fields are written; by default the last one, () for none"
+        default=None, description="half-cycles whose fields are written; by default the last one, [] for none"
     )
     checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
     report: bool = Field(default=True, description="draw figures and report.html when the run has ended")

@@ -139,9 +139,10 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
 def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     """Print the state as soon as it is there: the way to it may take longer."""
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
+    part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
         print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
-              f"contact width {width:7.3f} mm")  # fmt: skip
+              f"contact {part.format(width)}")  # fmt: skip
     print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
     if state.heat is not None:
@@ -167,7 +168,7 @@ def _duration(seconds: float) -> str:
 
 
 def _velocities(velocity: dict[str, float], per: str) -> str:
-    units = {"lambda_F": "mm", "lambda_M": "rad"}
+    units = {name: "mm" if name == "lambda_F" else "rad" for name in velocity}
     separator = "/" if len(per) == 1 else " "
     return ", ".join(f"{name} = {value:.5g} {units[name]}{separator}{per}" for name, value in velocity.items())
 
@@ -192,7 +193,9 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
         print(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):
             chi = math.degrees(state.tilt[end])
-            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at x = {system.pair.x[end]:g} mm")
+            names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
+            at = ", ".join(f"{axis} = {c:g}" for axis, c in zip(names, place, strict=False))
+            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")
 
 
 @app.command("check")
@@ -227,7 +230,7 @@ def mesh_command(
     loaded = _load(case, settings)
     if output.suffix != ".msh":
         raise CaseError(Problem("-o", f"expected a file ending in .msh, got {str(output)!r}"))
-    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output))
+    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output, loaded.model.law))
     log(f"mesh in {output}")
 
 

@@ -64,7 +64,7 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
         CaseError: what only the geometry can tell is wrong, such as a missing group.
         MeshQualityError: an element does not survive the motion.
     """
-    meshes = build_meshes(case.geometry, case.folder, comm)
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
     return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
@@ -83,7 +83,7 @@ def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tupl
 
 def elastic_body(case: Case, mesh: BodyMesh, description: Body) -> ElasticBody:
     """Assemble the elasticity of one body of a case under the mean of its loads; collective."""
-    law = isotropic(mesh, description.regions, case.materials, case.model.plane)
+    law = isotropic(mesh, description.regions, case.materials, case.model.law)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
     return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)
 

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Heat, OneWay, WearLaw
+from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, Problem
 from fenwear.interface import (
     ContactPair,
@@ -22,13 +22,16 @@ from fenwear.interface import (
     pass_material,
     rigid_equilibrium,
 )
-from fenwear.interface.placement import in_model
+from fenwear.interface.placement import in_model, in_space
 from fenwear.optimum import Optimum, check_equilibrium, optimum
 from fenwear.remedies import Remedies
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import PhasesWear, Wear, Worn
+
+ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
+OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
 
 
 @dataclass(frozen=True)
@@ -54,17 +57,31 @@ class Sliding:
 
 def make_sliding(case: Case, parts: int = 1) -> Sliding:
     """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
-    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None).in_parts(parts)
-    sliding_field = ALONG_X if case.motion.axis == "x" else ALONG_Y
-    one_way = isinstance(case.motion, OneWay)
+    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None and case.passes).in_parts(parts)
+    sliding_field = _sliding_field(case)
+    one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(
         motion,
         sliding_field,
         Friction(case.contact, sliding_field),
         (case.wear.punch, case.wear.strip),
         case.motion.track if isinstance(case.motion, OneWay) else None,
-        case.motion.axis == "x" and not one_way,
+        case.passes and not one_way,
     )
+
+
+def _sliding_field(case: Case) -> SlidingField:
+    motion = case.motion
+    if isinstance(motion, Oscillation | Rotation):
+        return SlidingField(turn=_unit(motion.axis), centre=motion.centre)
+    if motion.along is not None:
+        return SlidingField(shift=_unit(motion.along))
+    return ALONG_X if motion.axis == "x" else ALONG_Y
+
+
+def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (np.array(vector) / np.linalg.norm(vector)).tolist()
+    return x, y, z
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -267,7 +284,14 @@ class Placed:
         Args:
             direction: Sliding direction d.
             zone: Nodes in contact (n,) bool; by default all.
+
+        Raises:
+            CaseError: a node of the contact lies on the axis of rotation.
         """
+        slides = self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
+        if not (slides > ROUNDING * slides.max()).all():
+            message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
+            raise CaseError(Problem("motion.centre", message))
         wear = self.phases_wear
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
@@ -301,9 +325,11 @@ def place(
     Raises:
         CaseError: the surfaces do not face each other, or no pressure balances the loads.
     """
-    middle = pair(bodies.punch.surface, bodies.strip.surface)
+    rings = bodies.punch.law.kind == "axisymmetric"
+    middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings)
     if bodies.followed is None:
         check_distance(middle)
+    _check_axis(middle, sliding)
     whole = heat is None
     pairs = {
         offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -335,6 +361,20 @@ def place(
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         check_equilibrium(one, phase.direction, ratio)
     return placed
+
+
+def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
+    """Raise where a strip that turns in place is no body of revolution about the axis."""
+    if not any(sliding.field.turn) or sliding.motion.reach > 0:
+        return
+    velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)
+    out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
+    if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
+        raise CaseError(
+            Problem(
+                "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
+            )
+        )
 
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:

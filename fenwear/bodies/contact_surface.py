@@ -4,7 +4,8 @@ Displacements and temperatures live on the trace nodes, pressures and heat fluxe
 nodes. They are the same nodes where the shape functions of the trace have positive integrals at
 Gauss-Lobatto nodes: on lines and quadrilaterals of any degree. Quadratic triangles have integrals of
 zero at their vertices; there the pressure lives on the vertices alone, in the dual piecewise linear
-basis psi_i = 4 lambda_i - 1.
+basis psi_i = 4 lambda_i - 1. On the axis of rings a node of degree 2 or more has no weight, as 2 pi r
+is zero there: no pressure lives on it.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.mesh import BodyMesh
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
+NO_WEIGHT = 1e-9  # of the largest: what rounding leaves
 
 
 @dataclass(frozen=True)
@@ -147,12 +149,12 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     facets, inner = facets[by_nodes], inner[by_nodes]
     trace, blocks = trace[order], blocks[order]
     if cell == "triangle":
-        surface = _on_vertices(body.name, trace, facets, degree, inner)
+        surface = vertex_surface(body.name, trace, facets, degree, inner)
     else:
         weights, outward = _integrals(body, space, measure, blocks)
-        every = np.arange(len(trace))
-        identity = csr_array((np.ones(len(trace)), (every, every)), shape=(len(trace), len(trace)))
-        surface = ContactSurface(body.name, trace, facets, cell, degree, every, weights, outward, identity)
+        nodes = np.flatnonzero(weights > NO_WEIGHT * weights.max(initial=0.0))
+        spread = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(trace), len(nodes)))
+        surface = ContactSurface(body.name, trace, facets, cell, degree, nodes, weights[nodes], outward[nodes], spread)
     return surface, Trace(surface, space, blocks)
 
 
@@ -232,11 +234,20 @@ def _integrals(
         found[k, own] = vector.array_r.reshape(-1, dim)[blocks[own] - start]
     body.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
     weights, normals = found[0, :, 0], found[1]
-    return weights, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    size = np.linalg.norm(normals, axis=1, keepdims=True)
+    return weights, normals / np.where(size > 0, size, 1.0)
 
 
-def _on_vertices(name: str, trace: Array, facets: NDArray[np.int64], degree: int, inner: Array) -> ContactSurface:
-    """Return the surface of triangles, with the pressure on the vertices in the dual linear basis."""
+def vertex_surface(name: str, trace: Array, facets: NDArray[np.int64], degree: int, inner: Array) -> ContactSurface:
+    """Return the surface of triangles, with the pressure on the vertices in the dual linear basis.
+
+    Args:
+        name: Of the body.
+        trace: Coordinates of the trace nodes (N, 3), mm.
+        facets: Trace nodes of each triangle (f, k), corners first.
+        degree: Of the trace.
+        inner: A point on the body's side of each facet (f, 3).
+    """
     corners = facets[:, :3]
     cross = np.cross(trace[corners[:, 1]] - trace[corners[:, 0]], trace[corners[:, 2]] - trace[corners[:, 0]]) / 2
     cross *= np.sign(np.einsum("fd,fd->f", cross, trace[corners].mean(axis=1) - inner))[:, None]

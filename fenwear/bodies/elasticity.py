@@ -22,9 +22,9 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
 from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor
-from fenwear.bodies.material import ElasticLaw, Kind, measure, strain_of
-from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Body, Load, Support
+from fenwear.bodies.material import ElasticLaw, measure, strain_of
+from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.case import Body, Kind, Load, Support
 from fenwear.errors import CaseError, Problem
 from fenwear.parallel import total
 
@@ -86,7 +86,7 @@ class ElasticBody:
         self.space = fem.functionspace(mesh, element)
         self.surface, self.trace = contact_surface(body, self.space, measure(mesh, law.kind))
         self.pivot = _pivot(body, description)
-        supports = self._supports(description.supports)
+        supports = [*self._supports(description.supports), *self._on_axis()]
         modes, self.mode_names = self._free_modes(supports)
         self.rigid_modes = modes
 
@@ -137,6 +137,14 @@ class ElasticBody:
             for number, support in enumerate(supports)
             for component in (self._component(axis, f"{key}.{number}.fix") for axis in support.fix)
         ]
+
+    def _on_axis(self) -> list[fem.DirichletBC]:
+        """Return the support u_r = 0 at r = 0 of an axisymmetric body, without which u_r / r is not finite."""
+        if self.law.kind != "axisymmetric":
+            return []
+        collapsed, to_parent = compat.collapse(self.space.sub(0))
+        on_axis = collapsed.tabulate_dof_coordinates()[:, 0] < 1e-9 * self._size()
+        return [self._held(0, to_parent[on_axis])]
 
     def _component(self, axis: str, key: str) -> int:
         known = axes(self.dim)
@@ -283,7 +291,8 @@ def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.fl
         return np.array([support.at])
     if support.on not in body.points:
         known = ", ".join(sorted({*body.curves, *body.points}))
-        message = f"no physical curve or point {support.on!r} on the {body.name}; the geometry has {known}"
+        entity = ENTITIES[body.mesh.topology.dim - 1]
+        message = f"no physical {entity} or point {support.on!r} on the {body.name}; the geometry has {known}"
         raise CaseError(Problem(f"{key}.on", message))
     return body.points[support.on]
 

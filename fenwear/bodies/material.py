@@ -8,17 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
 from fenwear.bodies.mesh import BodyMesh
-from fenwear.case import Material
+from fenwear.case import Kind, Material
 from fenwear.errors import CaseError, Problem
-
-Kind = Literal["stress", "strain", "axisymmetric", "solid"]
 
 
 def strain(u: Any) -> Any:

@@ -2,7 +2,8 @@
 
 The contract of a geometry, a .geo or a .msh: physical groups whose names start with the body they
 belong to, punch_ or strip_; surfaces are the material regions; punch_contact and strip_contact are
-the curves that meet; further curves and points are for supports, loads and thermal conditions.
+the curves that meet; further curves and points are for supports, loads and thermal conditions. In a
+solid the regions are volumes and what meets are surfaces. An axisymmetric model has r along x.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from numpy.typing import NDArray
 from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.mesh_check import element_problems
-from fenwear.case import Geometry
+from fenwear.case import Geometry, Kind
 from fenwear.errors import CaseError, OutputError, Problem
 from fenwear.parallel import on_root
 
 BODIES = ("punch", "strip")
+ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
+SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,8 @@ class BodyMesh:
             CaseError: no such group; `key` is the case's key that asked for it.
         """
         if group not in self.curves:
-            raise CaseError(Problem(key, f"no physical curve {group!r} on the {self.name}{_known(self.curves)}"))
+            entity = ENTITIES[self.mesh.topology.dim - 1]
+            raise CaseError(Problem(key, f"no physical {entity} {group!r} on the {self.name}{_known(self.curves)}"))
         return self.curves[group]
 
 
@@ -122,8 +126,16 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
     return path
 
 
-def build_meshes(geometry: Geometry, folder: Path | None, comm: MPI.Comm) -> tuple[BodyMesh, BodyMesh]:
+def build_meshes(
+    geometry: Geometry, folder: Path | None, comm: MPI.Comm, kind: Kind = "stress"
+) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
+
+    Args:
+        geometry: Of the case.
+        folder: Where its path starts.
+        comm: The ranks.
+        kind: Of the model: solids are meshed in volumes.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
@@ -131,15 +143,19 @@ def build_meshes(geometry: Geometry, folder: Path | None, comm: MPI.Comm) -> tup
     on_root(comm, lambda: find_geometry(geometry, folder))
     if comm.rank == 0:
         with _gmsh() as gmsh:
-            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder)))
-            punch, strip = (_distribute(gmsh, name, comm) for name in BODIES)
+            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind))
+            punch, strip = (_distribute(gmsh, name, comm, _dim(kind)) for name in BODIES)
     else:
         on_root(comm, lambda: None)
-        punch, strip = (_distribute(None, name, comm) for name in BODIES)
+        punch, strip = (_distribute(None, name, comm, _dim(kind)) for name in BODIES)
     return punch, strip
 
 
-def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
+def _dim(kind: Kind) -> int:
+    return 3 if kind == "solid" else 2
+
+
+def write_msh(geometry: Geometry, folder: Path | None, path: Path, kind: Kind = "stress") -> None:
     """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
 
     Raises:
@@ -147,7 +163,7 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path) -> None:
         OutputError: there is no room for it.
     """
     with _gmsh() as gmsh:
-        _load(gmsh, geometry, find_geometry(geometry, folder))
+        _load(gmsh, geometry, find_geometry(geometry, folder), kind)
         try:
             path.touch()
         except OSError as error:
@@ -177,7 +193,7 @@ def _gmsh() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _load(gmsh: Any, geometry: Geometry, path: Path) -> None:
+def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind) -> None:
     """Read and mesh the geometry in the current gmsh model, and check the contract."""
     gmsh.parser.clear()
     for name, value in geometry.parameters.items():
@@ -186,11 +202,11 @@ def _load(gmsh: Any, geometry: Geometry, path: Path) -> None:
     try:
         _merge(gmsh, path)
         if path.suffix == ".geo":
-            gmsh.model.mesh.generate(2)
+            gmsh.model.mesh.generate(_dim(kind))
             gmsh.model.mesh.setOrder(geometry.order)
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(Problem("geometry.file", f"gmsh on {path.name}: {error}")) from None
-    _check_groups(gmsh, path)
+    _check_groups(gmsh, path, kind)
 
 
 def _merge(gmsh: Any, path: Path) -> None:
@@ -234,62 +250,86 @@ def _groups(gmsh: Any, dim: int) -> dict[str, int]:
     return {gmsh.model.getPhysicalName(dim, tag): tag for _, tag in gmsh.model.getPhysicalGroups(dim)}
 
 
-def _check_groups(gmsh: Any, path: Path) -> None:
+def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
+    problems, whole = [], _dim(kind)
+    region, facet = ENTITIES[whole], ENTITIES[whole - 1]
+    for body in BODIES:
+        regions = [name for name in _groups(gmsh, whole) if name.startswith(f"{body}_")]
+        if not regions:
+            problems.append(f"{path.name} has no physical {region} named {body}_...")
+        if f"{body}_contact" not in _groups(gmsh, whole - 1):
+            problems.append(f"{path.name} has no physical {facet} named {body}_contact")
+    if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
+        problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
+    for dim in (whole, whole - 1):
+        names = _groups(gmsh, dim)
+        types = {name: _element_types(gmsh, dim, tag) for name, tag in names.items()}
+        problems += [f"{path.name}: physical group {name} has no elements" for name in names if not types[name]]
+        problems += [
+            f"{path.name}: physical group {name} mixes element types" for name in names if len(types[name]) > 1
+        ]
+    if not problems and whole == 3:
+        problems = [f"{path.name}: {text}" for text in _solid_types(gmsh)]
+    if not problems:
+        groups = [{n: t for n, t in _groups(gmsh, dim).items() if n.startswith(BODIES)} for dim in range(whole + 1)]
+        found = element_problems(gmsh, groups, axisymmetric=kind == "axisymmetric")
+        problems = [f"{path.name}: {text}" for text in found]
+    if problems:
+        raise CaseError([Problem("geometry.file", text) for text in problems])
+
+
+def _element_types(gmsh: Any, dim: int, tag: int) -> set[int]:
+    entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
+    return {int(t) for entity in entities for t in gmsh.model.mesh.getElementTypes(dim, entity)}
+
+
+def _solid_types(gmsh: Any) -> list[str]:
+    """Return what is wrong with the kinds of elements of solids, in words."""
     problems = []
     for body in BODIES:
-        regions = [name for name in _groups(gmsh, 2) if name.startswith(f"{body}_")]
-        if not regions:
-            problems.append(Problem("geometry.file", f"{path.name} has no physical surface named {body}_..."))
-        if f"{body}_contact" not in _groups(gmsh, 1):
-            problems.append(Problem("geometry.file", f"{path.name} has no physical curve named {body}_contact"))
-    for dim, names in ((2, _groups(gmsh, 2)), (1, _groups(gmsh, 1))):
-        for name, tag in names.items():
-            entities = gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
-            types = {t for entity in entities for t in gmsh.model.mesh.getElementTypes(dim, entity)}
-            if not types:
-                problems.append(Problem("geometry.file", f"{path.name}: physical group {name} has no elements"))
-            if len(types) > 1:
-                problems.append(Problem("geometry.file", f"{path.name}: physical group {name} mixes element types"))
-    if not problems:
-        groups = [{n: t for n, t in _groups(gmsh, dim).items() if n.startswith(BODIES)} for dim in range(3)]
-        problems = [Problem("geometry.file", f"{path.name}: {text}") for text in element_problems(gmsh, groups)]
-    if problems:
-        raise CaseError(problems)
+        regions = [tag for name, tag in _groups(gmsh, 3).items() if name.startswith(f"{body}_")]
+        types = {t for tag in regions for t in _element_types(gmsh, 3, tag)}
+        names = sorted(gmsh.model.mesh.getElementProperties(t)[0] for t in types)
+        if len(types) > 1:
+            problems.append(f"the {body} mixes elements ({', '.join(names)}); expected one kind in a body")
+        if not names[0].startswith(SOLID_ELEMENTS):
+            problems.append(f"the {body} has elements of the kind {names[0]}; expected tetrahedra or hexahedra")
+    return problems
 
 
-def _distribute(gmsh: Any, body: str, comm: MPI.Comm) -> BodyMesh:
-    """Distribute one body's part of rank 0's gmsh model; collective."""
-    groups: list[dict[str, int]] = [{}, {}, {}]
+def _distribute(gmsh: Any, body: str, comm: MPI.Comm, whole: int) -> BodyMesh:
+    """Distribute one body's part of rank 0's gmsh model, of dimension `whole`; collective."""
+    groups: list[dict[str, int]] = [{} for _ in range(whole + 1)]
     points: dict[str, NDArray[np.float64]] = {}
     model = None
     if gmsh is not None:
         model = gmsh.model
-        for dim in (0, 1, 2):
+        for dim in range(whole + 1):
             groups[dim] = {n: t for n, t in _groups(gmsh, dim).items() if n.startswith(f"{body}_")}
         for name, tag in groups[0].items():
-            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :2]
-        whole = model.getCurrent()
+            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :whole]
+        both = model.getCurrent()
         _isolate(gmsh, body, groups)
-    _, curves, regions = comm.bcast(groups)
+    *_, curves, regions = comm.bcast(groups)
     points = comm.bcast(points)
-    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, gdim=2)
+    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, gdim=whole)
     if gmsh is not None:
         gmsh.model.remove()
-        gmsh.model.setCurrent(whole)
+        gmsh.model.setCurrent(both)
     return BodyMesh(body, mesh, cell_tags, facet_tags, regions, curves, points)
 
 
 def _isolate(gmsh: Any, body: str, groups: list[dict[str, int]]) -> None:
     """Make a model of the body's groups alone current: dolfinx wants nodes numbered without gaps."""
-    model = gmsh.model
+    model, whole = gmsh.model, len(groups) - 1
     node_tags, coordinates, _ = model.mesh.getNodes()
     parts = [
         (dim, tag, model.mesh.getElements(dim, entity))
-        for dim in (2, 1)
+        for dim in (whole, whole - 1)
         for tag in groups[dim].values()
         for entity in model.getEntitiesForPhysicalGroup(dim, tag)
     ]
-    used = np.unique(np.concatenate([nodes for dim, _, (_, _, lists) in parts if dim == 2 for nodes in lists]))
+    used = np.unique(np.concatenate([nodes for dim, _, (_, _, lists) in parts if dim == whole for nodes in lists]))
     position = np.argsort(node_tags)[np.searchsorted(np.sort(node_tags), used)]
     model.add(body)
     entities: dict[tuple[int, int], list[int]] = {}

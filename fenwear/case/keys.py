@@ -121,7 +121,8 @@ def _below(field: FieldInfo, parts: list[Any], path: str, kind: str) -> Iterator
         key = replace(key, values="list of tables" if listed == ".N" else "table")
     yield replace(key, table=bool(parts))
     for part in parts:
-        own = str(get_args(part.model_fields["kind"].annotation)[0]) if "kind" in part.model_fields else kind
+        words = get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()
+        own = str(words[0]) if len(words) == 1 else kind
         yield from _keys(part, f"{path}{listed}.", own)
     if not parts and get_origin(field.annotation) is dict:
         yield replace(key, path=f"{path}.NAME", values=_values(get_args(field.annotation)[1]), default="")
@@ -165,4 +166,6 @@ def _default(field: FieldInfo) -> str:
         return ""
     if isinstance(value, bool):
         return "true" if value else "false"
+    if isinstance(value, tuple):
+        return f"[{', '.join(f'{entry:g}' for entry in value)}]"
     return f'"{value}"' if isinstance(value, str) else f"{value:g}"

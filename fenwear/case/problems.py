@@ -6,11 +6,17 @@ import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fenwear.case.schema import Case, Dependence, OneWay, Reciprocating, Tabulated, part_models
+from fenwear.case.schema import Case, Dependence, OneWay, Oscillation, Reciprocating, Rotation, Tabulated, part_models
 from fenwear.case.units import shown
 from fenwear.errors import Problem
 
-MOTIONS: dict[str | int, type] = {"reciprocating": Reciprocating, "one-way": OneWay, "table": Tabulated}
+MOTIONS: dict[str | int, type] = {
+    "reciprocating": Reciprocating,
+    "one-way": OneWay,
+    "table": Tabulated,
+    "rotation": Rotation,
+    "oscillation": Oscillation,
+}
 # What was expected, by the kind of an error of pydantic: its own words are those of Python.
 EXPECTED = {
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), "a table"),

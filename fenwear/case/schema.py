@@ -62,7 +62,14 @@ Number = Annotated[float, *_quantity("")]
 Temperature = Annotated[float, *_quantity("K")]
 CONDUCTANCE = "N/(mm*s*K)"
 Conductance = Annotated[float, *_quantity(CONDUCTANCE)]
-Axis = Literal["x", "z"]
+Angle = Annotated[float, *_quantity("rad")]
+Axis = Literal["x", "y", "z"]
+Vector = tuple[Number, Number, Number]
+Kind = Literal["stress", "strain", "axisymmetric", "solid"]  # of a model: what tells strains and rigid modes
+# With as many components as the model has axes.
+Point = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
+Forces = Annotated[tuple[Force, ...], Field(min_length=2, max_length=3)]
+Stresses = Annotated[tuple[Stress, ...], Field(min_length=2, max_length=3)]
 
 
 class _Part(BaseModel):
@@ -106,10 +113,31 @@ class Geometry(_Part):
 
 
 class Model(_Part):
-    """The plane model and its thickness."""
+    """Plane bodies in (x, z) with their thickness; rings in (x, z), x the radius; or solids in (x, y, z)."""
 
+    kind: Literal["plane", "axisymmetric", "solid"] = Field(
+        default="plane", description="plane bodies, rings, or solids"
+    )
     plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
-    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="size out of the plane")
+    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies, out of their plane")
+
+    @model_validator(mode="after")
+    def _plane_alone(self) -> Self:
+        if self.kind != "plane":
+            for key, default in (("plane", "stress"), ("thickness", 1.0)):
+                if getattr(self, key) != default:
+                    raise ValueError(f"{key}: belongs to plane models, not with kind = '{self.kind}'")
+        return self
+
+    @property
+    def law(self) -> Kind:
+        """Plane stress, plane strain, axisymmetric or solid."""
+        return self.plane if self.kind == "plane" else self.kind
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes of vectors."""
+        return ("x", "y", "z") if self.kind == "solid" else ("x", "z")
 
 
 class Material(_Part):
@@ -135,7 +163,7 @@ class Support(_Part):
     """Displacement components held at zero, on a named group or at a point."""
 
     on: str | None = Field(default=None, description="group of the geometry")
-    at: tuple[Length, Length] | None = Field(default=None, description="or a point [x, z] at a mesh node")
+    at: Point | None = Field(default=None, description="or a point [x, z], in a solid [x, y, z], at a mesh node")
     fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero")
 
     @model_validator(mode="after")
@@ -146,11 +174,11 @@ class Support(_Part):
 
 
 class Load(_Part):
-    """A load spread evenly over a named group: its resultant, or a traction (x, z)."""
+    """A load spread evenly over a named group: its resultant, or a traction; (x, z), in a solid (x, y, z)."""
 
     on: str = Field(description="group of the geometry")
-    force: tuple[Force, Force] | None = Field(default=None, description="resultant [x, z], spread evenly")
-    traction: tuple[Stress, Stress] | None = Field(default=None, description="or the traction [x, z] itself")
+    force: Forces | None = Field(default=None, description="resultant [x, z], in a solid [x, y, z], spread evenly")
+    traction: Stresses | None = Field(default=None, description="or the traction itself")
     over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
         default=None,
         description="[fraction of the cycle, factor] pairs from 0 to 1: the load varies linearly between them",
@@ -181,7 +209,8 @@ class Load(_Part):
 
     def _scaled(self, factor: float) -> Load:
         force, traction = (
-            None if pair is None else (factor * pair[0], factor * pair[1]) for pair in (self.force, self.traction)
+            None if vector is None else tuple(factor * component for component in vector)
+            for vector in (self.force, self.traction)
         )
         return Load(on=self.on, force=force, traction=traction)
 
@@ -200,7 +229,7 @@ class Body(_Part):
     supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
     loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
     temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
-    pivot: tuple[Length, Length] | None = Field(
+    pivot: Point | None = Field(
         default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
     )
 
@@ -295,9 +324,7 @@ class WearLaw(_Part):
     coefficient: _constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
         default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
     )
-    beta: Annotated[float | None, Unit("")] = Field(
-        default=None, description="beta, in the same unit; beta~ = beta mu^b"
-    )
+    beta: Annotated[float | None, Unit("")] = Field(default=None, description="in the same unit; beta~ = beta mu^b")
     archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
     hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H, with archard")
     energy: Annotated[float, *_quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
@@ -382,13 +409,36 @@ class Wear(_Part):
         return self
 
 
-class _Motion(_Part):
-    """What all motions share."""
+class _Along(_Part):
+    """What translations of the strip share."""
 
     axis: Literal["x", "y"] = Field(default="x", description="x: along the contact; y: out of the plane")
+    along: Vector | None = Field(default=None, description="direction of the sliding in a solid, in place of axis")
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if self.along is not None:
+            if not any(self.along):
+                raise ValueError("along: expected a direction, got zero")
+            if self.axis != "x":
+                raise ValueError("along: give either along or axis")
+        return self
 
 
-class _ToAndFro(_Motion):
+class _About(_Part):
+    """What rotations of the strip share."""
+
+    axis: Vector = Field(default=(0.0, 0.0, 1.0), description="of the rotation")
+    centre: tuple[Length, Length, Length] = Field(default=(0.0, 0.0, 0.0), description="a point on the axis")
+
+    @model_validator(mode="after")
+    def _some_axis(self) -> Self:
+        if not any(self.axis):
+            raise ValueError("axis: expected a direction, got zero")
+        return self
+
+
+class _ToAndFro(_Part):
     positions: Annotated[int, Field(ge=1, le=200, strict=True)] | None = Field(
         default=None,
         description="of the strip under the punch in each half-cycle; 1: opposite each other throughout; "
@@ -396,15 +446,13 @@ class _ToAndFro(_Motion):
     )
 
 
-class Reciprocating(_ToAndFro):
-    """Sliding to and fro over 2 u0 in each half-cycle; it starts rightward, from -u0.
+class _Profile(_ToAndFro):
+    """The speed over half-cycles to and fro.
 
     sinusoidal: v = u0 omega |sin omega t|, equation (10); triangular: constant speed; trapezoidal: the
     speed rises linearly over the fraction `ramp` of the half-cycle, stays, and falls again.
     """
 
-    kind: Literal["reciprocating"] = Field(description="to and fro")
-    amplitude: Annotated[Length, Field(gt=0)] = Field(description="u0, to both sides of the middle")
     angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = Field(
         default=None, description="omega; a half-cycle takes pi / omega"
     )
@@ -430,7 +478,21 @@ class Reciprocating(_ToAndFro):
         return math.pi / self.angular_frequency if self.angular_frequency else (self.period or 0.0) / 2
 
 
-class OneWay(_Motion):
+class Reciprocating(_Along, _Profile):
+    """Sliding to and fro over 2 u0 in each half-cycle; it starts rightward, from -u0."""
+
+    kind: Literal["reciprocating"] = Field(description="to and fro")
+    amplitude: Annotated[Length, Field(gt=0)] = Field(description="u0, to both sides of the middle")
+
+
+class Oscillation(_About, _Profile):
+    """Turning to and fro by 2 phi0 in each half-cycle; it starts counterclockwise, from -phi0."""
+
+    kind: Literal["oscillation"] = Field(description="turning to and fro")
+    amplitude: Annotated[Angle, Field(gt=0)] = Field(description="phi0, to both sides of the middle")
+
+
+class OneWay(_Along):
     """Steady sliding in one direction, counted in steps of `duration`."""
 
     kind: Literal["one-way"] = Field(description="steadily in one direction")
@@ -442,7 +504,18 @@ class OneWay(_Motion):
     )
 
 
-class Tabulated(_ToAndFro):
+class Rotation(_About):
+    """Steady turning about an axis, counted in steps of `duration`."""
+
+    kind: Literal["rotation"] = Field(description="turning steadily")
+    direction: Literal["counterclockwise", "clockwise"] = Field(
+        default="counterclockwise", description="seen against the axis"
+    )
+    angular_speed: Annotated[AngularFrequency, Field(gt=0)] = Field(description="of the strip")
+    duration: Annotated[Time, Field(gt=0)] = Field(description="of a step, which counts as a half-cycle")
+
+
+class Tabulated(_Along, _ToAndFro):
     """The strip's position over one cycle, straight lines between the given times; every stroke is a half-cycle."""
 
     kind: Literal["table"] = Field(description="the strip's position over a cycle")
@@ -479,6 +552,9 @@ PerfectOrConductance = Annotated[
     BeforeValidator(_perfect_or_conductance),
     PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
 ]
+
+
+Motions = Reciprocating | OneWay | Tabulated | Oscillation | Rotation
 
 
 class Heat(_Part):
@@ -602,9 +678,7 @@ class Case(_Part):
     strip: Body = Field(description="the body below, which slides, body 2")
     contact: Contact = Field(default=Contact(), description="between the two")
     wear: Wear = Field(description="of punch, strip or both")
-    motion: Annotated[Reciprocating | OneWay | Tabulated, Field(discriminator="kind")] = Field(
-        description="of the strip under the punch"
-    )
+    motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
     heat: Heat | None = Field(default=None, description="without this table there is no temperature")
     run: Run = Field(description="how far, and how")
     output: Output = Field(default=Output(), description="what is kept")
@@ -620,9 +694,10 @@ class Case(_Part):
             for region, name in part.regions.items()
             if name not in self.materials
         ]
-        if self.model.plane == "strain":
+        if self.model.law != "stress":
+            where = {"strain": "in plane strain", "axisymmetric": "in rings", "solid": "in solids"}[self.model.law]
             problems += [
-                f"materials.{name}.poisson: expected less than 0.5 in plane strain, got {material.poisson:g}"
+                f"materials.{name}.poisson: expected less than 0.5 {where}, got {material.poisson:g}"
                 for name, material in self.materials.items()
                 if material.poisson >= 0.5
             ]
@@ -630,7 +705,7 @@ class Case(_Part):
             problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
-        problems += self._sliding_problems()
+        problems += [*self._kind_problems(), *self._sliding_problems()]
         problems += [
             f"{body}.regions: missing, but required"
             for body, part in (("punch", self.punch), ("strip", self.strip))
@@ -642,23 +717,60 @@ class Case(_Part):
             raise ValueError("\n".join(problems))
         return self
 
+    def _kind_problems(self) -> list[str]:
+        """Return what does not go with a plane, an axisymmetric or a solid model."""
+        kind, axes, motion = self.model.kind, self.model.axes, self.motion
+        names, problems = " or ".join(f"'{axis}'" for axis in axes), []
+        for body, part in (("punch", self.punch), ("strip", self.strip)):
+            vectors: dict[str, tuple[float, ...] | None] = {f"{body}.pivot": part.pivot}
+            for number, support in enumerate(part.supports):
+                vectors[f"{body}.supports.{number}.at"] = support.at
+                problems += [
+                    f"{body}.supports.{number}.fix.{place}: expected {names} in a {kind} model, got '{axis}'"
+                    for place, axis in enumerate(support.fix)
+                    if axis not in axes
+                ]
+            for number, load in enumerate(part.loads):
+                vectors[f"{body}.loads.{number}.force"] = load.force
+                vectors[f"{body}.loads.{number}.traction"] = load.traction
+            problems += [
+                f"{key}: expected {len(axes)} components ({', '.join(axes)}) in a {kind} model, got {len(vector)}"
+                for key, vector in vectors.items()
+                if vector is not None and len(vector) != len(axes)
+            ]
+        if isinstance(motion, Oscillation | Rotation):
+            if kind == "plane":
+                problems.append("motion.kind: expected reciprocating, one-way or table in a plane model")
+            if kind == "axisymmetric" and (any(motion.axis[:2]) or any(motion.centre[:2])):
+                problems.append("motion.axis: expected the axis z of the rings, through x = y = 0")
+        elif kind == "axisymmetric":
+            problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
+        elif kind == "plane" and motion.along is not None:
+            problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
+        if kind != "plane" and self.heat is not None:
+            problems.append(f"heat: expected a plane model: heat is not followed in a {kind} model yet")
+        if kind != "plane" and self.contact.solver == "full":
+            problems.append("contact.solver: expected 'condensed' but in plane models")
+        return problems
+
+    @property
+    def passes(self) -> bool:
+        """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
+        return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis == "x")
+
     def _sliding_problems(self) -> list[str]:
         problems = []
-        motion, one_way = self.motion, isinstance(self.motion, OneWay)
+        motion, one_way = self.motion, isinstance(self.motion, OneWay | Rotation)
         least = 1 if one_way else 2
         if self.run.integration == "jump" and self.run.half_cycles < least:
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
-        if self.wear.strip is not None:
-            if isinstance(motion, OneWay):
-                if motion.track is None and motion.axis == "x":
-                    problems.append("motion.track: missing, but required where the strip wears in one-way sliding")
-            elif motion.positions == 1 and motion.axis == "x":
-                problems.append("motion.positions: expected 2 or more, since the strip's wear spreads over the stroke")
-        if motion.axis == "y" and self.heat is not None:
+        if self.wear.strip is not None and self.passes:
+            problems += self._track_problems()
+        if not self.passes and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
-        if motion.axis == "y" and not isinstance(motion, OneWay) and (motion.positions or 1) > 1:
+        if not self.passes and not isinstance(motion, OneWay | Rotation) and (motion.positions or 1) > 1:
             problems.append("motion.positions: expected 1 for sliding out of the plane")
         if self.heat is None:
             given = {"contact.friction": self.contact.friction}
@@ -674,6 +786,20 @@ class Case(_Part):
             if law is not None and law.coefficient is None and law.archard is None and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
+
+    def _track_problems(self) -> list[str]:
+        """Return what does not go with wear of a strip that passes under the punch."""
+        motion = self.motion
+        if self.model.kind == "solid" and isinstance(motion, OneWay | Rotation):
+            return [
+                "wear.strip: not followed in solids around a closed track yet; expected the wear of the punch alone, "
+                "an axisymmetric model, or sliding to and fro"
+            ]
+        if isinstance(motion, OneWay) and motion.track is None:
+            return ["motion.track: missing, but required where the strip wears in one-way sliding"]
+        if not isinstance(motion, OneWay | Rotation) and motion.positions == 1:
+            return ["motion.positions: expected 2 or more, since the strip's wear spreads over the stroke"]
+        return []
 
     @property
     def varies(self) -> bool:

@@ -244,8 +244,8 @@ def _check_exists(system: Tribosystem) -> None:
     for own in system.interfaces[1:]:
         if np.abs(own.rigid.rigid_normal - first).max(initial=0.0) > 1e-9 * np.abs(first).max(initial=1.0):
             raise ConvergenceError(
-                "no cyclic steady state is solved for where the rigid motions open other gaps in other positions, as of "
-                "a strip that is free to move and slides as a whole: follow the wear by `run`"
+                "no cyclic steady state is solved for where the rigid motions open other gaps in other positions, as "
+                "of a strip that is free to move and slides as a whole: follow the wear by `run`"
             )
 
 

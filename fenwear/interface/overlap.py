@@ -32,7 +32,8 @@ class ChartedSurface:
     """A contact surface laid out in a chart, where its facets do not overlap.
 
     The pressure lives at all trace nodes of intervals and quadrilaterals, and at the vertices of triangles,
-    whose other nodes have no or negative weights. Facets with curved edges are taken by their corners.
+    whose other nodes have no or negative weights; not at nodes on the axis of rings that have no weight.
+    Facets with curved edges are taken by their corners.
 
     Attributes:
         s: Chart coordinates of the trace nodes (N, d - 1), mm.
@@ -56,7 +57,7 @@ class ChartedSurface:
 
     @cached_property
     def pressure_facets(self) -> Indices:
-        """Pressure nodes of each facet, numbered as in `nodes`."""
+        """Pressure nodes of each facet, numbered as in `nodes`; -1 for one that carries none."""
         number = np.full(len(self.s), -1)
         number[self.nodes] = np.arange(len(self.nodes))
         return number[self.facets[:, :3] if self.cell == "triangle" else self.facets]
@@ -143,7 +144,8 @@ def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     diameter = np.linalg.norm(np.ptp(corners1, axis=1), axis=1)
     covered_facets = left <= np.minimum(SLACK * first.extent * diameter ** (flat - 1), size1 / 2)
     covered = np.ones(len(first.nodes), dtype=bool)
-    covered[first.pressure_facets[~covered_facets]] = False
+    uncovered = first.pressure_facets[~covered_facets]
+    covered[uncovered[uncovered >= 0]] = False
     return Overlap(
         facet1,
         facet2,
@@ -168,7 +170,8 @@ def node_areas(surface: ChartedSurface) -> NodeAreas:
     corners = surface.corners
     polygons = tabulate(surface.cell, 1, reference.reshape(-1, flat)) @ corners
     polygons = polygons.reshape(-1, count, flat)
-    node = surface.pressure_facets.ravel()
+    node: Indices = surface.pressure_facets.ravel()
+    polygons, node = polygons[node >= 0], node[node >= 0]
     sizes: Array = np.zeros(len(surface.nodes))
     np.add.at(sizes, node, np.abs(_sizes(polygons)))
     return NodeAreas(polygons, node, sizes)

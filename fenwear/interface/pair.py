@@ -71,8 +71,15 @@ class ContactPair:
         return interpolation(self.x, self.punch.degree, np.atleast_1d(x)) @ values
 
 
-def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE) -> ContactPair:
+def pair(
+    punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE, *, axisymmetric: bool = False
+) -> ContactPair:
     """Bring the punch's nodes opposite the strip's surface, moved to its place.
+
+    Args:
+        punch, strip: The surfaces as they were meshed.
+        placement: Of the strip.
+        axisymmetric: Whether they are rings, x being the radius.
 
     Raises:
         CaseError: the surfaces do not face each other, or the strip's does not reach below the whole punch.
@@ -86,7 +93,7 @@ def pair(punch: ContactSurface, strip: ContactSurface, placement: Placement = HE
                 _not_facing(f"{surface.body}_contact folds back on itself seen along {'xyz'[axis]}")
     common = overlap(first, second)
     _check_covered(common, first, second, placement)
-    transfer = dual_transfer(first, second, common)
+    transfer = dual_transfer(first, second, _around(common, first, punch) if axisymmetric else common)
     material = _material(first, second, transfer)
     normal = material @ strip_outward
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -121,6 +128,10 @@ def _material(first: ChartedSurface, second: ChartedSurface, transfer: csr_array
     """Return what takes values at the strip's pressure nodes to the punch's (n, n_strip)."""
     if len(second.nodes) == len(second.s):
         return transfer
+    if second.cell != "triangle":  # a node on the axis of rings stands for nothing: it takes its neighbour's value
+        nearest = np.abs(second.s - second.s[second.nodes].T).argmin(axis=1)
+        to_trace = csr_array((np.ones(len(nearest)), (np.arange(len(nearest)), nearest)))
+        return csr_array(transfer @ to_trace)
     # On the vertices alone: linear on each facet.
     vertices = np.arange(len(second.nodes))
     linear = ChartedSurface(second.s[second.nodes], second.pressure_facets, second.cell, 1, vertices)
@@ -151,6 +162,13 @@ def _chart_axis(strip: ContactSurface) -> int:
 
 def _charted(surface: ContactSurface, trace: Array, axis: int) -> ChartedSurface:
     return ChartedSurface(np.delete(trace, axis, axis=1), surface.facets, surface.cell, surface.degree, surface.nodes)
+
+
+def _around(common: Overlap, first: ChartedSurface, punch: ContactSurface) -> Overlap:
+    """Return the overlap of rings, each point with its circumference 2 pi r."""
+    radius = punch.trace[first.facets[common.facet1], 0]
+    around = 2 * np.pi * np.einsum("qk,qk->q", first.shape_functions(common.points1), radius)
+    return replace(common, weights=common.weights * around)
 
 
 def _folds(surface: ContactSurface, axis: int) -> bool:
@@ -189,7 +207,8 @@ def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int
         angle = np.degrees(np.arccos(np.clip(facing[worst], -1, 1)))
         place = ", ".join(f"{c:g}" for c in punch.x[worst][: punch.dim - 1])
         _not_facing(
-            f"their outward normals do not point at each other at x = {place} mm{where}: they are {angle:.0f} degrees off"
+            f"their outward normals do not point at each other at x = {place} mm{where}: they are {angle:.0f} degrees "
+            "off"
         )
     if punch.dim == 2 and axis == 1 and normal[:, 1].mean() < 0:
         _not_facing("the punch lies below the strip; expected it above, with z upwards")

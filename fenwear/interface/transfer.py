@@ -16,12 +16,11 @@ The psi_i have negative parts, by which wear would let material grow. Worn depth
 
 from __future__ import annotations
 
-import basix
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from fenwear.arrays import Array
-from fenwear.interface.overlap import ChartedSurface, Indices, Overlap, overlap, shared_areas, tabulate
+from fenwear.interface.overlap import ChartedSurface, Indices, Overlap, overlap, shared_areas
 
 ROUNDING = 1e-14  # entries of T that are left of zero
 
@@ -69,29 +68,12 @@ def wear_transfer(first: ChartedSurface, second: ChartedSurface) -> csr_array:
     return _rows_to_one(shared_areas(first, second))
 
 
-def trace_spread(surface: ChartedSurface) -> csr_array:
-    """Return the forces at the trace nodes of unit forces at the pressure nodes: integral of phi_a psi_i / w_i (N, n).
-
-    Where every trace node has a pressure it is the identity: forces act at their node.
-    """
-    shape = (len(surface.s), len(surface.nodes))
-    if surface.pressure_degree == surface.degree:
-        return csr_array((np.ones(shape[1]), (surface.nodes, np.arange(shape[1]))), shape=shape)
-    points, gauss = basix.make_quadrature(basix.CellType.triangle, surface.degree + 1)
-    dual = 4 * tabulate("triangle", 1, points) - 1
-    share = np.einsum("q,qi,qa->ia", gauss / gauss.sum(), dual, surface.shape_functions(points))
-    corners = surface.corners
-    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
-    parts = area[:, None, None] * share
-    spread = _assemble(surface.pressure_facets, surface.facets, parts, (shape[1], shape[0]))
-    return csr_array(_rows_to_one(spread).T)
-
-
 def _assemble(rows: Indices, columns: Indices, parts: Array, shape: tuple[int, int]) -> csr_array:
-    """Add up local matrices (t, k, l) of rows (t, k) and columns (t, l)."""
+    """Add up local matrices (t, k, l) of rows (t, k), negative for none, and columns (t, l)."""
     row = np.broadcast_to(rows[:, :, None], parts.shape).ravel()
     column = np.broadcast_to(columns[:, None, :], parts.shape).ravel()
-    return coo_array((parts.ravel(), (row, column)), shape=shape).tocsr()
+    carries = row >= 0
+    return coo_array((parts.ravel()[carries], (row[carries], column[carries])), shape=shape).tocsr()
 
 
 def _rows_to_one(matrix: csr_array) -> csr_array:

@@ -35,7 +35,7 @@ class SlidingField:
 
     def __post_init__(self) -> None:
         """Raise where it shifts and turns at once: its axis would have to move along."""
-        if self.shift != ZERO and self.turn != ZERO:
+        if ZERO not in (self.shift, self.turn):
             raise CaseError(Problem("motion", "expected a translation or a rotation of the counter-body, not both"))
 
     def rate(self, x: Array, normal: Array) -> Array:

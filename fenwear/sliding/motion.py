@@ -2,7 +2,7 @@
 
 A cycle is a sequence of half-cycles (strokes in one direction), and each half-cycle is cut into equal
 times, one for each position of the strip under the punch. Such a phase has one contact: a direction,
-an offset of the strip, and the sliding that is done there.
+an offset of the strip, and the sliding that is done there. Rotations are counted in rad in place of mm.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.special import beta, betainc
 
 from fenwear.arrays import Array
-from fenwear.case import OneWay, Reciprocating, Tabulated
+from fenwear.case import Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.errors import CaseError, Problem
 
 DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
@@ -193,24 +193,22 @@ class Motion:
         return np.concatenate(rows)
 
 
-def make_motion(description: OneWay | Reciprocating | Tabulated, *, strip_wears: bool = False) -> Motion:
+def make_motion(description: Motions, *, strip_wears: bool = False) -> Motion:
     """Return the motion that the case describes.
 
     Args:
         description: Of the case.
-        strip_wears: Whether the strip wears, so that its positions matter by default.
+        strip_wears: Whether the strip wears and passes under the punch, so that its positions matter by default.
 
     Raises:
         CaseError: it is faster than numbers are large.
     """
-    positions = 1
-    if not isinstance(description, OneWay) and description.axis == "x":
-        positions = description.positions or (DEFAULT_POSITIONS if strip_wears else 1)
-    if isinstance(description, OneWay):
-        direction = 1 if description.direction == "rightward" else -1
-        speed = (description.speed,)
+    if isinstance(description, OneWay | Rotation):
+        forward = description.direction in ("rightward", "counterclockwise")
+        speed = (description.speed if isinstance(description, OneWay) else description.angular_speed,)
         steady = _PiecewiseLinear((0.0, description.duration), speed, speed)
-        return _motion(((direction, 0.0, steady),), 1)
+        return _motion(((1 if forward else -1, 0.0, steady),), 1)
+    positions = description.positions or (DEFAULT_POSITIONS if strip_wears else 1)
     if isinstance(description, Tabulated):
         return _motion(_table_strokes(description), positions)
     stroke, amplitude = _to_and_fro(description), description.amplitude
@@ -247,7 +245,7 @@ def _motion(strokes: tuple[tuple[int, float, _Stroke], ...], positions: int) -> 
     return Motion(tuple(phases), positions, len(strokes), tuple(stroke for _, _, stroke in strokes))
 
 
-def _to_and_fro(description: Reciprocating) -> _Stroke:
+def _to_and_fro(description: Reciprocating | Oscillation) -> _Stroke:
     duration, distance = description.half_period, 2 * description.amplitude
     if description.profile == "sinusoidal":
         return _Sinusoidal(description.amplitude, math.pi / duration)

@@ -221,3 +221,65 @@ def test_msh_that_cannot_be_written(tmp_path: Path) -> None:
     """The path is named."""
     with pytest.raises(CaseError, match=r"nowhere.*cannot be written"):
         write_msh(Geometry(parameters=SMALL), None, tmp_path / "nowhere" / "mesh.msh")
+
+
+SOLID = {"width": 2.0, "depth": 1.5, "punch_height": 0.5, "margin_x": 0.5, "across_x": 2, "across_y": 3}
+
+
+@pytest.mark.parametrize("tetrahedra", [0, 1])
+@pytest.mark.mpi
+def test_contract_of_solids(tetrahedra: int) -> None:
+    """Volumes are regions, surfaces the groups: each with its own size, on any number of ranks."""
+    geometry = Geometry(file="solid_blocks.geo", parameters=SOLID | {"punch_tetrahedra": tetrahedra})
+    punch, strip = build_meshes(geometry, None, MPI.COMM_WORLD, "solid")
+    assert punch.mesh.geometry.dim == strip.mesh.topology.dim == 3
+    assert set(punch.regions) == {"punch_body"}
+    assert integral(punch) == pytest.approx(2 * 1.5 * 0.5, rel=1e-12)
+    assert integral(strip) == pytest.approx(3 * 1.5, rel=1e-12)
+    areas = {"punch_contact": 3, "punch_far": 3, "punch_sides": 1.5, "punch_ends": 2, "strip_contact": 4.5}
+    for name, area in areas.items():
+        assert integral(punch if name in punch.curves else strip, curve=name) == pytest.approx(area, rel=1e-12)
+
+
+def test_own_msh_of_a_solid(tmp_path: Path) -> None:
+    """A .msh of volumes gives the same bodies as its .geo."""
+    geometry = Geometry(file="solid_blocks.geo", parameters=SOLID)
+    write_msh(geometry, None, tmp_path / "own.msh", "solid")
+    punch, strip = build_meshes(Geometry(file="own.msh"), tmp_path, MPI.COMM_SELF, "solid")
+    assert integral(punch) + integral(strip) == pytest.approx(1.5 + 4.5, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "expected"),
+    [
+        (("Recombine Surface{fx[], fy[], fz[]};", "Recombine Surface{fx[], fy[]};"), "solid", "kind Prism"),
+        (("Physical Volume(\"punch_body\")", "Physical Volume(\"body\")"), "solid", "no physical volume named punch_"),
+        (("Physical Surface(\"strip_contact\")", "Physical Surface(\"strip_top\")"), "solid", "no physical surface"),
+        (("Physical Volume", "Physical Volume"), "stress", "expected model.kind = 'solid'"),
+    ],
+)  # fmt: skip
+def test_refused_solids(change: tuple[str, str], kind: str, expected: str, tmp_path: Path) -> None:
+    """What is wrong with groups and elements is told in words."""
+    text = (meshes_folder() / "solid_blocks.geo").read_text("utf-8")
+    assert change[0] in text
+    (tmp_path / "own.geo").write_text(text.replace(*change), "utf-8")
+    with pytest.raises(CaseError) as refused:
+        build_meshes(Geometry(file="own.geo"), tmp_path, MPI.COMM_SELF, kind)  # type: ignore[arg-type]
+    assert expected in str(refused.value)
+
+
+def test_flat_volumes_are_refused(tmp_path: Path) -> None:
+    """Elements whose corners have slipped into one plane are counted."""
+    write_msh(Geometry(file="solid_blocks.geo", parameters={"punch_layers": 1}), None, tmp_path / "own.msh", "solid")
+    lines = (tmp_path / "own.msh").read_text("utf-8").split("\n")
+    corner = lines.index("0.5 0.5 1")
+    lines[corner] = "0.5 0.5 0"  # the upper corner onto the lower one
+    (tmp_path / "own.msh").write_text("\n".join(lines), "utf-8")
+    with pytest.raises(CaseError, match="1 elements that are degenerate or twisted"):
+        build_meshes(Geometry(file="own.msh"), tmp_path, MPI.COMM_SELF, "solid")
+
+
+def test_a_ring_across_its_axis_is_refused() -> None:
+    """In an axisymmetric model x is the radius."""
+    with pytest.raises(CaseError, match="x is the radius"):
+        build_meshes(Geometry(file="blocks.geo"), None, MPI.COMM_SELF, "axisymmetric")

@@ -6,6 +6,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fenwear import CaseError, load_case, make_case
@@ -164,3 +165,45 @@ def test_a_case_is_frozen() -> None:
     case: Any = load_case("example1")
     with pytest.raises(Exception, match="frozen"):
         case.contact.friction = 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "key", "expected"),
+    [
+        ("ball-on-flat", ["punch.loads.0.force=[0, -20]"], "punch.loads.0.force", "3 components (x, y, z)"),
+        ("example1", ["punch.loads.0.force=[0, 0, -20]"], "punch.loads.0.force", "2 components (x, z)"),
+        ("example1", ["punch.pivot=[0, 0, 1]"], "punch.pivot", "2 components"),
+        ("ball-on-flat", ["strip.supports.0={at=[0, 0], fix=['x']}"], "strip.supports.0.at", "3 components"),
+        ("example1", ["strip.supports.0.fix=['y']"], "strip.supports.0.fix.0", "'x' or 'z' in a plane model"),
+        ("ring-on-ring", ["strip.supports.0.fix=['y']"], "strip.supports.0.fix.0", "axisymmetric"),
+        ("ball-on-flat", ["model.thickness='2 mm'"], "model.thickness", "plane models"),
+        ("ring-on-ring", ["model.plane=strain"], "model.plane", "plane models"),
+        ("example1", ["motion={kind='rotation', angular_speed=1, duration=1}"], "motion.kind", "plane model"),
+        ("example1", ["motion.along=[1, 0, 0]"], "motion.along", "belongs to solids"),
+        ("ball-on-flat", ["motion.along=[0, 0, 0]"], "motion.along", "got zero"),
+        ("ball-on-flat", ["motion.axis=y"], "motion.along", "either along or axis"),
+        ("ring-on-ring", ["motion.axis=[1, 0, 1]"], "motion.axis", "axis z"),
+        ("ring-on-ring", ["motion={kind='one-way', direction='leftward', speed=1, duration=1}"], "motion.kind",
+         "rotation or oscillation"),
+        ("pin-on-disc", ["motion.axis=[0, 0, 0]"], "motion.axis", "got zero"),
+        ("pin-on-disc", ["wear.strip.coefficient=1e-9"], "wear.strip", "not followed in solids"),
+        ("ball-on-flat", ["motion.positions=1"], "motion.positions", "2 or more"),
+        ("pin-on-disc", ["materials.brass.poisson=0.5"], "materials.brass.poisson", "in solids"),
+        ("pin-on-disc", ["contact.solver=full", "run.integration=explicit"], "contact.solver", "plane models"),
+        ("pin-on-disc", ["motion.angular_speed='10 mm/s'"], "motion.angular_speed", "another kind"),
+    ],
+)  # fmt: skip
+def test_what_does_not_go_with_the_model(name: str, settings: list[str], key: str, expected: str) -> None:
+    """Plane, axisymmetric and solid models each have their axes, motions and settings."""
+    with pytest.raises(CaseError) as refused:
+        load_case(name, settings)
+    messages = [p.message for p in refused.value.problems if p.key == key]
+    assert any(expected in message for message in messages), str(refused.value)
+
+
+def test_angles_have_units() -> None:
+    """Degrees become radians, and a resolved case reads back as the same one."""
+    motion = "motion={kind='oscillation', amplitude='90 deg', period='1 s', axis=[0, 0, 2]}"
+    case = load_case("pin-on-disc", [motion])
+    assert case.motion.amplitude == pytest.approx(np.pi / 2)  # type: ignore[union-attr]
+    assert make_case(tomllib.loads(case.to_toml())) == case

@@ -1,4 +1,4 @@
-"""Transfer between two surfaces in a chart: dual mortar, wear, and forces on the trace."""
+"""Transfer between two surfaces in a chart: dual mortar and wear."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mortar import transfer_matrix
 
 from fenwear.arrays import Array
 from fenwear.interface.overlap import ChartedSurface, node_areas, overlap, tabulate
-from fenwear.interface.transfer import dual_transfer, trace_spread, wear_transfer
+from fenwear.interface.transfer import dual_transfer, wear_transfer
 
 CELLS = ["triangle", "quadrilateral"]
 QUADS_AND_TRIANGLES = [
@@ -171,24 +171,3 @@ def test_wear(cell1: str, degree1: int, cell2: str, degree2: int) -> None:
     i, k = transfer.nonzero()
     apart = np.linalg.norm(first.s[first.nodes][i] - second.s[second.nodes][k], axis=1)
     assert apart.max() < 2 * size
-
-
-def test_forces_on_quadratic_triangles() -> None:
-    """A unit force at a vertex of one triangle goes to its six nodes in shares known in closed form."""
-    triangle = surface(np.array([[[0.0, 0.0], [2.0, 0.3], [0.4, 1.0]]]), "triangle", 2)
-    found = trace_spread(triangle).toarray()[triangle.facets[0]][:, triangle.pressure_facets[0]]
-    # Vertices, then the middles of the edges opposite them.
-    exact = np.concatenate([np.full((3, 3), -0.2) + 0.6 * np.eye(3), np.full((3, 3), 0.6) - 0.8 * np.eye(3)])
-    np.testing.assert_allclose(found, exact, atol=1e-14)
-
-
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_forces_on_the_trace(degree: int) -> None:
-    """Forces keep their sum and their moments, and do the work of the dual functions on the surface's own trace."""
-    x = np.array([-1.0, -0.2, 0.1, 0.9, 1.0])
-    for charted in (line(x, degree), *(grid(x, x, cell, degree, distort=0.3) for cell in CELLS)):
-        spread = trace_spread(charted)
-        assert spread.shape == (len(charted.s), len(charted.nodes))
-        np.testing.assert_allclose(spread.sum(axis=0), 1, rtol=1e-13)
-        np.testing.assert_allclose(spread.T @ charted.s, charted.s[charted.nodes], atol=1e-13)
-        np.testing.assert_allclose(spread.T.toarray(), dual_transfer(charted, charted).toarray(), atol=1e-12)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fenwear.case import OneWay, Reciprocating, Tabulated
+from fenwear.case import OneWay, Oscillation, Reciprocating, Rotation, Tabulated
+from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion, make_motion
 
 
@@ -92,3 +93,28 @@ def test_table() -> None:
     np.testing.assert_allclose([phase.offset for phase in motion.phases], [0, 2, 0.75, -1.25])
     np.testing.assert_allclose(motion.sliding(), [4, 0, 2.5, 1.5])
     np.testing.assert_allclose(motion.time(np.array([1, 2, 3])), [2, 5, 7])
+
+
+def test_rotation_and_oscillation() -> None:
+    """Angles take the place of lengths: a steady turn, and a stroke of 2 phi0 with the speeds of a translation's."""
+    turn = make_motion(Rotation(kind="rotation", direction="clockwise", angular_speed=4.0, duration=0.5))
+    assert turn.directions == (-1,)
+    assert turn.sliding(2)[0] == pytest.approx(8.0, rel=1e-14)
+    assert turn.reach == 0
+    strokes = {"period": 2.0, "profile": "triangular", "positions": 5}
+    angles = make_motion(Oscillation(kind="oscillation", amplitude=0.3, **strokes))  # type: ignore[arg-type]
+    lengths = make_motion(Reciprocating(kind="reciprocating", amplitude=0.3, **strokes))  # type: ignore[arg-type]
+    assert angles.phases == lengths.phases
+
+
+def test_field_of_a_rotation() -> None:
+    """v = omega x (x - c): its size is the distance from the axis, its direction lies across the arm."""
+    field = SlidingField(turn=(0.0, 0.0, 1.0), centre=(1.0, 0.0, 7.0))
+    x = np.array([[3.0, 0.0, 0.0], [1.0, 4.0, 0.0], [1.0, 0.0, 2.0]])
+    np.testing.assert_allclose(field.rate(x, np.broadcast_to([0.0, 0.0, 1.0], x.shape)), [2, 4, 0], atol=1e-15)
+    normal = np.broadcast_to([0.0, 0.0, 1.0], x.shape)
+    np.testing.assert_allclose(field.direction(x, normal), [[0, 1, 0], [-1, 0, 0], [0, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(field.placement(np.pi / 2).points(x)[0], [1, 2, 0], atol=1e-14)
+    # In a ring, (r, z), the sliding goes out of the plane.
+    ring = SlidingField(turn=(0.0, 0.0, 1.0))
+    np.testing.assert_allclose(ring.direction(np.array([[5.0, 0.0]]), np.array([[0.0, 1.0]])), [[0, 1, 0]])

@@ -1,0 +1,450 @@
+"""Solids and rings: contact on surfaces, transfer between meshes that do not match, rotation, slices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from fenwear import vary
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, assemble
+from fenwear.case import make_case
+from fenwear.cycle import growth_rate, march, steady
+from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
+
+YOUNG, POISSON = 210_000.0, 0.3
+STEEL, RIGID = {"young": YOUNG, "poisson": POISSON}, {"young": 1e6 * YOUNG, "poisson": POISSON}
+MODULUS = YOUNG / (1 - POISSON**2)  # E* of a rigid body on steel, MPa
+ROTATION = {"kind": "rotation", "angular_speed": 1.0, "duration": 1.0}
+
+
+def solve(
+    geometry: Mapping[str, Any],
+    punch: Mapping[str, Any],
+    strip: Mapping[str, Any],
+    *,
+    kind: str = "solid",
+    materials: tuple[Mapping[str, float], Mapping[str, float]] = (STEEL, STEEL),
+    **tables: Any,
+) -> Tribosystem:
+    """Return the system of one material for each body; collective.
+
+    Args:
+        geometry: Table of the case file.
+        punch, strip: Their supports and loads.
+        kind: Of the model.
+        materials: Of punch and strip.
+        tables: Further tables of the case, or others in place of the defaults.
+    """
+    case = {
+        "geometry": geometry,
+        "model": {"kind": kind},
+        "materials": {"of_punch": dict(materials[0]), "of_strip": dict(materials[1])},
+        "punch": {"regions": {"punch_body": "of_punch"}, **punch},
+        "strip": {"regions": {"strip_body": "of_strip"}, **strip},
+        "wear": {"punch": {"coefficient": 0}},
+        "motion": {"kind": "one-way", "direction": "rightward", "speed": 1.0, "duration": 1.0},
+        "run": {"half_cycles": 1},
+        **tables,
+    }
+    return assemble(make_case(case))
+
+
+def middles(body: str) -> list[dict[str, Any]]:
+    """Return the supports of the planes of symmetry of a quarter of solid_blocks.geo."""
+    return [{"on": f"{body}_middle_{axis}", "fix": [axis]} for axis in "xy"]
+
+
+# ------------------------------------------------------------------------------- transfer
+
+
+@verification(
+    "solid-patch",
+    "Patch test: two blocks whose hexahedra and tetrahedra do not match, pressed by 100 MPa",
+    "uniform uniaxial stress, which the elements hold exactly",
+)
+def patch() -> Result:
+    """Uniform pressure whatever the meshes; outer sides are free, the planes of symmetry held.
+
+    Under 100 MPa the rounding of coordinates, 1e-16 mm, is small against what the load closes.
+    """
+    rows: list[Row] = []
+    for punch, strip, degree in (("hexahedra", "tetrahedra", 1), ("hexahedra", "tetrahedra", 2),
+                                 ("tetrahedra", "hexahedra", 2), ("hexahedra", "hexahedra", 3),
+                                 ("tetrahedra", "tetrahedra", 3)):  # fmt: skip
+        sizes = {
+            "quarter": 1,
+            "across_x": 2,
+            "across_y": 3,
+            "strip_across_x": 3,
+            "strip_across_y": 2,
+            "punch_tetrahedra": int(punch == "tetrahedra"),
+            "strip_tetrahedra": int(strip == "tetrahedra"),
+        }
+        system = solve(
+            {"file": "solid_blocks.geo", "degree": degree, "parameters": sizes},
+            {
+                "supports": middles("punch"),
+                "loads": [{"on": "punch_far", "traction": [0, 0, -100]}],
+            },
+            {"supports": [*middles("strip"), {"on": "strip_far", "fix": ["z"]}]},
+        )
+        pair = system.pair
+        p = system.contact((1,)).solve(pair.initial_gap).pressure[0]
+        what = f"{punch} on {strip} of degree {degree}"
+        forces = pair.strip.spread @ pair.strip.weights
+        rows += [
+            profile(f"{what}: forces on the strip's nodes (N)", forces, pair.transfer.T @ pair.weights, 1e-12),
+            profile(f"{what}: pressure (MPa)", np.full(len(p), 100.0), p, 1e-10, scale=100),
+        ]
+    return Result(rows)
+
+
+@verification(
+    "solid-slice",
+    "A solid slice with its sides held is in plane strain",
+    "the plane model on the same mesh, which is verified by itself",
+)
+def slice_of_plane_strain() -> Result:
+    """Pressure with friction, after 20 half-cycles, of the cyclic steady state and of the optimum, along the slice."""
+    depth = 0.7
+    sizes = {"width": 2, "punch_height": 1.5, "strip_height": 1, "punch_layers": 2, "strip_layers": 2, "growth": 1.4}
+    shared: dict[str, Any] = {
+        "contact": {"friction": 0.3},
+        "wear": {"punch": {"coefficient": 2e-7}},
+        "motion": {"kind": "reciprocating", "amplitude": 0.5, "period": 1.0},
+    }
+    flat = solve(
+        {"file": "blocks.geo", "degree": 2, "parameters": {**sizes, "across": 4}},
+        {"supports": [{"on": "punch_sides", "fix": ["x"]}], "loads": [{"on": "punch_far", "force": [0, -100]}]},
+        {"supports": [{"on": "strip_far", "fix": ["x", "z"]}]},
+        **{**shared, "model": {"plane": "strain", "thickness": depth}},
+    )
+    held = {body: {"on": f"{body}_ends", "fix": ["y"]} for body in ("punch", "strip")}
+    solid = solve(
+        {
+            "file": "solid_blocks.geo",
+            "degree": 2,
+            "parameters": {**sizes, "depth": depth, "across_x": 4, "across_y": 1},
+        },
+        {
+            "supports": [{"on": "punch_sides", "fix": ["x"]}, held["punch"]],
+            "loads": [{"on": "punch_far", "force": [0, 0, -100]}],
+        },
+        {"supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}, held["strip"]]},
+        **shared,
+    )
+    node = np.searchsorted(flat.pair.x, solid.pair.x - 1e-9)
+    rows: list[Row] = []
+    compared: dict[str, Callable[[Tribosystem], Array]] = {
+        "contact, rightward": lambda s: s.contact((1,)).solve(s.pair.initial_gap).pressure[0],
+        "after 20 half-cycles": lambda s: list(march(s, 20))[-1].pressure[-1],
+        "cyclic steady state": lambda s: steady(s).pressure[0],
+        "optimum": lambda s: s.optimum(1).pressure,
+    }
+    for name, pressure in compared.items():
+        exact = pressure(flat)
+        rows.append(profile(f"{name}: pressure (MPa)", exact[node], pressure(solid), 1e-9, scale=exact.max()))
+    rates = [growth_rate(s, steady(s).phase_pressure) for s in (flat, solid)]
+    rows.append(number("rate of the slowest disturbance (1/s)", rates[0], rates[1], 1e-8))
+    return Result(rows)
+
+
+# --------------------------------------------------------------------------- indentation
+
+
+@cache
+def quarter(elements: int, degree: int, *, tetrahedra: bool = False) -> Tribosystem:
+    """Return a quarter of a rigid body, on a square of 0.23 mm, on a steel block ten times as wide; collective."""
+    width, far, finer = 0.46, 2.4, elements / 4
+    sizes = {
+        "quarter": 1,
+        "width": width,
+        "depth": width,
+        "margin_x": far,
+        "margin_y": far,
+        "margin_elements": round(4 * finer),
+        "spread": 2.5 ** (1 / finer),
+        "across_x": elements,
+        "across_y": elements,
+        "punch_height": width / 2,
+        "punch_layers": 1,
+        "strip_height": far,
+        "strip_layers": round(6 * finer),
+        "growth": 2.1 ** (1 / finer),
+        "punch_tetrahedra": int(tetrahedra),
+        "strip_tetrahedra": int(tetrahedra),
+    }
+    return solve(
+        {"file": "solid_blocks.geo", "degree": degree, "parameters": sizes},
+        {"supports": middles("punch"), "loads": [{"on": "punch_far", "force": [0, 0, -1]}]},
+        {"supports": [*middles("strip"), {"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        materials=(RIGID, STEEL),
+    )
+
+
+def indent(system: Tribosystem, load: float, radii: tuple[float, float]) -> tuple[Array, Array]:
+    """Return the nodes (n, 3) and the pressure of a body with the gap x²/2R1 + y²/2R2 under a load, N."""
+    loaded = vary(system, f"punch.loads=[{{on='punch_far', force=[0, 0, {-load / 4!r}]}}]")
+    x = loaded.pair.punch.x
+    gap = x[:, 0] ** 2 / (2 * radii[0]) + x[:, 1] ** 2 / (2 * radii[1])
+    return x, loaded.contact((1,)).solve(gap).pressure[0]
+
+
+def hertz(x: Array, axes: tuple[float, float], peak: float) -> Array:
+    """Return p0 sqrt(1 - x²/a² - y²/b²), MPa."""
+    square = 1 - (x[:, 0] / axes[0]) ** 2 - (x[:, 1] / axes[1]) ** 2
+    return np.asarray(peak * np.sqrt(np.maximum(square, 0)))
+
+
+@verification(
+    "solid-hertz",
+    "Hertz: a rigid sphere and a rigid ellipsoid on steel",
+    "K. L. Johnson, Contact Mechanics, 1985, sections 4.2(a) and (c)",
+)
+def sphere() -> Result:
+    """The sphere R = 10: p0³ = 6 P E*² / (pi³ R²); radii 10 and 5: half-axes 0.20800, 0.13116 at P = 200 N.
+
+    Both are the contacts of two steel bodies under half the load, as a rigid one makes E* twice as large.
+    """
+    load, rows = 200.0, list[Row]()
+    a = (3 * load * 10 / (4 * MODULUS)) ** (1 / 3)
+    peak = 3 * load / (2 * np.pi * a**2)
+    ellipse, ellipse_peak = (0.2080002, 0.1311640), 2 * 1750.100
+    plots = []
+    for elements, degree, tetrahedra in ((12, 1, False), (6, 2, False), (6, 2, True)):
+        system = quarter(elements, degree, tetrahedra=tetrahedra)
+        x, p = indent(system, load, (10.0, 10.0))
+        exact, inside = hertz(x, (a, a), peak), np.hypot(x[:, 0], x[:, 1]) < 0.8 * a
+        what = f"{'tetrahedra' if tetrahedra else 'hexahedra'} of degree {degree}, {elements} over the quarter"
+        rows += [
+            number(f"sphere, {what}: largest pressure p0 (MPa)", peak, p.max(), 0.02),
+            profile(f"sphere, {what}: pressure for r < 0.8 a (MPa)", exact[inside], p[inside], 0.02, scale=peak),
+            number(f"sphere, {what}: force (N)", load / 4, p @ system.pair.weights, 1e-11),
+        ]
+        shown = np.argsort(np.hypot(x[:, 0], x[:, 1]))
+        r, dense = np.hypot(x[:, 0], x[:, 1]), np.linspace(0, 1.3 * a, 300)
+        lines = [
+            Line("Hertz", dense, peak * np.sqrt(np.maximum(1 - (dense / a) ** 2, 0)), reference=True),
+            Line("fenwear", r[shown], p[shown]),
+        ]
+        plots.append(Plot(f"Sphere on a flat, {what}", "r (mm)", "pressure (MPa)", lines))
+        x, p = indent(system, load, (10.0, 5.0))
+        exact = hertz(x, ellipse, ellipse_peak)
+        inside = exact > 0.6 * ellipse_peak
+        rows += [
+            number(f"ellipsoid, {what}: largest pressure p0 (MPa)", ellipse_peak, p.max(), 0.02),
+            profile(f"ellipsoid, {what}: pressure (MPa)", exact[inside], p[inside], 0.04, scale=ellipse_peak),
+        ]
+    errors = [sphere_error(elements) for elements in (6, 12)]
+    # The pressure's slope is infinite at the edge: the order is 1 whatever the elements' degree.
+    rows.append(order("sphere, hexahedra of degree 1: order of the L2 error, mean of four loads", 1, errors, 0.5))
+    return Result(rows, plots)
+
+
+def sphere_error(elements: int) -> float:
+    """Return the L2 error of the pressure under the sphere over that of the pressure, the mean of four loads."""
+    system, found = quarter(elements, 1), []
+    for load in (90.0, 120.0, 160.0, 200.0):
+        a = (3 * load * 10 / (4 * MODULUS)) ** (1 / 3)
+        x, p = indent(system, load, (10.0, 10.0))
+        exact = hertz(x, (a, a), 3 * load / (2 * np.pi * a**2))
+        found.append(np.sqrt(system.pair.weights @ (p - exact) ** 2 / (system.pair.weights @ exact**2)))
+    return float(np.mean(found))
+
+
+# ---------------------------------------------------------------------------------- rings
+
+
+@cache
+def ring(inner: float, across: int = 16, degree: int = 3, friction: float = 0.2) -> Tribosystem:
+    """Return a rigid ring, or a disc, of outer radius 1 under 1,000 N on a steel body of 60 mm; collective."""
+    sizes = {
+        "inner_radius": inner,
+        "outer_radius": 1,
+        "margin_inside": inner,
+        "margin_outside": 60,
+        "margin_elements": 26,
+        "spread": 1.4,
+        "across": across,
+        "edge_grading": 12,
+        "punch_height": 1,
+        "strip_height": 60,
+        "strip_layers": 22,
+        "growth": 1.45,
+    }
+    return solve(
+        {"file": "rings.geo", "degree": degree, "parameters": sizes},
+        {"loads": [{"on": "punch_far", "force": [0, -1000]}]},
+        {"supports": [{"on": "strip_far", "fix": ["x", "z"]}]},
+        kind="axisymmetric",
+        materials=(RIGID, STEEL),
+        contact={"friction": friction},
+        wear={"punch": {"coefficient": 0.02 / MODULUS}},
+        motion=ROTATION,
+    )
+
+
+def decay_rates(system: Tribosystem, speed: Array) -> Array:
+    """Return the rates at which pressure disturbances decay by wear k p v, ascending, in E* k.
+
+    On closed contact S p' + H a' = -k v p with the equilibrium of p' (full contact, no friction in S).
+    """
+    rigid = system.rigid
+    n, r = rigid.rigid_normal.shape
+    matrix = np.zeros((n + r, n + r))
+    matrix[:n, :n] = system.interface.compliance(0.0) * MODULUS
+    matrix[:n, n:] = rigid.rigid_normal
+    matrix[n:, :n] = rigid.equilibrium(0.0)
+    values = np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n] * speed).real
+    return np.sort(values[values > 1e-6 * values.max()])
+
+
+@verification(
+    "round-punch",
+    "A flat round punch and an annular one: pressure, and its decay by wear",
+    "Boussinesq; Galin and Goryacheva: 2.0606500, 3.6710391; annular rates by a spectral solution of the half-space",
+)
+def round_punch() -> Result:
+    """Pressure P / (2 pi a sqrt(a² - r²)); rates in E* k V / a of a translation and of a turn about the axis."""
+    system = ring(0.0)
+    r, p = system.pair.x, system.contact((1,)).solve(system.pair.initial_gap).pressure[0]
+    exact = 1000 / (2 * np.pi * np.sqrt(np.maximum(1 - r**2, 1e-12)))
+    inside = r < 0.8
+    rows = [profile("disc: pressure for r < 0.8 a (MPa)", exact[inside], p[inside], 3e-3, scale=exact[inside])]
+    one = np.ones(len(r))
+    for k, (rate, found) in enumerate(zip((2.0606500, 3.6710391), decay_rates(system, one), strict=False)):
+        rows.append(number(f"disc, translation: symmetric mode {k + 1} (E* k V/a)", rate, found, 2e-3))
+    annular = ring(0.5)
+    turning = annular.sliding.field.rate(annular.pair.punch.x, annular.pair.normal)
+    for name, speed, rates in (
+        ("translation", np.ones(len(turning)), (3.91876, 6.9196)),
+        ("turn about the axis", turning, (2.74886, 4.9628)),
+    ):
+        for k, (rate, found) in enumerate(zip(rates, decay_rates(annular, speed), strict=False)):
+            rows.append(number(f"r1/r2 = 0.5, {name}: symmetric mode {k + 1} (E* k V/r2)", rate, found, 1e-3))
+    step = 0.02  # E* k of a half-cycle of 1 rad
+    growth = growth_rate(annular, annular.optimum(1).pressure[None])
+    rows.append(number("r1/r2 = 0.5, turn: growth rate (E* k V/r2)", 2.74886, np.expm1(-growth) / step, 1e-3))
+    dense = np.linspace(0, 0.99, 300)
+    lines = [
+        Line("exact", dense, 1000 / (2 * np.pi * np.sqrt(1 - dense**2)), reference=True),
+        Line("fenwear", r[r < 0.99], p[r < 0.99]),
+    ]
+    return Result(rows, [Plot("Flat round punch: pressure", "r (mm)", "pressure (MPa)", lines)])
+
+
+@verification(
+    "rotation",
+    "A ring and a pad on a turning disc: steady pressure, worn volume",
+    "p r = constant where all wears evenly; volume rate = beta~ omega torque / mu",
+)
+def rotation() -> Result:
+    """P = F / (2 pi (r2 - r1) r) of a ring, from the optimum and from a march; a pad of 60 degrees with b = 1 and 2."""
+    system = ring(0.5, friction=0.2)
+    r, weights = system.pair.x, system.pair.weights
+    exact = 1000 / (2 * np.pi * 0.5 * r)
+    found = steady(system)
+    blocks = list(march(system, 200, implicit=True))
+    pressure = np.concatenate([block.pressure for block in blocks])
+    torque = 0.2 * pressure @ (weights * r)
+    depth = np.diff(np.concatenate([block.wear for block in blocks]), axis=0) @ weights
+    rate = 0.02 / MODULUS  # beta~ omega of a half-cycle
+    rows = [
+        profile("ring, optimum: pressure (MPa)", exact, system.optimum(1).pressure, 1e-10, scale=exact),
+        profile("ring, steady state: pressure (MPa)", exact, found.pressure[0], 1e-10, scale=exact),
+        profile("ring, marched: pressure (MPa)", exact, pressure[-1], 1e-3, scale=exact),
+        profile("ring, marched: volume in each half-cycle (mm³)", rate * torque[1:] / 0.2, depth, 1e-9,
+                scale=rate * torque[-1] / 0.2),
+    ]  # fmt: skip
+    both = vary(system, f"wear.strip.coefficient={0.01 / MODULUS!r}")
+    rows.append(profile("ring, both wear: pressure (MPa)", exact, steady(both).pressure[0], 1e-9, scale=exact))
+    for b, inside, outside in ((1.0, 1.9894368, 1.1936621), (2.0, 1.7274554, 1.3380812)):
+        turning = pad(b)
+        x = turning.pair.punch.x
+        r, optimum = np.hypot(x[:, 0], x[:, 1]), turning.optimum(1)
+        state = steady(turning)
+        for radius, value in ((60, inside), (100, outside)):
+            there = np.abs(r - radius) < 1e-3
+            what = f"pad, b = {b:g}: pressure at r = {radius} mm (MPa)"
+            rows.append(profile(what, np.full(there.sum(), value), optimum.pressure[there], 1e-5, scale=value))
+        rows.append(profile(f"pad, b = {b:g}, steady state: pressure (MPa)", optimum.pressure, state.pressure[0], 1e-9))
+        if b == 1:
+            torque = 0.35 * (optimum.pressure * r) @ turning.pair.weights
+            rows += [
+                number("pad: torque (N mm)", 140_000, torque, 1e-5),
+                number("pad: rate of approach (mm/s)", 1.1936621e-5, optimum.velocity["lambda_F"], 1e-5),
+            ]
+    return Result(rows)
+
+
+def pad(b: float = 1.0, **tables: Any) -> Tribosystem:
+    """Return the annular sector r 60..100 mm, 60 degrees, F = 5,000 N, on a disc that turns; collective."""
+    return solve(
+        {"file": "pad_on_disc.geo", "degree": 2, "order": 2},
+        {
+            "supports": [{"on": "punch_sides", "fix": ["x", "y"]}],
+            "loads": [{"on": "punch_far", "force": [0, 0, -5000]}],
+        },
+        {"supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        materials=({"young": 1000.0, "poisson": 0.25}, STEEL),
+        **{
+            "contact": {"friction": 0.35},
+            "wear": {"punch": {"coefficient": 1e-8, "pressure_exponent": b}},
+            "motion": {"kind": "rotation", "angular_speed": 10.0, "duration": 1.0},
+            **tables,
+        },
+    )
+
+
+@verification(
+    "solid-volume",
+    "Worn volumes of both solids, sliding to and fro and turning to and fro",
+    "beta~ F 2 u0 in a translation; beta~ 2 phi0 times the integral of p r in a rotation",
+)
+def volumes() -> Result:
+    """Blocks that slide askew over nodes that do not match, and the pad on a disc that oscillates; both bodies wear."""
+    rows: list[Row] = []
+    rates = {"punch": 1e-6, "strip": 5e-7}
+    wear = {body: {"coefficient": rate} for body, rate in rates.items()}
+    run, amplitude = {"half_cycles": 4}, 0.05
+    sizes = {"margin_x": 0.3, "margin_y": 0.3, "margin_elements": 1, "across_x": 2, "across_y": 3, "strip_across_x": 3}
+    for tetrahedra in (0, 1):
+        blocks = solve(
+            {"file": "solid_blocks.geo", "degree": 2, "parameters": {**sizes, "strip_tetrahedra": tetrahedra}},
+            {
+                "supports": [{"on": "punch_sides", "fix": ["x", "y"]}],
+                "loads": [{"on": "punch_far", "force": [0, 0, -100]}],
+            },
+            {"supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+            contact={"friction": 0.2},
+            wear=wear,
+            motion={"kind": "reciprocating", "amplitude": amplitude, "period": 1.0, "along": [3, 4, 0], "positions": 3},
+            run=run,
+        )
+        last = list(march(blocks, 4))[-1]
+        for body, surface, depth in (
+            ("punch", blocks.pair.weights, last.wear[-1]),
+            ("strip", blocks.pair.strip.weights, last.wear_strip[-1]),
+        ):
+            exact = rates[body] * 100 * 2 * amplitude * 4
+            kind = ("hexahedra", "tetrahedra")[tetrahedra]
+            rows.append(number(f"blocks on {kind}: volume of the {body} (mm³)", exact, surface @ depth, 1e-9))
+    angle = 0.1
+    turning = {"kind": "oscillation", "amplitude": angle, "period": 1.0}
+    alone = pad(wear={"punch": wear["punch"]}, motion=turning, run=run)
+    x = alone.pair.punch.x
+    last = list(march(alone, 4))[-1]
+    exact = rates["punch"] * 2 * angle * (last.pressure @ (alone.pair.weights * np.hypot(x[:, 0], x[:, 1]))).sum()
+    rows.append(number("pad alone: volume (mm³)", exact, alone.pair.weights @ last.wear[-1], 1e-12))
+    both = pad(wear=wear, motion={**turning, "positions": 3}, run=run)
+    last = list(march(both, 4))[-1]
+    worn = both.pair.weights @ last.wear[-1]
+    rows.append(
+        number("pad and disc: volume of the disc (mm³)", worn / 2, both.pair.strip.weights @ last.wear_strip[-1], 1e-12)
+    )
+    rows.append(number("pad and disc: volume of the pad (mm³)", exact, worn, 1e-3))
+    return Result(rows)

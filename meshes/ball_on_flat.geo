@@ -1,0 +1,181 @@
+// A ball on a flat: the lower cap of a ball, cut square, and a block. Structured hexahedra, finest at the contact.
+//
+// Lengths in mm; x and y from the middle, z up from the contact. The ball touches the flat in one point.
+// Physical groups: every name starts with the body it belongs to, punch_ (the ball) or strip_ (the flat).
+
+DefineConstant[
+  radius = 5,
+  contact_width = 0.4,    // side of the square in which the surfaces may touch
+  ball_margin = 0.6,      // by which the ball goes on beyond it on each side
+  ball_height = 0.8,
+  flat_length = 4,        // along x
+  flat_width = 4,         // along y
+  flat_height = 1.6,
+  stroke = 0.1,           // by which the square is longer along x on the flat, on each side
+  across = 8,             // elements over the square
+  stroke_elements = 2,    // over the stroke on each side of it
+  margin_elements = 2,    // over each margin
+  ball_layers = 4,        // elements over the height
+  flat_layers = 5,
+  growth = 2              // of an element's height over that of its neighbour towards the contact
+];
+
+If(radius <= 0 || contact_width <= 0 || ball_margin <= 0 || ball_height <= 0 || flat_height <= 0 || stroke < 0)
+  Error("lengths must be positive");
+EndIf
+If(contact_width / 2 + ball_margin >= 0.7 * radius)
+  Error("contact_width / 2 + ball_margin must be less than 0.7 radius");
+EndIf
+If(radius - Sqrt(radius^2 - 2 * (contact_width / 2 + ball_margin)^2) >= 0.8 * ball_height)
+  Error("ball_height must be larger: the cap's corners come too near to its top");
+EndIf
+If(flat_length <= contact_width + 2 * stroke || flat_width <= contact_width)
+  Error("flat_length and flat_width must be larger than the square that the ball sweeps");
+EndIf
+If(across < 1 || stroke_elements < 1 || margin_elements < 1 || ball_layers < 1 || flat_layers < 1 || growth <= 0)
+  Error("across, stroke_elements, margin_elements, ball_layers and flat_layers must be at least 1, growth positive");
+EndIf
+
+heights[] = {ball_height, -flat_height};
+layers[] = {ball_layers, flat_layers};
+h = contact_width / 2;
+centre = newp; Point(centre) = {0, 0, radius};
+For body In {0 : 1}
+  // Lines of the grid along x and y, the elements between them and the ratio of their sizes.
+  x[] = {}; y[] = {}; nx[] = {}; ny[] = {}; grade_x[] = {}; grade_y[] = {};
+  If(body == 0)
+    x[] = {-h - ball_margin, -h, h, h + ball_margin}; y[] = x[];
+    nx[] = {margin_elements, across, margin_elements}; ny[] = nx[];
+    grade_x[] = {1 / growth, 1, growth}; grade_y[] = grade_x[];
+  Else
+    If(stroke > 0)
+      x[] = {-flat_length / 2, -h - stroke, -h, h, h + stroke, flat_length / 2};
+      nx[] = {margin_elements, stroke_elements, across, stroke_elements, margin_elements};
+      grade_x[] = {1 / growth, 1, 1, 1, growth};
+    Else
+      x[] = {-flat_length / 2, -h, h, flat_length / 2};
+      nx[] = {margin_elements, across, margin_elements}; grade_x[] = {1 / growth, 1, growth};
+    EndIf
+    y[] = {-flat_width / 2, -h, h, flat_width / 2};
+    ny[] = {margin_elements, across, margin_elements}; grade_y[] = {1 / growth, 1, growth};
+  EndIf
+  mx = #x[]; my = #y[];
+
+  // Points, lines along x, y and z, faces and volumes by their place in the grid.
+  p[] = {}; lx[] = {}; ly[] = {}; lz[] = {}; fx[] = {}; fy[] = {}; fz[] = {}; volumes~{body}[] = {};
+  For k In {0 : 1}
+    For j In {0 : my - 1}
+      For i In {0 : mx - 1}
+        n = newp; Point(n) = {x[i], y[j], (k == 1) ? heights[body] : (body == 1) ? 0 : radius - Sqrt(radius^2 - x[i]^2 - y[j]^2)};
+        p[] += n;
+      EndFor
+    EndFor
+  EndFor
+  For k In {0 : 1}
+    For j In {0 : my - 1}
+      For i In {0 : mx - 2}
+        l = newl;
+        If(body == 0 && k == 0)    // in the plane y = y_j a circle about the ball's centre line
+          n = newp; Point(n) = {0, y[j], radius};
+          Circle(l) = {p[i + mx * j], n, p[i + 1 + mx * j]};
+        Else
+          Line(l) = {p[i + mx * (j + my * k)], p[i + 1 + mx * (j + my * k)]};
+        EndIf
+        Transfinite Curve{l} = nx[i] + 1 Using Progression grade_x[i];
+        lx[] += l;
+      EndFor
+    EndFor
+    For j In {0 : my - 2}
+      For i In {0 : mx - 1}
+        l = newl;
+        If(body == 0 && k == 0)
+          n = newp; Point(n) = {x[i], 0, radius};
+          Circle(l) = {p[i + mx * j], n, p[i + mx * (j + 1)]};
+        Else
+          Line(l) = {p[i + mx * (j + my * k)], p[i + mx * (j + 1 + my * k)]};
+        EndIf
+        Transfinite Curve{l} = ny[j] + 1 Using Progression grade_y[j];
+        ly[] += l;
+      EndFor
+    EndFor
+  EndFor
+  For j In {0 : my - 1}
+    For i In {0 : mx - 1}
+      l = newl; Line(l) = {p[i + mx * j], p[i + mx * (j + my)]};
+      Transfinite Curve{l} = layers[body] + 1 Using Progression growth;
+      lz[] += l;
+    EndFor
+  EndFor
+  For k In {0 : 1}
+    For j In {0 : my - 2}
+      For i In {0 : mx - 2}
+        a = lx[i + (mx - 1) * (j + my * k)]; b = ly[i + 1 + mx * (j + (my - 1) * k)];
+        c = lx[i + (mx - 1) * (j + 1 + my * k)]; d = ly[i + mx * (j + (my - 1) * k)];
+        n = newll; Curve Loop(n) = {a, b, -c, -d};
+        s = news;
+        If(body == 0 && k == 0)
+          Surface(s) = {n} In Sphere {centre};
+        Else
+          Plane Surface(s) = {n};
+        EndIf
+        fz[] += s;
+      EndFor
+    EndFor
+  EndFor
+  For j In {0 : my - 1}
+    For i In {0 : mx - 2}
+      n = newll;
+      Curve Loop(n) = {lx[i + (mx - 1) * j], lz[i + 1 + mx * j], -lx[i + (mx - 1) * (j + my)], -lz[i + mx * j]};
+      s = news; Plane Surface(s) = {n};
+      fy[] += s;
+    EndFor
+  EndFor
+  For j In {0 : my - 2}
+    For i In {0 : mx - 1}
+      n = newll;
+      Curve Loop(n) = {ly[i + mx * j], lz[i + mx * (j + 1)], -ly[i + mx * (j + my - 1)], -lz[i + mx * j]};
+      s = news; Plane Surface(s) = {n};
+      fx[] += s;
+    EndFor
+  EndFor
+  For j In {0 : my - 2}
+    For i In {0 : mx - 2}
+      n = newsl;
+      Surface Loop(n) = {fz[i + (mx - 1) * j], fz[i + (mx - 1) * (j + my - 1)], fy[i + (mx - 1) * j],
+                         fy[i + (mx - 1) * (j + 1)], fx[i + mx * j], fx[i + 1 + mx * j]};
+      v = newv; Volume(v) = {n};
+      volumes~{body}[] += v;
+    EndFor
+  EndFor
+  Transfinite Surface{fx[], fy[], fz[]};
+  Transfinite Volume{volumes~{body}[]};
+  Recombine Surface{fx[], fy[], fz[]};
+  cells = (mx - 1) * (my - 1);
+  contact~{body}[] = {fz[{0 : cells - 1}]};
+  far~{body}[] = {fz[{cells : 2 * cells - 1}]};
+  sides~{body}[] = {}; ends~{body}[] = {};
+  For i In {0 : mx - 2}
+    sides~{body}[] += {fy[i], fy[i + (mx - 1) * (my - 1)]};
+  EndFor
+  For j In {0 : my - 2}
+    ends~{body}[] += {fx[mx * j], fx[mx - 1 + mx * j]};
+  EndFor
+  If(body == 0)
+    contact~{body}[] = {fz[4]};
+  Else
+    contact~{body}[] = {};
+    For i In {1 : mx - 3}
+      contact~{body}[] += {fz[i + (mx - 1)]};
+    EndFor
+  EndIf
+EndFor
+
+Physical Volume("punch_body") = volumes_0[];
+Physical Surface("punch_contact") = contact_0[];
+Physical Surface("punch_top") = far_0[];
+Physical Surface("punch_sides") = {sides_0[], ends_0[]};
+Physical Volume("strip_body") = volumes_1[];
+Physical Surface("strip_contact") = contact_1[];
+Physical Surface("strip_bottom") = far_1[];
+Physical Surface("strip_sides") = sides_1[];
+Physical Surface("strip_ends") = ends_1[];

@@ -1,0 +1,156 @@
+// A pad on a disc: an annular sector on a larger one, of which the rest of the disc is left out. Structured hexahedra.
+//
+// Lengths in mm, angles in degrees; the disc turns about z, the pad's middle lies on x, z up from the contact.
+// Physical groups: every name starts with the body it belongs to, punch_ (the pad) or strip_ (the disc).
+
+DefineConstant[
+  inner_radius = 60,      // of the pad
+  outer_radius = 100,
+  angle = 60,             // of the pad, below 120
+  pad_height = 12,
+  disc_height = 12,
+  margin = 20,            // by which the disc is wider on each side, below inner_radius
+  margin_angle = 20,      // by which it goes on beyond the pad's ends
+  across = 4,             // elements over the pad's width
+  along = 6,              // elements over the pad's length
+  margin_elements = 2,    // over each margin
+  pad_layers = 2,         // elements over the height
+  disc_layers = 2,
+  growth = 1              // of an element's height over that of its neighbour towards the contact
+];
+
+If(inner_radius <= 0 || outer_radius <= inner_radius || pad_height <= 0 || disc_height <= 0)
+  Error("expected 0 < inner_radius < outer_radius, and positive heights");
+EndIf
+If(angle <= 0 || angle >= 120 || margin_angle < 0 || margin_angle >= 120)
+  Error("angle must lie between 0 and 120, margin_angle between 0 and 120");
+EndIf
+If(margin < 0 || margin >= inner_radius)
+  Error("margin must lie between 0 and inner_radius");
+EndIf
+If(across < 1 || along < 1 || margin_elements < 1 || pad_layers < 1 || disc_layers < 1 || growth <= 0)
+  Error("across, along, margin_elements, pad_layers and disc_layers must be at least 1, growth positive");
+EndIf
+
+heights[] = {pad_height, -disc_height};
+layers[] = {pad_layers, disc_layers};
+levels[] = {0, pad_height, -disc_height};
+o[] = {};
+For k In {0 : 2}
+  n = newp; Point(n) = {0, 0, levels[k]};
+  o[] += n;
+EndFor
+For body In {0 : 1}
+  // Radii and angles of the grid, and the elements between them.
+  x[] = {}; y[] = {}; nx[] = {}; ny[] = {};
+  If(body == 1 && margin > 0)
+    x[] += {inner_radius - margin}; nx[] += margin_elements;
+  EndIf
+  x[] += {inner_radius, outer_radius}; nx[] += across;
+  If(body == 1 && margin > 0)
+    x[] += {outer_radius + margin}; nx[] += margin_elements;
+  EndIf
+  If(body == 1 && margin_angle > 0)
+    y[] += {-angle / 2 - margin_angle}; ny[] += margin_elements;
+  EndIf
+  y[] += {-angle / 2, angle / 2}; ny[] += along;
+  If(body == 1 && margin_angle > 0)
+    y[] += {angle / 2 + margin_angle}; ny[] += margin_elements;
+  EndIf
+  mx = #x[]; my = #y[];
+
+  // Points, lines along the radius, the circumference and z, faces and volumes by their place in the grid.
+  p[] = {}; lx[] = {}; ly[] = {}; lz[] = {}; fx[] = {}; fy[] = {}; fz[] = {}; volumes~{body}[] = {};
+  For k In {0 : 1}
+    For j In {0 : my - 1}
+      For i In {0 : mx - 1}
+        n = newp; Point(n) = {x[i] * Cos(y[j] * Pi / 180), x[i] * Sin(y[j] * Pi / 180), k * heights[body]};
+        p[] += n;
+      EndFor
+    EndFor
+  EndFor
+  For k In {0 : 1}
+    For j In {0 : my - 1}
+      For i In {0 : mx - 2}
+        l = newl; Line(l) = {p[i + mx * (j + my * k)], p[i + 1 + mx * (j + my * k)]};
+        Transfinite Curve{l} = nx[i] + 1;
+        lx[] += l;
+      EndFor
+    EndFor
+    For j In {0 : my - 2}
+      For i In {0 : mx - 1}
+        l = newl;
+        Circle(l) = {p[i + mx * (j + my * k)], o[k * (1 + body)], p[i + mx * (j + 1 + my * k)]};
+        Transfinite Curve{l} = ny[j] + 1;
+        ly[] += l;
+      EndFor
+    EndFor
+  EndFor
+  For j In {0 : my - 1}
+    For i In {0 : mx - 1}
+      l = newl; Line(l) = {p[i + mx * j], p[i + mx * (j + my)]};
+      Transfinite Curve{l} = layers[body] + 1 Using Progression growth;
+      lz[] += l;
+    EndFor
+  EndFor
+  For k In {0 : 1}
+    For j In {0 : my - 2}
+      For i In {0 : mx - 2}
+        a = lx[i + (mx - 1) * (j + my * k)]; b = ly[i + 1 + mx * (j + (my - 1) * k)];
+        c = lx[i + (mx - 1) * (j + 1 + my * k)]; d = ly[i + mx * (j + (my - 1) * k)];
+        n = newll; Curve Loop(n) = {a, b, -c, -d};
+        s = news; Plane Surface(s) = {n};
+        fz[] += s;
+      EndFor
+    EndFor
+  EndFor
+  For j In {0 : my - 1}
+    For i In {0 : mx - 2}
+      n = newll;
+      Curve Loop(n) = {lx[i + (mx - 1) * j], lz[i + 1 + mx * j], -lx[i + (mx - 1) * (j + my)], -lz[i + mx * j]};
+      s = news; Plane Surface(s) = {n};
+      fy[] += s;
+    EndFor
+  EndFor
+  For j In {0 : my - 2}
+    For i In {0 : mx - 1}
+      n = newll;
+      Curve Loop(n) = {ly[i + mx * j], lz[i + mx * (j + 1)], -ly[i + mx * (j + my - 1)], -lz[i + mx * j]};
+      s = news; Surface(s) = {n};
+      fx[] += s;
+    EndFor
+  EndFor
+  For j In {0 : my - 2}
+    For i In {0 : mx - 2}
+      n = newsl;
+      Surface Loop(n) = {fz[i + (mx - 1) * j], fz[i + (mx - 1) * (j + my - 1)], fy[i + (mx - 1) * j],
+                         fy[i + (mx - 1) * (j + 1)], fx[i + mx * j], fx[i + 1 + mx * j]};
+      v = newv; Volume(v) = {n};
+      volumes~{body}[] += v;
+    EndFor
+  EndFor
+  Transfinite Surface{fx[], fy[], fz[]};
+  Transfinite Volume{volumes~{body}[]};
+  Recombine Surface{fx[], fy[], fz[]};
+  cells = (mx - 1) * (my - 1);
+  contact~{body}[] = {fz[{0 : cells - 1}]};
+  far~{body}[] = {fz[{cells : 2 * cells - 1}]};
+  sides~{body}[] = {}; ends~{body}[] = {};
+  For i In {0 : mx - 2}
+    ends~{body}[] += {fy[i], fy[i + (mx - 1) * (my - 1)]};
+  EndFor
+  For j In {0 : my - 2}
+    sides~{body}[] += {fx[mx * j], fx[mx - 1 + mx * j]};
+  EndFor
+EndFor
+
+Physical Volume("punch_body") = volumes_0[];
+Physical Surface("punch_contact") = contact_0[];
+Physical Surface("punch_far") = far_0[];
+Physical Surface("punch_sides") = sides_0[];      // the inner and the outer one
+Physical Surface("punch_ends") = ends_0[];        // across the sliding
+Physical Volume("strip_body") = volumes_1[];
+Physical Surface("strip_contact") = contact_1[];
+Physical Surface("strip_far") = far_1[];
+Physical Surface("strip_sides") = sides_1[];
+Physical Surface("strip_ends") = ends_1[];

@@ -1,0 +1,54 @@
+"""Solids and rings from a case to their contact: what only the geometry tells is refused in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, Tribosystem, load_case
+from fenwear.assembly import place_case
+
+COARSE = ("geometry.degree=1", "geometry.order=1")
+
+
+def test_an_axis_that_is_none_of_the_disc() -> None:
+    """Turned about x in place, the disc's face would leave the pin."""
+    with pytest.raises(CaseError, match=r"motion\.axis: the strip's contact surface is none of revolution"):
+        place_case(load_case("pin-on-disc", [*COARSE, "motion.axis=[1, 0, 0]"]))
+
+
+def test_nothing_wears_on_the_axis_itself() -> None:
+    """A pin that turns on its own axis has no pressure that wears it evenly."""
+    placed = place_case(load_case("pin-on-disc", [*COARSE, "geometry.parameters.track_radius=0",
+                                                  "geometry.parameters.around=2"]))  # fmt: skip
+    with pytest.raises(CaseError, match=r"motion\.centre: lies within the contact"):
+        placed.optimum(1)
+
+
+def test_a_ball_that_leaves_its_flat() -> None:
+    """The message names the motion and how far the strip reaches."""
+    with pytest.raises(CaseError, match="motion: the stroke runs off the meshed strip: moved by"):
+        place_case(load_case("ball-on-flat", [*COARSE, "motion.along=[0, 1, 0]"]))
+
+
+@pytest.mark.parametrize(("settings", "message"), [
+    (["punch.supports=[]"], "the punch is free to slide along x: hold its x somewhere and to slide along y"),
+    (["punch.supports=[{at=[15, 0, 12], fix=['x', 'y']}]"], "spin about z"),
+])  # fmt: skip
+def test_too_few_supports(settings: list[str], message: str) -> None:
+    """The modes in which friction would carry the pin away are named."""
+    with pytest.raises(CaseError, match=message):
+        place_case(load_case("pin-on-disc", [*COARSE, "geometry.parameters.around=2", *settings]))
+
+
+def test_friction_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> None:
+    """The traction on the pin is mu across the arm from the disc's axis, the other way if it turns back."""
+    system = assembled("pin-on-disc", *COARSE)
+    arm = system.pair.punch.x[:, :2]
+    for direction in (1, -1):
+        ratio = system.friction_ratio(direction)
+        across = np.column_stack([-arm[:, 1], arm[:, 0]]) / np.linalg.norm(arm, axis=1, keepdims=True)
+        np.testing.assert_allclose(ratio[:, :2], direction * 0.05 * across, atol=1e-14)
+        np.testing.assert_allclose(ratio[:, 2], 0, atol=1e-15)

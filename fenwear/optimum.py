@@ -88,7 +88,8 @@ def optimum(
     p_mean, b = rigid.mean_pressure, pressure_exponent
     lengths = np.abs(modes).max(axis=0, initial=1e-300)
     mean_rate = float(wear_rate.mean())
-    shape = modes / lengths * (mean_rate / wear_rate)[:, None]
+    relative = wear_rate / mean_rate if mean_rate > 0 else np.ones_like(wear_rate)
+    shape = modes / lengths / relative[:, None]
     rows = weights_rows / (lengths[:, None] * p_mean * rigid.pair.weights.sum())
     resultant = rigid.resultant / (lengths * p_mean * rigid.pair.weights.sum())
     # Unknown y: w_n / (K p_mean^b) = shape y at each node, so that p / p_mean = (shape y)_+^(1/b).

@@ -298,7 +298,7 @@ class Placed:
         bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.exponent == exponent]
         on_track = wear.track is not None and wear.punch is not None
         rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
-        rate = rates[0] if on_track else np.sum(rates, axis=0)
+        rate = rates[0] if on_track else np.sum([np.zeros(len(self.pair.weights)), *rates], axis=0)
         found = optimum(self.rigid, self.friction_ratio(direction), rate, exponent, zone)
         if on_track and wear.strip is not None and "lambda_F" in found.velocity:
             depth = wear.worn(np.tile(found.pressure, (len(self.motion.phases), 1))).strip.mean()

@@ -17,7 +17,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import State
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
 
-CLOSE = 1e-9  # change of pressure over its scale that ends the iterations of coefficients and pressure
+CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
 COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"

@@ -51,7 +51,7 @@ def test_many_small_eliminations_equal_a_large_one(
     system = assembled("example1", *BOTH)
     results = []
     for limit in (0, 10**6):
-        monkeypatch.setattr("fenwear.contact.condensed.DENSE", limit)
+        monkeypatch.setattr("fenwear.contact.operators.DENSE", limit)
         *_, last = jump(system, 2000, tolerance=1e-2)
         results.append((last.pressure[-1], last.wear_strip[-1]))
     np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-9 * MEAN)

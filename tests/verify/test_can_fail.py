@@ -75,8 +75,8 @@ def lame_of_the_other_plane(patch: Patch) -> None:
 def _pairs_with(patch: Patch, change: Callable[[ContactPair], dict[str, Any]]) -> None:
     right = placed.pair
 
-    def pair(*surfaces: Any) -> ContactPair:
-        found = right(*surfaces)
+    def pair(*surfaces: Any, **options: Any) -> ContactPair:
+        found = right(*surfaces, **options)
         return replace(found, **change(found))
 
     patch.setattr(placed, "pair", pair)
@@ -94,11 +94,10 @@ def smaller_gap(patch: Patch) -> None:
 
 def strip_wears_where_it_meets(patch: Patch) -> None:
     """Depths put on the strip's nodes by interpolation, which keeps no area."""
-
-    def deposit(self: ContactPair) -> Any:
-        return csr_array(interpolation(self.x, self.punch.degree, self.strip.x[:, 0]))
-
-    patch.setattr(ContactPair, "deposit", property(deposit))
+    _pairs_with(
+        patch,
+        lambda pair: {"deposit": csr_array(interpolation(pair.x, pair.punch.degree, pair.strip.x[:, 0]))},
+    )
 
 
 def strip_does_not_wear(patch: Patch) -> None:

@@ -74,6 +74,11 @@ class Keys(Written):
         return (_code(name), _plain(takes), default, _plain(key.meaning))
 
 
+def _value(option: Any) -> str:
+    """Return what an option of the command line takes, in a word."""
+    return "" if option.is_flag else str(option.metavar or option.type.name.upper())
+
+
 class Commands(Written):
     """Every command with its arguments and options."""
 
@@ -84,7 +89,10 @@ class Commands(Written):
             usage = " ".join(p.make_metavar() for p in command.params if p.param_type_name == "argument")
             yield f"\n**`fenwear {name} {usage}`**".replace(" `**", "`**") + f"\n\n{_plain(command.help or '')}\n"
             rows = [
-                (", ".join(_code(o) for o in (*p.opts, *p.secondary_opts)), _plain(p.help or ""))
+                (
+                    ", ".join(_code(f"{o} {_value(p)}".strip()) for o in (*p.opts, *p.secondary_opts)),
+                    _plain(p.help or ""),
+                )
                 for p in command.params
                 if p.param_type_name == "option" and p.name != "help"
             ]
@@ -122,13 +130,16 @@ class Cases(Written):
 class Geometries(Written):
     """The ready geometries with their parameters."""
 
-    PARAMETER: ClassVar[re.Pattern[str]] = re.compile(r"^\s*(\w+)\s*=\s*([^,\n/]+?)\s*,?\s*//\s*(.*)$", re.MULTILINE)
+    PARAMETER: ClassVar[re.Pattern[str]] = re.compile(
+        r"^[ \t]*(\w+)[ \t]*=[ \t]*([^,\n/]+?)[ \t]*,?[ \t]*(?://[ \t]*(.*))?$", re.MULTILINE
+    )
 
     def lines(self) -> Iterable[str]:
         """Return a table for each geometry."""
         for path in sorted(meshes_folder().glob("*.geo")):
             text = path.read_text("utf-8")
-            yield f"\n**`{path.name}`**: {_plain(text.splitlines()[0].lstrip('/ '))}\n"
+            about = " ".join(line.lstrip("/ ") for line in text.partition("\n//\n")[0].splitlines())
+            yield f"\n**`{path.name}`**: {_plain(about)}\n"
             block = re.search(r"DefineConstant\[(.*?)\];", text, re.DOTALL)
             rows = self.PARAMETER.findall(block[1]) if block else []
             if rows:

@@ -55,4 +55,3 @@ def setup(app: Any) -> None:
     notebooks.mkdir(exist_ok=True)
     for path in sorted((HERE.parent / "demos").glob("*.ipynb")):
         shutil.copy(path, notebooks)
-    shutil.copy(HERE.parent / "demos" / "example1-heat-pressure.png", HERE / "pressure.png")

@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     help="Thermo-mechanical sliding wear with FEniCSx. Without a command: runs the built-in Example 1.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     no_args_is_help=False,
     rich_markup_mode=None,
@@ -401,10 +401,23 @@ def life_command(
 
 
 @app.command("info")
-def info_command(as_json: JsonOption = False) -> None:
-    """Print the versions of the stack and the built-in cases."""
+def info_command(
+    key: Annotated[
+        str | None, typer.Argument(metavar="KEY", help="Explain this key of the case file, or this table.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
+    from fenwear.case.keys import find_keys
     from fenwear.versions import versions
 
+    if key is not None:
+        found = find_keys(key)
+        if as_json:
+            _print_json({"keys": [asdict(k) for k in found]})
+        else:
+            print("\n".join(k.text() for k in found))
+        return
     if as_json:
         _print_json({"versions": versions(), "cases": builtin_cases()})
         return
@@ -413,3 +426,11 @@ def info_command(as_json: JsonOption = False) -> None:
     print("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
         print(f"  {name:26} {title}")
+
+
+@app.command("schema")
+def schema_command() -> None:
+    """Print the JSON schema of case files, by which editors complete and check them."""
+    from fenwear.case.keys import json_schema
+
+    _print_json(json_schema())

@@ -242,3 +242,10 @@ def test_two_ranks_without_convergence(fenwear: Run, tmp_path: Path) -> None:
     done = fenwear("steady", "example1", *options(), "--", "-fenwear_steady_snes_max_it", "1", ranks=2, cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     assert done.stderr.count("DIVERGED_MAX_IT") == 1
+
+
+def test_shell_completion(run_python: Run) -> None:
+    """The shell is told commands and options that begin as what stands there."""
+    for words, place, expected in (("fenwear st", 1, ["steady"]), ("fenwear run --re", 2, ["--resume"])):
+        variables = {"_FENWEAR_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(place)}
+        assert run_python("-m", "fenwear", **variables).stdout.split() == expected

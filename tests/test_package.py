@@ -26,12 +26,13 @@ def wheel(run_python: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_wheel_is_complete(wheel: Path) -> None:
-    """Modules, built-in cases, geometries, the marker of typing, the licence; nothing else."""
+    """Modules, built-in cases, geometries, templates of pages, the marker of typing, the licence; nothing else."""
     names = set(zipfile.ZipFile(wheel).namelist())
     sources = {p.relative_to(ROOT).as_posix() for p in (ROOT / "fenwear").rglob("*.py")}
     cases = {p.relative_to(ROOT).as_posix() for p in (ROOT / "fenwear" / "cases").glob("*.toml")}
     meshes = {f"fenwear/meshes/{p.name}" for p in meshes_folder().glob("*.geo")}
-    expected = sources | cases | meshes | {"fenwear/py.typed"}
+    templates = {p.relative_to(ROOT).as_posix() for p in (ROOT / "fenwear/report/templates").iterdir()}
+    expected = sources | cases | meshes | templates | {"fenwear/py.typed"}
     assert expected <= names
     assert any(name.endswith("licenses/LICENSE") for name in names)
     assert not {n for n in names if not n.startswith(("fenwear/", "fenwear-"))}

@@ -32,9 +32,21 @@ from fenwear.case.units import convert, quantity_text, shown
 from fenwear.errors import CaseError, Problem
 
 
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a key's bare numbers; in the JSON schema a text with a unit may stand for the number."""
+
+    symbol: str
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a number with this unit."""
+        return {"anyOf": [handler(core), {"type": "string"}]}
+
+
 def _quantity(unit: str) -> Any:
     """Return pydantic metadata: a number read with, and written in, `unit`."""
     return (
+        Unit(unit),
         BeforeValidator(lambda value: convert(value, unit)),
         PlainSerializer(lambda value: quantity_text(value, unit)),
     )
@@ -77,14 +89,19 @@ def _parameter(value: object) -> float:
 class Geometry(_Part):
     """Where the meshes come from: a gmsh .geo with its parameters, or a .msh."""
 
-    file: str = "punch_on_strip.geo"
-    parameters: dict[str, Annotated[float, BeforeValidator(_parameter)]] = {}
-    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = 4
+    file: str = Field(
+        default="punch_on_strip.geo", description=".geo or .msh beside the case file, or one of the ready geometries"
+    )
+    parameters: dict[str, Annotated[float, Unit("mm"), BeforeValidator(_parameter)]] = Field(
+        default={}, description="values of parameters of the .geo, by their names"
+    )
+    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(default=4, description="of the elements, 1 to 8")
     order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
         default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
     )
     follow_wear: Annotated[Number, Field(gt=0)] | None = Field(
-        default=0.5, description="worn depth over the elements' height above which the mesh follows the worn surface"
+        default=0.5,
+        description="worn depth over the elements' height above which the mesh follows the worn surface; or never",
     )
 
     @model_validator(mode="before")
@@ -98,9 +115,11 @@ class Geometry(_Part):
 class Model(_Part):
     """Plane bodies in (x, z) with their thickness; rings in (x, z), x the radius; or solids in (x, y, z)."""
 
-    kind: Literal["plane", "axisymmetric", "solid"] = "plane"
-    plane: Literal["stress", "strain"] = "stress"
-    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies")
+    kind: Literal["plane", "axisymmetric", "solid"] = Field(
+        default="plane", description="plane bodies, rings, or solids"
+    )
+    plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
+    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies, out of their plane")
 
     @model_validator(mode="after")
     def _plane_alone(self) -> Self:
@@ -124,20 +143,28 @@ class Model(_Part):
 class Material(_Part):
     """An isotropic, linear-elastic material; the thermal values are needed with heat only."""
 
-    young: Annotated[Stress, Field(gt=0)]
-    poisson: Annotated[Number, Field(gt=-1, le=0.5)]
-    conductivity: Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None = None
-    heat_capacity: Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = None
-    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = None
-    expansion: Annotated[float, *_quantity("1/K")] | None = None
+    young: Annotated[Stress, Field(gt=0)] = Field(description="Young's modulus E")
+    poisson: Annotated[Number, Field(gt=-1, le=0.5)] = Field(description="Poisson's ratio nu")
+    conductivity: Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None = Field(
+        default=None, description="thermal conductivity k; 1 W/(m K) = 1"
+    )
+    heat_capacity: Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = Field(
+        default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
+    )
+    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
+        default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
+    )
+    expansion: Annotated[float, *_quantity("1/K")] | None = Field(
+        default=None, description="linear thermal expansion alpha"
+    )
 
 
 class Support(_Part):
     """Displacement components held at zero, on a named group or at a point."""
 
-    on: str | None = None
-    at: Point | None = None
-    fix: Annotated[tuple[Axis, ...], Field(min_length=1)]
+    on: str | None = Field(default=None, description="group of the geometry")
+    at: Point | None = Field(default=None, description="or a point [x, z], in a solid [x, y, z], at a mesh node")
+    fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero")
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
@@ -149,11 +176,12 @@ class Support(_Part):
 class Load(_Part):
     """A load spread evenly over a named group: its resultant, or a traction; (x, z), in a solid (x, y, z)."""
 
-    on: str
-    force: Forces | None = None
-    traction: Stresses | None = None
+    on: str = Field(description="group of the geometry")
+    force: Forces | None = Field(default=None, description="resultant [x, z], in a solid [x, y, z], spread evenly")
+    traction: Stresses | None = Field(default=None, description="or the traction itself")
     over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
-        default=None, description="(fraction of the cycle, factor) pairs: the load varies linearly between them"
+        default=None,
+        description="[fraction of the cycle, factor] pairs from 0 to 1: the load varies linearly between them",
     )
 
     @model_validator(mode="after")
@@ -190,17 +218,17 @@ class Load(_Part):
 class Prescribed(_Part):
     """A temperature held on a named group of the boundary."""
 
-    on: str
-    temperature: Temperature = 0.0
+    on: str = Field(description="group of the geometry")
+    temperature: Temperature = Field(default=0.0, description="theta held there")
 
 
 class Body(_Part):
     """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
     regions: dict[str, str] = Field(default={}, description="name of the material of each region")
-    supports: tuple[Support, ...] = ()
-    loads: tuple[Load, ...] = ()
-    temperatures: tuple[Prescribed, ...] = ()
+    supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
+    loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
+    temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
     pivot: Point | None = Field(
         default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
     )
@@ -209,12 +237,12 @@ class Body(_Part):
 class Dependence(_Part):
     """A coefficient that depends on T (K), p (MPa) or v (mm/s): an expression, or a table with straight lines."""
 
-    expression: str | None = None
+    expression: str | None = Field(default=None, description="arithmetic on T (K), p (MPa) and v (mm/s)")
     table: tuple[tuple[Number, Number], ...] | None = Field(
-        default=None, description="(argument, value) pairs; beyond its ends the end values hold"
+        default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
-    of: Literal["T", "p", "v"] = "T"
-    unit: str = ""
+    of: Literal["T", "p", "v"] = Field(default="T", description="argument of the table")
+    unit: str = Field(default="", description="unit of the values")
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -274,7 +302,9 @@ class Contact(_Part):
     transverse_friction: Number = Field(
         default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
     )
-    solver: Literal["condensed", "full"] = "condensed"
+    solver: Literal["condensed", "full"] = Field(
+        default="condensed", description="full: all displacements as unknowns, slow, to compare with"
+    )
 
     @model_validator(mode="after")
     def _pure_number(self) -> Self:
@@ -291,17 +321,17 @@ class WearLaw(_Part):
     energy of friction, `energy`, beta~ = energy mu.
     """
 
-    coefficient: _constant_or_dependence(float | None) = Field(  # type: ignore[valid-type]
+    coefficient: _constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
         default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
     )
-    beta: float | None = Field(default=None, description="beta, in the same unit; beta~ = beta mu^b")
+    beta: Annotated[float | None, Unit("")] = Field(default=None, description="in the same unit; beta~ = beta mu^b")
     archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
-    hardness: Annotated[Stress, Field(gt=0)] | None = None
+    hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H, with archard")
     energy: Annotated[float, *_quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )
-    pressure_exponent: Annotated[Number, Field(gt=0)] = 1.0
-    speed_exponent: Annotated[Number, Field(gt=0)] = 1.0
+    pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
+    speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
 
     @staticmethod
     def coefficient_unit(pressure_exponent: float, speed_exponent: float) -> str:
@@ -369,8 +399,8 @@ class WearLaw(_Part):
 class Wear(_Part):
     """The wear law of each body that wears."""
 
-    punch: WearLaw | None = None
-    strip: WearLaw | None = None
+    punch: WearLaw | None = Field(default=None, description="law of the punch; without it the punch does not wear")
+    strip: WearLaw | None = Field(default=None, description="law of the strip; without it the strip does not wear")
 
     @model_validator(mode="after")
     def _some_law(self) -> Self:
@@ -423,10 +453,16 @@ class _Profile(_ToAndFro):
     speed rises linearly over the fraction `ramp` of the half-cycle, stays, and falls again.
     """
 
-    angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = None
-    period: Annotated[Time, Field(gt=0)] | None = None
-    profile: Literal["sinusoidal", "triangular", "trapezoidal"] = "sinusoidal"
-    ramp: Annotated[Number, Field(gt=0, le=0.5)] | None = None
+    angular_frequency: Annotated[AngularFrequency, Field(gt=0)] | None = Field(
+        default=None, description="omega; a half-cycle takes pi / omega"
+    )
+    period: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or the time of a whole cycle")
+    profile: Literal["sinusoidal", "triangular", "trapezoidal"] = Field(
+        default="sinusoidal", description="speed over a half-cycle; triangular: constant speed"
+    )
+    ramp: Annotated[Number, Field(gt=0, le=0.5)] | None = Field(
+        default=None, description="trapezoidal: fraction of the half-cycle in which the speed rises, and falls"
+    )
 
     @model_validator(mode="after")
     def _one_frequency(self) -> Self:
@@ -445,24 +481,24 @@ class _Profile(_ToAndFro):
 class Reciprocating(_Along, _Profile):
     """Sliding to and fro over 2 u0 in each half-cycle; it starts rightward, from -u0."""
 
-    kind: Literal["reciprocating"]
-    amplitude: Annotated[Length, Field(gt=0)]
+    kind: Literal["reciprocating"] = Field(description="to and fro")
+    amplitude: Annotated[Length, Field(gt=0)] = Field(description="u0, to both sides of the middle")
 
 
 class Oscillation(_About, _Profile):
     """Turning to and fro by 2 phi0 in each half-cycle; it starts counterclockwise, from -phi0."""
 
-    kind: Literal["oscillation"]
-    amplitude: Annotated[Angle, Field(gt=0)] = Field(description="phi0")
+    kind: Literal["oscillation"] = Field(description="turning to and fro")
+    amplitude: Annotated[Angle, Field(gt=0)] = Field(description="phi0, to both sides of the middle")
 
 
 class OneWay(_Along):
     """Steady sliding in one direction, counted in steps of `duration`."""
 
-    kind: Literal["one-way"]
-    direction: Literal["leftward", "rightward"]
-    speed: Annotated[Speed, Field(gt=0)]
-    duration: Annotated[Time, Field(gt=0)]
+    kind: Literal["one-way"] = Field(description="steadily in one direction")
+    direction: Literal["leftward", "rightward"] = Field(description="of the strip")
+    speed: Annotated[Speed, Field(gt=0)] = Field(description="of the strip")
+    duration: Annotated[Time, Field(gt=0)] = Field(description="of a step, which counts as a half-cycle")
     track: Annotated[Length, Field(gt=0)] | None = Field(
         default=None, description="length of the closed track over which the strip's wear spreads"
     )
@@ -471,19 +507,19 @@ class OneWay(_Along):
 class Rotation(_About):
     """Steady turning about an axis, counted in steps of `duration`."""
 
-    kind: Literal["rotation"]
+    kind: Literal["rotation"] = Field(description="turning steadily")
     direction: Literal["counterclockwise", "clockwise"] = Field(
         default="counterclockwise", description="seen against the axis"
     )
-    angular_speed: Annotated[AngularFrequency, Field(gt=0)]
-    duration: Annotated[Time, Field(gt=0)]
+    angular_speed: Annotated[AngularFrequency, Field(gt=0)] = Field(description="of the strip")
+    duration: Annotated[Time, Field(gt=0)] = Field(description="of a step, which counts as a half-cycle")
 
 
 class Tabulated(_Along, _ToAndFro):
     """The strip's position over one cycle, straight lines between the given times; every stroke is a half-cycle."""
 
-    kind: Literal["table"]
-    times: Annotated[tuple[Time, ...], Field(min_length=3)]
+    kind: Literal["table"] = Field(description="the strip's position over a cycle")
+    times: Annotated[tuple[Time, ...], Field(min_length=3)] = Field(description="rising from 0 to the cycle's end")
     displacements: Annotated[tuple[Length, ...], Field(min_length=3)] = Field(description="of the strip, towards +x")
 
     @model_validator(mode="after")
@@ -512,6 +548,7 @@ def _perfect_or_conductance(value: object) -> float | str:
 
 PerfectOrConductance = Annotated[
     float | Literal["perfect"],
+    Unit(CONDUCTANCE),
     BeforeValidator(_perfect_or_conductance),
     PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
 ]
@@ -529,7 +566,8 @@ class Heat(_Part):
     debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
     conductance: PerfectOrConductance = Field(
         default="perfect",
-        description="h_c between punch and strip where they touch; by default 0 where partition is given",
+        description="h_c between punch and strip where they touch, 1 W/(m² K) = 0.001; "
+        "by default 0 where partition is given",
     )
     conductance_per_pressure: tuple[Annotated[float, *_quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
         default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
@@ -538,25 +576,29 @@ class Heat(_Part):
         default="closed", description="the nodes that conduct: those in contact, or the whole nominal interface"
     )
     convection: Annotated[Conductance, Field(ge=0)] = Field(
-        default=0.0, description="h on all other boundaries and on the two faces of the plane model"
+        default=0.0, description="h on all other boundaries and on the two faces of the plane model, 1 W/(m² K) = 0.001"
     )
-    convecting_faces: bool = True
-    ambient: Temperature = 0.0
+    convecting_faces: bool = Field(default=True, description="whether the faces of the plane model convect, too")
+    ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings, from any zero")
     inflow: Temperature | None = Field(
         default=None,
         description="of the strip's material that enters through free ends; by default, sliding one way, the "
         "ambient, and to and fro what has left comes back as it was",
     )
-    initial: Temperature = 0.0
+    initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
-    coupling: Literal["implicit", "split"] = "implicit"
+    coupling: Literal["implicit", "split"] = Field(
+        default="implicit", description="heat and contact together, or in turn by the operator split"
+    )
     split_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=1e-4, description="change of the gap volume that ends the operator split, equation (30)"
     )
     relaxation: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.5, description="of the pressure in the operator split, equation (29)"
     )
-    operator: Literal["reduced", "full"] = "reduced"
+    operator: Literal["reduced", "full"] = Field(
+        default="reduced", description="temperatures on a small basis, or on the whole mesh"
+    )
     # The keys that the operators of the bodies do not depend on.
     exchange_keys: ClassVar[frozenset[str]] = frozenset(
         (
@@ -583,8 +625,10 @@ class Heat(_Part):
 class Run(_Part):
     """How far a run goes and how it integrates the wear."""
 
-    half_cycles: Annotated[int, Field(ge=1, strict=True)]
-    integration: Literal["explicit", "implicit", "jump"] = "explicit"
+    half_cycles: Annotated[int, Field(ge=1, strict=True)] = Field(description="how many at most")
+    integration: Literal["explicit", "implicit", "jump"] = Field(
+        default="explicit", description="of the wear; jump: over many cycles at once"
+    )
     jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=3e-3,
         description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
@@ -601,7 +645,7 @@ class Output(_Part):
         default=1, description="keep every k-th cycle in history.nc, and always the last one"
     )
     fields_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = Field(
-        default=None, description="half-cycles whose fields are written; by default the last one, () for none"
+        default=None, description="half-cycles whose fields are written; by default the last one, [] for none"
     )
     checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
     report: bool = Field(default=True, description="draw figures and report.html when the run has ended")
@@ -626,18 +670,18 @@ class Written:
 class Case(_Part):
     """A problem: the root of the case file."""
 
-    title: str = ""
-    geometry: Geometry = Geometry()
-    model: Model = Model()
-    materials: Annotated[dict[str, Material], Field(min_length=1)]
-    punch: Body
-    strip: Body
-    contact: Contact = Contact()
-    wear: Wear
-    motion: Annotated[Motions, Field(discriminator="kind")]
-    heat: Heat | None = None
-    run: Run
-    output: Output = Output()
+    title: str = Field(default="", description="shown with the results")
+    geometry: Geometry = Field(default=Geometry(), description="the meshes")
+    model: Model = Field(default=Model(), description="of the plane")
+    materials: Annotated[dict[str, Material], Field(min_length=1)] = Field(description="by their names")
+    punch: Body = Field(description="the body above, body 1")
+    strip: Body = Field(description="the body below, which slides, body 2")
+    contact: Contact = Field(default=Contact(), description="between the two")
+    wear: Wear = Field(description="of punch, strip or both")
+    motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
+    heat: Heat | None = Field(default=None, description="without this table there is no temperature")
+    run: Run = Field(description="how far, and how")
+    output: Output = Field(default=Output(), description="what is kept")
 
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
     _written: Written = Written()

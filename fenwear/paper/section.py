@@ -8,14 +8,16 @@ from dataclasses import asdict
 from typing import Any, get_args
 
 import numpy as np
+from markupsafe import Markup
 
 from fenwear.arrays import Array
+from fenwear.paper.figures import Picture as Drawing
 from fenwear.paper.figures import paper_figures
 from fenwear.paper.published import OPEN
 from fenwear.paper.readings import TRIED
 from fenwear.paper.rows import Row, Verdict, paper_rows, sensitivity_rows
 from fenwear.paper.study import FULL, HeatRun, Scope, StabilityMap, Variant, central_runs, heat_runs, stability_maps
-from fenwear.report.html_page import escape, figure
+from fenwear.report.html_page import Picture, picture, render
 
 COLUMNS = ("quantity", "paper", "fenwear", "verdict", "why")
 NUMBERS = (
@@ -39,34 +41,28 @@ READING_LEGEND = (
 )
 
 
-def write_section(scope: Scope = FULL) -> str:
+def write_section(scope: Scope = FULL) -> Markup:
     """Return the comparison as HTML without head or style: tables and figures with their images inline; collective."""
-    rows, pictures = paper_rows(scope), paper_figures(scope)
+    rows, runs = paper_rows(scope), heat_runs(scope)
     choices, discretisations = sensitivity_rows(scope)
-    drawn = [figure(_png(p.figure), "png", f"{p.title}. {p.caption}", f"{p.title}. {p.caption}") for p in pictures]
-    return "\n".join(
-        [
-            f"<p>The paper leaves open: {escape('; '.join(OPEN))}. Each number stands under several readings; what a "
-            "reading was fitted to is said. A number is reproduced where ours agrees to one unit of the last "
-            "digit printed under every reading, and under an assumption where it does under one that keeps to all that "
-            f"the paper gives. Some {TRIED} readings were tried: that one of them meets a number says little, that one "
-            "meets numbers it was not fitted to says more.</p>",
-            f"<p>{escape(summary(rows))}</p>",
-            table(rows),
-            "<h3>Readings</h3>",
-            f"<p>{escape(READING_LEGEND)} {escape(map_text(stability_maps(scope)))}</p>",
-            readings_table(heat_runs(scope), central_runs(scope)),
-            commands(heat_runs(scope)),
-            *drawn[:-2],
-            "<h3>What else the paper leaves open</h3>",
-            f"<p>{escape(LEGEND)}</p>",
-            drawn[-2],
-            variants_table("choice", choices),
-            "<h3>Mesh, time step and coupling</h3>",
-            f"<p>{escape(convergence_text(discretisations))}</p>",
-            drawn[-1],
-            variants_table("mesh, time step or coupling", discretisations),
-        ]
+    return render(
+        "paper.html",
+        open=OPEN,
+        tried=TRIED,
+        summary=summary(rows),
+        columns=COLUMNS,
+        rows=[_cells(row) for row in rows],
+        reading_legend=READING_LEGEND,
+        map_text=map_text(stability_maps(scope)),
+        reading_columns=READING,
+        readings=[_reading_cells(run, two) for run, two in zip(runs, central_runs(scope), strict=True)],
+        commands=[run.reading for run in runs],
+        pictures=[_drawn(one) for one in paper_figures(scope)],
+        legend=LEGEND,
+        numbers=NUMBERS,
+        choices=[(v.name, *_numbers(v)) for v in choices],
+        convergence=convergence_text(discretisations),
+        discretisations=[(v.name, *_numbers(v)) for v in discretisations],
     )
 
 
@@ -96,32 +92,10 @@ def map_text(maps: Sequence[StabilityMap]) -> str:
     return " ".join(parts)
 
 
-def readings_table(runs: Sequence[HeatRun], central: Sequence[HeatRun | None]) -> str:
-    """Return what every reading gives as an HTML table."""
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in READING)
-    body = "\n".join(
-        f'<tr><th scope="row">{escape(cells[0])}</th>'
-        + "".join(f"<td>{escape(text)}</td>" for text in cells[1:3])
-        + "".join(f'<td class="number">{escape(text)}</td>' for text in cells[3:])
-        + "</tr>"
-        for cells in (_reading_cells(run, two) for run, two in zip(runs, central, strict=True))
-    )
-    return (
-        '<div class="wide" role="region" aria-label="Readings" tabindex="0"><table class="comparison variants">\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
-    )
-
-
 def readings_markdown(runs: Sequence[HeatRun], central: Sequence[HeatRun | None]) -> str:
     """Return what every reading gives as a Markdown table."""
     cells = [_reading_cells(run, two) for run, two in zip(runs, central, strict=True)]
     return _markdown([READING, ("---",) * len(READING), *cells])
-
-
-def commands(runs: Sequence[HeatRun]) -> str:
-    """Return the command of each reading as HTML."""
-    lines = "\n".join(f"{run.reading.command}    # {run.reading.name}" for run in runs)
-    return f"<p>Each by one command, after <code>python3 -m fenwear</code>:</p><pre>{escape(lines)}</pre>"
 
 
 def convergence_text(variants: Sequence[Variant]) -> str:
@@ -159,36 +133,6 @@ def lines(rows: Sequence[Row]) -> list[str]:
     return found
 
 
-def table(rows: Sequence[Row]) -> str:
-    """Return the rows as an HTML table whose cells name their column where the page is narrow."""
-    head = "".join(f'<th scope="col">{name}</th>' for name in COLUMNS)
-    body = "\n".join(
-        "<tr>"
-        + "".join(
-            f'<td data-column="{name}">{escape(text)}</td>' for name, text in zip(COLUMNS, _cells(row), strict=True)
-        )
-        + "</tr>"
-        for row in rows
-    )
-    return f'<table class="stacked">\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>'
-
-
-def variants_table(what: str, variants: Sequence[Variant]) -> str:
-    """Return the numbers of variants as an HTML table."""
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in (what, *NUMBERS))
-    body = "\n".join(
-        f'<tr><th scope="row">{escape(v.name)}</th>'
-        + "".join(f'<td class="number">{text}</td>' for text in _numbers(v))
-        + "</tr>"
-        for v in variants
-    )
-    return (
-        f'<div class="wide" role="region" aria-label="{escape(what)}" tabindex="0">'
-        f'<table class="comparison variants">\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table></div>"
-    )
-
-
 def markdown(rows: Sequence[Row]) -> str:
     """Return the rows as a Markdown table."""
     return _markdown([COLUMNS, ("---",) * len(COLUMNS), *(_cells(row) for row in rows)])
@@ -198,10 +142,11 @@ def _markdown(lines: Sequence[Sequence[str]]) -> str:
     return "\n".join("| " + " | ".join(text.replace("|", "\\|") for text in line) + " |" for line in lines)
 
 
-def _png(canvas: Any) -> bytes:
+def _drawn(one: Drawing) -> Picture:
     buffer = io.BytesIO()
-    canvas.savefig(buffer, format="png", dpi=120)
-    return buffer.getvalue()
+    one.figure.savefig(buffer, format="png", dpi=120)
+    words = f"{one.title}. {one.caption}"
+    return picture(buffer.getvalue(), "png", words, words)
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -4,55 +4,47 @@ from __future__ import annotations
 
 import io
 import math
+from collections import Counter
 from collections.abc import Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 
 from fenwear.arrays import Array
-from fenwear.report.html_page import document, escape, figure, section
+from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.style import COLOURS, DASHES, panels
-from fenwear.verify.suite import Line, Outcome, Plot, Row
+from fenwear.verify.suite import Line, Outcome, Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLUMNS = ("what is compared", "reference", "fenwear", "error", "tolerance", "order", "")
 MARKERS = "os^Dvx+"
-WORDS = {"agrees": "agrees", "differs": "DIFFERS", "not run": "not run"}
 
 
-def page(outcomes: Sequence[Outcome], beside_paper: str | None, ranks: int, versions: dict[str, str]) -> str:
+def page(outcomes: Sequence[Outcome], beside_paper: Markup | None, ranks: int, versions: dict[str, str]) -> str:
     """Return the page of what the cases found, and of the comparison with the paper where there is one."""
-    now = datetime.now().astimezone()
-    when = f'<time datetime="{now.isoformat(timespec="seconds")}">{now:%d %B %Y, %H:%M %Z}</time>'
-    paper = "" if beside_paper is None else "<p><a href=\"#paper\">The paper's numbers beside fenwear's</a>.</p>"
-    head = (
-        "<header>\n<h1>Verification of fenwear</h1>\n"
-        f"<p>{_found(outcomes)}On {ranks} rank{'s' if ranks > 1 else ''}, {when}.</p>\n{paper}</header>\n<main>"
+    return render(
+        "verification.html",
+        title="Verification of fenwear",
+        found=_found(outcomes),
+        ranks=ranks,
+        now=datetime.now().astimezone(),
+        outcomes=outcomes,
+        columns=COLUMNS,
+        largest=_largest,
+        drawn=_drawn,
+        paper=beside_paper,
+        versions=versions,
     )
-    warning = "".join(
-        f'<p class="warning"><strong>Differs:</strong> <a href="#{o.case.name}">{escape(o.case.title)}</a></p>'
-        for o in outcomes
-        if o.verdict == "differs"
-    )
-    stack = ", ".join(f"{escape(name)} {escape(version)}" for name, version in versions.items())
-    parts = [
-        head,
-        warning,
-        section("Cases", _overview(outcomes) if outcomes else ""),
-        *(_case(outcome) for outcome in outcomes),
-        _named(section("The paper's numbers beside fenwear's", beside_paper or ""), "paper"),
-        section("Versions", f"<p>{stack}</p>"),
-    ]
-    return document("Verification of fenwear", "\n".join(parts) + "\n</main>")
 
 
 def _found(outcomes: Sequence[Outcome]) -> str:
     if not outcomes:
         return ""
-    found = {word: sum(o.verdict == word for o in outcomes) for word in WORDS}
+    found = Counter(outcome.verdict for outcome in outcomes)
     comparisons = sum(len(o.result.rows) for o in outcomes)
     return (
         f"Of {len(outcomes)} cases {found['agrees']} agree with exact solutions and published results, "
@@ -61,57 +53,14 @@ def _found(outcomes: Sequence[Outcome]) -> str:
     )
 
 
-def _named(part: str, name: str) -> str:
-    return part.replace("<section>", f'<section id="{name}">', 1)
-
-
-def _overview(outcomes: Sequence[Outcome]) -> str:
-    rows = "\n".join(
-        f'<tr><th scope="row"><a href="#{o.case.name}">{escape(o.case.title)}</a></th>'
-        f'<td class="number">{_largest(o)}</td><td class="number">{o.seconds:.1f} s</td>{_verdict(o.verdict)}</tr>'
-        for o in outcomes
-    )
-    return _table("All cases", ("case", "largest error / tolerance", "time", ""), rows)
-
-
 def _largest(outcome: Outcome) -> str:
     ratios = [row.error / row.tolerance if row.tolerance else row.error for row in outcome.result.rows]
     return f"{max(ratios):.2g}" if ratios else "–"
 
 
-def _case(outcome: Outcome) -> str:
-    case, result = outcome.case, outcome.result
-    note = f'<p class="note">{escape(result.note)}</p>' if result.note else ""
-    rows = "\n".join(_row(row) for row in result.rows)
-    table = _table(case.title, COLUMNS, rows) if rows else ""
-    plots = "".join(figure(draw(plot), "png", _alt(plot), plot.title) for plot in result.plots)
-    content = f'<p>Reference: {escape(case.source)}. <span class="note">{case.name}</span></p>{note}{table}{plots}'
-    return _named(section(case.title, content), case.name)
-
-
-def _row(row: Row) -> str:
-    order = "" if row.order is None else f"{row.order:.2f}"
-    numbers = (f"{row.reference:.6g}", f"{row.ours:.6g}", f"{row.error:.1e}", f"{row.tolerance:.2g}", order)
-    cells = "".join(f'<td class="number">{text}</td>' for text in numbers)
-    verdict = _verdict("agrees" if row.agrees else "differs")
-    return f'<tr><th scope="row">{escape(row.what)}</th>{cells}{verdict}</tr>'
-
-
-def _verdict(word: str) -> str:
-    text = f"<strong>{WORDS[word]}</strong>" if word == "differs" else WORDS[word]
-    return f'<td class="verdict">{text}</td>'
-
-
-def _table(caption: str, columns: Sequence[str], rows: str) -> str:
-    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in columns)
-    return (
-        f'<div class="wide" role="region" aria-label="{escape(caption)}" tabindex="0"><table class="comparison">\n'
-        f"<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody>\n</table></div>"
-    )
-
-
-def _alt(plot: Plot) -> str:
-    return f"{plot.title}: {plot.y_label} over {plot.x_label}, lines {', '.join(line.name for line in plot.lines)}."
+def _drawn(plot: Plot) -> Picture:
+    alt = f"{plot.title}: {plot.y_label} over {plot.x_label}, lines {', '.join(line.name for line in plot.lines)}."
+    return picture(draw(plot), "png", plot.title, alt)
 
 
 def draw(plot: Plot) -> bytes:

@@ -1,4 +1,4 @@
-"""The README's files do what it says: they are taken from its text."""
+"""The cases of the pages do what these say: they are taken from their text."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ import pytest
 from fenwear import assemble, jump, load_case
 from fenwear.case import Case
 
-README = Path(__file__).resolve().parents[1] / "README.md"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+OWN_PART, FIRST_STEPS, LAWS = DOCS / "how-to/own-part.md", DOCS / "first-steps.md", DOCS / "how-to/laws.md"
 
 
-def saved_as(name: str) -> str:
-    """Return the block of code that follows "Save this as `name`"."""
-    found = re.search(rf"Save this as `{re.escape(name)}`.*?```\w+\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
+def saved_as(page: Path, name: str) -> str:
+    """Return the block of code that follows "Save this as `name`" on a page."""
+    found = re.search(rf"Save this as `{re.escape(name)}`.*?```\w+\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
     assert found, name
     return found[1]
 
 
 @pytest.fixture(scope="module")
 def slider(tmp_path_factory: pytest.TempPathFactory) -> Case:
-    """Return the case of the README's own mesh."""
+    """Return the case of the page's own mesh."""
     folder = tmp_path_factory.mktemp("slider")
     for name in ("slider.geo", "slider.toml"):
-        (folder / name).write_text(saved_as(name), "utf-8")
-    command = re.search(r"`(gmsh -2 [^`]*)`", README.read_text("utf-8"))
+        (folder / name).write_text(saved_as(OWN_PART, name), "utf-8")
+    command = re.search(r"fenwear (gmsh -2 .*)", OWN_PART.read_text("utf-8"))
     assert command
     subprocess.run(command[1].split(), cwd=folder, check=True, capture_output=True, timeout=1800)
     return load_case(folder / "slider.toml")
@@ -50,18 +51,16 @@ def test_own_mesh(slider: Case) -> None:
     assert last.contact_width[-1] > 1.5 * float(system.pair.weights @ (start > 0))
 
 
-@pytest.mark.parametrize("name", ["wide-punch.toml"])
-def test_case_files(name: str, tmp_path: Path) -> None:
+def test_case_to_start_from(tmp_path: Path) -> None:
     """The case to start from is valid as it is printed."""
-    (tmp_path / name).write_text(saved_as(name), "utf-8")
-    assert assemble(load_case(tmp_path / name)).pair.x.max() == pytest.approx(40)
+    (tmp_path / "wide-punch.toml").write_text(saved_as(FIRST_STEPS, "wide-punch.toml"), "utf-8")
+    assert assemble(load_case(tmp_path / "wide-punch.toml")).pair.x.max() == pytest.approx(40)
 
 
 def test_laws_that_vary(tmp_path: Path) -> None:
-    """The coefficients of the README's example are accepted by a case with heat."""
-    blocks = re.findall(r"```toml\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
-    (laws,) = [block for block in blocks if "expression =" in block]
-    (tmp_path / "laws.toml").write_text(f'base = "example1-heat"\n{laws}', "utf-8")
+    """The coefficients of the example are accepted by a case with heat."""
+    laws = saved_as(LAWS, "laws.toml")
+    (tmp_path / "laws.toml").write_text(laws, "utf-8")
     case = load_case(tmp_path / "laws.toml")
     assert case.varies
     assert tomllib.loads(laws)["wear"]["punch"]["coefficient"]["unit"] == "1/MPa"

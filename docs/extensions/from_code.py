@@ -1,0 +1,212 @@
+"""What pages take from the code as they are made, so that they say what it does: keys, commands, results, cases."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar
+
+import typer
+from docutils import nodes
+from pydantic import BaseModel
+from sphinx.util.docutils import SphinxDirective
+
+from fenwear.bodies.mesh import meshes_folder
+from fenwear.case import builtin_cases
+from fenwear.case.keys import Key, all_keys
+from fenwear.cli import app as command_line
+from fenwear.results import history
+from fenwear.verify.suite import registered
+
+
+class Written(SphinxDirective):
+    """A directive whose content is written here, as Markdown."""
+
+    required_arguments = 0
+    optional_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Return what the Markdown makes."""
+        return self.parse_text_to_nodes("\n".join(self.lines()))
+
+    def lines(self) -> Iterable[str]:
+        """Return the lines of Markdown."""
+        raise NotImplementedError
+
+
+def _code(text: str) -> str:
+    return f"`{text}`" if text else ""
+
+
+def _plain(text: str) -> str:
+    """Return a text as Markdown shows it."""
+    return re.sub(r"([\\`*_\[\]<>|~$])", r"\\\1", text)
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    return ["", *("| " + " | ".join(cells) + " |" for cells in (head, ["---"] * len(head), *rows)), ""]
+
+
+class Keys(Written):
+    """The keys below a table of the case file; without a table those at its top."""
+
+    def lines(self) -> Iterable[str]:
+        """Return a table for each kind."""
+        table = self.arguments[0] if self.arguments else ""
+        below = [key for key in all_keys() if not key.table and self._inside(key.path, table)]
+        for kind in dict.fromkeys(key.kind for key in below):
+            if kind:
+                yield f'\n**kind = "{kind}"**\n'
+            yield from _table(
+                ("key", "takes", "default", "meaning"),
+                (self._cells(key, table) for key in below if key.kind == kind),
+            )
+
+    @staticmethod
+    def _inside(path: str, table: str) -> bool:
+        return path.startswith(f"{table}.") if table else "." not in path
+
+    @staticmethod
+    def _cells(key: Key, table: str) -> tuple[str, ...]:
+        default = key.default if key.default in ("", "required") else _code(key.default)
+        name = key.path.removeprefix(f"{table}.")
+        takes = f"{key.values} ({key.unit})" if key.unit else key.values
+        return (_code(name), _plain(takes), default, _plain(key.meaning))
+
+
+def _value(option: Any) -> str:
+    """Return what an option of the command line takes, in a word."""
+    return "" if option.is_flag else str(option.metavar or option.type.name.upper())
+
+
+class Commands(Written):
+    """Every command with its arguments and options."""
+
+    def lines(self) -> Iterable[str]:
+        """Return a section's worth for each command."""
+        group: Any = typer.main.get_command(command_line)
+        for name, command in sorted(group.commands.items()):
+            usage = " ".join(p.make_metavar() for p in command.params if p.param_type_name == "argument")
+            yield f"\n**`fenwear {name} {usage}`**".replace(" `**", "`**") + f"\n\n{_plain(command.help or '')}\n"
+            rows = [
+                (
+                    ", ".join(_code(f"{o} {_value(p)}".strip()) for o in (*p.opts, *p.secondary_opts)),
+                    _plain(p.help or ""),
+                )
+                for p in command.params
+                if p.param_type_name == "option" and p.name != "help"
+            ]
+            if rows:
+                yield from _table(("option", "does"), rows)
+
+
+class Results(Written):
+    """The variables of history.nc."""
+
+    def lines(self) -> Iterable[str]:
+        """Return a table of each group."""
+        heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in history.HEAT_TERMS.items()}
+        groups: dict[str, Any] = {
+            "In every run": history.VARIABLES,
+            "Where the strip wears": history.STRIP_VARIABLES,
+            "With heat": {**history.HEAT_VARIABLES, **heat},
+        }
+        for title, variables in groups.items():
+            yield f"\n**{title}**\n"
+            yield from _table(
+                ("variable", "over", "unit", "meaning"),
+                ((_code(n), ", ".join(d), u, _plain(text)) for n, (d, u, text) in variables.items()),
+            )
+
+
+class Cases(Written):
+    """The built-in cases."""
+
+    def lines(self) -> Iterable[str]:
+        """Return one table."""
+        return _table(("name", "title"), ((_code(n), _plain(t)) for n, t in builtin_cases().items()))
+
+
+class Geometries(Written):
+    """The ready geometries with their parameters."""
+
+    PARAMETER: ClassVar[re.Pattern[str]] = re.compile(
+        r"^[ \t]*(\w+)[ \t]*=[ \t]*([^,\n/]+?)[ \t]*,?[ \t]*(?://[ \t]*(.*))?$", re.MULTILINE
+    )
+
+    def lines(self) -> Iterable[str]:
+        """Return a table for each geometry."""
+        for path in sorted(meshes_folder().glob("*.geo")):
+            text = path.read_text("utf-8")
+            about = " ".join(line.lstrip("/ ") for line in text.partition("\n//\n")[0].splitlines())
+            yield f"\n**`{path.name}`**: {_plain(about)}\n"
+            block = re.search(r"DefineConstant\[(.*?)\];", text, re.DOTALL)
+            rows = self.PARAMETER.findall(block[1]) if block else []
+            if rows:
+                yield from _table(("parameter", "default", "meaning"), ((_code(n), v, _plain(m)) for n, v, m in rows))
+
+
+class Verification(Written):
+    """The problems that `fenwear verify` solves."""
+
+    def lines(self) -> Iterable[str]:
+        """Return one table."""
+        rows = ((_code(c.name), _plain(c.title), _plain(c.source)) for c in registered())
+        return _table(("name", "problem", "reference"), rows)
+
+
+def _as_written(app: Any, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """Make a docstring, which is plain text, the reStructuredText that shows it as it is written."""
+    found: list[str] = []
+    formula = 0  # indentation of a block that stands by itself
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if formula and line.strip() and indent < formula:
+            formula = 0
+        if not formula and line.strip() and indent > _indentation(found) and found and not found[-1].strip():
+            formula = indent
+            found += [" " * _indentation(found) + "::", ""]
+        if formula:
+            found.append(line)
+            continue
+        text = re.sub(r"``?([^`]+)``?", r"``\1``", line)
+        parts = re.split(r"(``[^`]+``)", text)
+        parts[::2] = [re.sub(r"([*|\\]|_(?![A-Za-z0-9]))", r"\\\1", part) for part in parts[::2]]
+        found.append("".join(parts))
+    lines[:] = found
+
+
+def _is_case(thing: object) -> bool:
+    return isinstance(thing, type) and issubclass(thing, BaseModel)
+
+
+def _short(app: Any, what: str, name: str, thing: object, options: object, signature: str, result: str) -> Any:
+    """Leave out the signatures of the tables of a case: the page of its keys has them."""
+    return ("", None) if _is_case(thing) else None
+
+
+def _leave_out(app: Any, what: str, name: str, thing: object, skip: bool, options: object) -> bool | None:
+    """Leave out what pydantic adds."""
+    return True if name.startswith("model_") else None
+
+
+def _indentation(lines: list[str]) -> int:
+    last = next((line for line in reversed(lines) if line.strip()), "")
+    return len(last) - len(last.lstrip())
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Name the directives."""
+    for name, directive in (
+        ("keys", Keys),
+        ("commands", Commands),
+        ("results", Results),
+        ("cases", Cases),
+        ("geometries", Geometries),
+        ("verification", Verification),
+    ):
+        app.add_directive(name, directive)
+    app.connect("autodoc-process-docstring", _as_written, priority=400)
+    app.connect("autodoc-process-signature", _short)
+    app.connect("autodoc-skip-member", _leave_out)
+    return {"parallel_read_safe": True}

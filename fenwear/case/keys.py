@@ -1,0 +1,171 @@
+"""The keys of case files, read off the schema: their units, values, defaults and meaning."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from types import NoneType
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from fenwear.case.schema import Body, Case, Dependence, Unit, WearLaw, part_models
+from fenwear.errors import CaseError, Problem
+
+WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of the case file.
+
+    Attributes:
+        path: Its tables and its name; NAME stands for a name of yours, N for a number from 0, BODY for punch or strip.
+        unit: Of a number without a unit.
+        values: What it takes.
+        default: What it is where it is not given; "required" where it has to be, "" where it then does nothing.
+        meaning: What it is.
+        kind: The kind of motion that it belongs to.
+        table: Whether it is a table with keys of its own.
+    """
+
+    path: str
+    unit: str
+    values: str
+    default: str
+    meaning: str
+    kind: str = ""
+    table: bool = False
+
+    def text(self) -> str:
+        """Return the key in words."""
+        unit = f", in {self.unit} where it has no unit" if self.unit else ""
+        default = "; required" if self.default == "required" else f"; default {self.default}" if self.default else ""
+        kind = f' (kind "{self.kind}")' if self.kind else ""
+        return f"{self.path}{kind}: {self.meaning}\n    {self.values}{unit}{default}"
+
+
+def all_keys() -> list[Key]:
+    """Return every key of a case file, tables before what is in them."""
+    about = "a built-in case, or a .toml beside this file: its keys hold where none is given"
+    return [Key("base", "", "text", "", about), *_keys(Case, "", "")]
+
+
+def find_keys(path: str) -> list[Key]:
+    """Return the key of this path and, where it is a table, those in it.
+
+    Args:
+        path: As in a case file or after --set: "motion.amplitude", "materials.steel.young".
+
+    Raises:
+        CaseError: there is none; names the nearest.
+    """
+    keys = all_keys()
+    found = [key for key in keys if _matches(key.path, path)]
+    if not found:
+        known = list(dict.fromkeys(key.path for key in keys))
+        last = path.rpartition(".")[2]
+        same = [key for key in known if key.rpartition(".")[2] == last]
+        close = same or difflib.get_close_matches(path, known, 3, 0.5)
+        hint = f"; did you mean {' or '.join(close[:3])}?" if close else "; fenwear info KEY explains one key or table"
+        raise CaseError(Problem(path, f"no such key{hint}"))
+    below = [key for key in keys if any(f.table and key.path.startswith(f"{f.path}.") for f in found)]
+    return [*found, *below]
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON schema of a case file, for editors; what is missing may stand in the base."""
+    schema = _without_required(Case.model_json_schema(mode="validation"))
+    schema["properties"] = {"base": {"type": "string", "description": all_keys()[0].meaning}, **schema["properties"]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _without_required(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {k: _without_required(v) for k, v in node.items() if not (k == "required" and isinstance(v, list))}
+    return [_without_required(v) for v in node] if isinstance(node, list) else node
+
+
+def _matches(pattern: str, path: str) -> bool:
+    steps, given = pattern.split("."), path.split(".")
+    return len(steps) == len(given) and all(
+        s in (g, "NAME") or (s == "N" and g.isdigit()) or (s == "BODY" and g in ("punch", "strip"))
+        for s, g in zip(steps, given, strict=True)
+    )
+
+
+def _keys(model: type[BaseModel], at: str, kind: str) -> Iterator[Key]:
+    seen: set[type] = set()
+    for name, field in model.model_fields.items():
+        parts = part_models(field.annotation)
+        if parts and parts[0] in (Body, WearLaw):  # the same for both bodies
+            if parts[0] in seen:
+                continue
+            seen.add(parts[0])
+            about = "the two bodies" if parts[0] is Body else "wear law; a body without one does not wear"
+            first, *rest = _below(field, parts, f"{at}BODY", kind)
+            yield from (replace(first, meaning=about), *rest)
+        else:
+            yield from _below(field, parts, at + name, kind)
+
+
+def _below(field: FieldInfo, parts: list[Any], path: str, kind: str) -> Iterator[Key]:
+    listed = _container(field.annotation)
+    key = Key(path, _unit(field), _values(field.annotation), _default(field), field.description or "", kind)
+    if Dependence in parts:
+        key = replace(key, values="number, or a table of the keys below")
+    elif parts:
+        key = replace(key, values="list of tables" if listed == ".N" else "table")
+    yield replace(key, table=bool(parts))
+    for part in parts:
+        words = get_args(part.model_fields["kind"].annotation) if "kind" in part.model_fields else ()
+        own = str(words[0]) if len(words) == 1 else kind
+        yield from _keys(part, f"{path}{listed}.", own)
+    if not parts and get_origin(field.annotation) is dict:
+        yield replace(key, path=f"{path}.NAME", values=_values(get_args(field.annotation)[1]), default="")
+
+
+def _container(annotation: Any) -> str:
+    """Return what stands between a key and those in it: a name of a table, a number of a list, or nothing."""
+    origins = {get_origin(a) for a in (annotation, *get_args(annotation))}
+    return ".NAME" if dict in origins else ".N" if tuple in origins else ""
+
+
+def _unit(field: FieldInfo) -> str:
+    return next((m.symbol for m in (*field.metadata, *_metadata(field.annotation)) if isinstance(m, Unit)), "")
+
+
+def _metadata(annotation: Any) -> Iterator[Any]:
+    yield from getattr(annotation, "__metadata__", ())
+    for argument in get_args(annotation):
+        yield from _metadata(argument)
+
+
+def _values(annotation: Any) -> str:
+    origin = get_origin(annotation)
+    if annotation in WORDS:
+        return WORDS[annotation]
+    if origin is Literal:
+        return ", ".join(f'"{value}"' for value in get_args(annotation))
+    if origin is dict:
+        return "table"
+    if origin is tuple:
+        return "list"
+    found = [_values(a) for a in get_args(annotation) if a is not NoneType and not isinstance(a, Unit)]
+    return " or ".join(dict.fromkeys(text for text in found if text))
+
+
+def _default(field: FieldInfo) -> str:
+    if field.default is PydanticUndefined:
+        return "required"
+    value = field.default
+    if value is None or isinstance(value, BaseModel) or value in ("", (), {}):
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, tuple):
+        return f"[{', '.join(f'{entry:g}' for entry in value)}]"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"

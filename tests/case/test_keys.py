@@ -1,0 +1,77 @@
+"""The keys of case files as they are explained: all of them, with the units that they are read in."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from fenwear.case import builtin_cases, load_case
+from fenwear.case.keys import all_keys, find_keys, json_schema
+from fenwear.case.units import convert
+from fenwear.errors import CaseError
+
+
+def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the values of nested tables and lists of tables by their paths."""
+    tables = value.items() if isinstance(value, dict) else enumerate(value) if _tables(value) else None
+    if tables is None:
+        yield path, value
+        return
+    for name, below in tables:
+        yield from _leaves(below, f"{path}.{name}".lstrip("."))
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(entry, dict) for entry in value)
+
+
+def test_every_key_has_a_meaning() -> None:
+    """Also those that are added to the schema later."""
+    assert [key.path for key in all_keys() if not key.meaning] == []
+
+
+@pytest.mark.parametrize("name", builtin_cases())
+def test_keys_of_cases_are_known_by_their_units(name: str) -> None:
+    """Each key of a resolved case is explained, and its values are in the unit that is said."""
+    resolved = load_case(name).resolved()
+    for path, value in _leaves(resolved):
+        key = next(key for key in find_keys(path) if key.kind in ("", resolved["motion"]["kind"]))
+        for text in value if isinstance(value, list) else [value]:
+            if key.unit and not path.startswith("geometry.parameters."):
+                assert convert(text, key.unit) == pytest.approx(float(str(text).split()[0]), rel=1e-12)
+
+
+def test_find_keys() -> None:
+    """A key by its path in a file or after --set, a table with what is in it; the nearest of what is not there."""
+    assert [key.path for key in find_keys("punch.loads.0.force")] == ["BODY.loads.N.force"]
+    assert {"materials", "materials.NAME.young"} <= {key.path for key in find_keys("materials")}
+    assert {key.kind for key in find_keys("motion.kind")} >= {"reciprocating", "one-way", "table"}
+    for wrong in ("motion.amplitud", "run.amplitude"):
+        with pytest.raises(CaseError, match=r"did you mean motion\.amplitude"):
+            find_keys(wrong)
+
+
+def test_schema_takes_cases_and_nothing_else() -> None:
+    """Every built-in case with and without its units; a misspelt key and a wrong word are no case."""
+    jsonschema = pytest.importorskip("jsonschema")
+    check = jsonschema.Draft202012Validator(json_schema())
+    for name in builtin_cases():
+        assert list(check.iter_errors(load_case(name).resolved())) == []
+    assert list(check.iter_errors({"base": "example1", "motion": {"kind": "reciprocating", "amplitude": 2}})) == []
+    for wrong in ({"titel": "x"}, {"model": {"plane": "stres"}}, {"motion": {"kind": "one-way", "amplitude": 2}}):
+        assert list(check.iter_errors({"base": "example1", **wrong})) != []
+
+
+def test_commands(fenwear: Callable[..., Any]) -> None:
+    """`info KEY` tells unit and meaning, or the nearest key with status 2; `schema` prints one object."""
+    done = fenwear("info", "motion.amplitude")
+    assert done.stdout.splitlines()[:2] == [
+        'motion.amplitude (kind "reciprocating"): u0, to both sides of the middle',
+        "    number, in mm where it has no unit; required",
+    ]
+    wrong = fenwear("info", "motion.amplitud")
+    assert (wrong.returncode, "did you mean motion.amplitude" in wrong.stderr) == (2, True)
+    assert json.loads(fenwear("schema").stdout) == json_schema()

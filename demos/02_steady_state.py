@@ -200,7 +200,8 @@ def explore(friction=0.25, load_kN=10.0, b=1.0):
     """Solve and draw the steady state of these values."""
     try:
         found = steady(
-            vary(system,
+            vary(
+                system,
                 f"contact.friction={friction}",
                 f"punch.loads.0.force=[0, {-1000 * load_kN}]",
                 f"wear.punch={{coefficient='3.93e-8 MPa^-{b}', pressure_exponent={b}}}",

@@ -120,7 +120,8 @@ class Block:
     @property
     def contact_width(self) -> Array:
         """Width of the nodes in contact, by their weights (k,), mm."""
-        return (self.pressure > 0) @ self.system.rigid.pair.weights
+        # Added up by numpy: a product by BLAS may end in other bits where the arrays lie elsewhere in memory.
+        return np.where(self.pressure > 0, self.system.rigid.pair.weights, 0.0).sum(axis=1)
 
 
 @dataclass(frozen=True)
@@ -244,9 +245,10 @@ class Recorder:
             numbers, records = zip(*members, strict=True)
             equilibrium = self.system.interfaces[records[0].phase].rigid
             pressure = np.concatenate([record.contact.pressure for record in records])
-            force = pressure @ equilibrium.pair.weights
+            force = (pressure * equilibrium.pair.weights).sum(axis=1)
             force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
-            balance = pressure @ equilibrium.equilibrium(records[0].friction_ratio).T + equilibrium.resultant
+            rows = equilibrium.equilibrium(records[0].friction_ratio)
+            balance = np.einsum("kn,mn->km", pressure, rows) + equilibrium.resultant
             error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
             np.maximum.at(errors, list(numbers), error)
         return errors

@@ -72,7 +72,7 @@ def pressure_scale(system: Tribosystem, pressure: Array) -> float:
 def pressure_scales(system: Tribosystem, pressure: Array) -> Array:
     """Return the same of k half-cycles (k,), each of all its phases: pressures (k, m, n), MPa."""
     weights = system.pair.weights
-    force = (np.abs(pressure) @ weights).sum(axis=1)
-    carried = (pressure**2 @ weights).sum(axis=1)
+    force = (np.abs(pressure) * weights).sum(axis=(1, 2))
+    carried = (pressure**2 * weights).sum(axis=(1, 2))
     loaded = force > 0
     return np.where(loaded, carried / np.where(loaded, force, 1.0), system.rigid.mean_pressure)

@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import fenwear
 from fenwear.case import Case, builtin_cases, doubts, load_case
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
 if TYPE_CHECKING:
@@ -79,9 +79,9 @@ def run(
 
     loaded = _load(case, settings)
     if resume and output is None:
-        raise CaseError(Problem("--resume", "expected the folder of the run to go on with, as -o DIR"))
+        raise CaseError(InputError("--resume", "expected the folder of the run to go on with, as -o DIR"))
     if quiet and verbose:
-        raise CaseError(Problem("--quiet", "given together with --verbose; expected one of them"))
+        raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
     summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
@@ -229,7 +229,7 @@ def mesh_command(
 
     loaded = _load(case, settings)
     if output.suffix != ".msh":
-        raise CaseError(Problem("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
     on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output, loaded.model.law))
     log(f"mesh in {output}")
 
@@ -347,7 +347,7 @@ def calibrate_command(
     loaded = _load(case, settings)
     if each:
         if posterior is not None:
-            raise CaseError(Problem("--posterior", "given together with --each; expected one of them"))
+            raise CaseError(InputError("--posterior", "given together with --each; expected one of them"))
         tests, between, folder = commands.run_calibrate_each(
             loaded, Path(case).stem, data, unknowns, baseline, output, log
         )

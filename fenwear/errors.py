@@ -11,7 +11,7 @@ class FenwearError(Exception):
     """Base of all errors below."""
 
 
-class Problem(NamedTuple):
+class InputError(NamedTuple):
     """One thing wrong with a case: the key's path and what was expected there."""
 
     key: str
@@ -26,12 +26,12 @@ def _shortened(text: str, length: int = 500) -> str:
 class CaseError(FenwearError):
     """The case, its geometry or the usage is wrong; lists every problem found."""
 
-    def __init__(self, problems: Sequence[Problem] | Problem) -> None:
-        found = [problems] if isinstance(problems, Problem) else problems
-        self.problems = [Problem(_shortened(p.key), _shortened(p.message)) for p in found]
+    def __init__(self, problems: Sequence[InputError] | InputError) -> None:
+        found = [problems] if isinstance(problems, InputError) else problems
+        self.problems = [InputError(_shortened(p.key), _shortened(p.message)) for p in found]
         super().__init__("\n".join(f"{p.key}: {p.message}" if p.key else p.message for p in self.problems))
 
-    def __reduce__(self) -> tuple[type[CaseError], tuple[list[Problem]]]:
+    def __reduce__(self) -> tuple[type[CaseError], tuple[list[InputError]]]:
         return type(self), (self.problems,)  # crosses ranks by pickle
 
 

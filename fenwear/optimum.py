@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
-from fenwear.errors import CaseError, ConvergenceError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import RigidEquilibrium
 
 
@@ -55,7 +55,7 @@ def check_equilibrium(rigid: RigidEquilibrium, direction: int, friction_ratio: A
     ):
         way = "rightward" if direction > 0 else "leftward"
         raise CaseError(
-            Problem(
+            InputError(
                 "punch.loads",
                 f"no pressure on the contact balances the loads in {way} sliding: the punch lifts off or tips over; "
                 "expected a load that presses on it between the contact's edges, friction included",

@@ -20,7 +20,7 @@ from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
 from fenwear.cycle import Block, follow, jump, march, stability_number, stationary_growth
 from fenwear.cycle.state import RunState, joined
-from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, MeshQualityError, OutputError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
 from fenwear.report.page import try_report
 from fenwear.results import checkpoint
@@ -77,7 +77,7 @@ def run_case(
     """
     if case.model.kind != "plane":
         reason = "results are written of plane models so far; `steady`, `optimum` and Python's march and jump take all"
-        raise CaseError(Problem("model.kind", reason))
+        raise CaseError(InputError("model.kind", reason))
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case))
     if not resume:
@@ -148,7 +148,7 @@ class _Run:
             start = checkpoint.load(directory, system)
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
-                raise CaseError(Problem("run.half_cycles", message))
+                raise CaseError(InputError("run.half_cycles", message))
         else:
             on_root(self.comm, lambda: make_directory(directory))
         self.system = system

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
-from fenwear.errors import Problem
+from fenwear.errors import InputError
 from fenwear.parallel import on_root
 
 COMM = MPI.COMM_WORLD
@@ -57,7 +57,7 @@ def test_on_root() -> None:
     assert on_root(COMM, lambda: COMM.rank) == 0
 
     def fail() -> None:
-        raise CaseError(Problem("key", f"on rank {COMM.rank}"))
+        raise CaseError(InputError("key", f"on rank {COMM.rank}"))
 
     with pytest.raises(CaseError, match="key: on rank 0"):
         on_root(COMM, fail)

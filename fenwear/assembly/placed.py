@@ -13,7 +13,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.interface import (
     ContactPair,
     RigidEquilibrium,
@@ -128,7 +128,7 @@ class Placed:
             CaseError: it was made in Python, without one.
         """
         if self.made_from is None:
-            raise CaseError(Problem("", "expected bodies made from a case: those made in Python have none"))
+            raise CaseError(InputError("", "expected bodies made from a case: those made in Python have none"))
         return self.made_from
 
     @property
@@ -291,7 +291,7 @@ class Placed:
         slides = self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
         if not (slides > ROUNDING * slides.max()).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
-            raise CaseError(Problem("motion.centre", message))
+            raise CaseError(InputError("motion.centre", message))
         wear = self.phases_wear
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
@@ -371,7 +371,7 @@ def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
     out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
     if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
         raise CaseError(
-            Problem(
+            InputError(
                 "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
             )
         )

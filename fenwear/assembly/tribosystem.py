@@ -16,7 +16,7 @@ from fenwear.assembly.placed import Placed
 from fenwear.bodies.condensation import CondensedBody, condense, respond_to_load
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
 from fenwear.contact.full import FullContact
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import (
@@ -99,7 +99,7 @@ class Tribosystem(Placed):
                 return
             gaps.append(float(contact.gap.min()))
         raise CaseError(
-            Problem(
+            InputError(
                 "geometry",
                 f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
                 "expected a punch that its supports let come down, or that starts in contact",
@@ -221,7 +221,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         CaseError: there is no heat, or a body has no heat sink.
     """
     if system.heat is None or system.bodies.heat is None:
-        raise CaseError(Problem("heat", "missing, but required here"))
+        raise CaseError(InputError("heat", "missing, but required here"))
     return prepare_steady(
         system.heat,
         system.bodies.heat,
@@ -238,7 +238,7 @@ def gap_rows(system: Tribosystem) -> tuple[Array, Array]:
     """Return the gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K."""
     punch, strip = system.condensed.punch.by_temperature, system.condensed.strip.by_temperature
     if punch is None or strip is None:
-        raise CaseError(Problem("heat", "missing, but required here"))
+        raise CaseError(InputError("heat", "missing, but required here"))
     return punch, -strip
 
 

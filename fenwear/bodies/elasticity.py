@@ -25,7 +25,7 @@ from fenwear.bodies.factor import Factor
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
 from fenwear.case import Body, Kind, Load, Support
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
 PREFIX = "fenwear_elasticity_"
@@ -98,7 +98,7 @@ class ElasticBody:
         try:
             form = fem.form(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
-            raise CaseError(Problem(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
+            raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
         self.stiffness = assembled(form, bcs)
         self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
         self._factor: Factor | None = None
@@ -149,7 +149,7 @@ class ElasticBody:
     def _component(self, axis: str, key: str) -> int:
         known = axes(self.dim)
         if axis not in known:
-            raise CaseError(Problem(key, f"expected {', '.join(known)}, got {axis!r}"))
+            raise CaseError(InputError(key, f"expected {', '.join(known)}, got {axis!r}"))
         return known[axis]
 
     def _held(self, component: int, dofs: NDArray[np.int32]) -> fem.DirichletBC:
@@ -169,7 +169,7 @@ class ElasticBody:
         missing = points[found == 0]
         if len(missing):
             place = ", ".join("(" + ", ".join(f"{c:g}" for c in p) + ")" for p in missing)
-            raise CaseError(Problem(f"{key}.at", f"a pin off the {body.name}: no node of its mesh at {place} mm"))
+            raise CaseError(InputError(f"{key}.at", f"a pin off the {body.name}: no node of its mesh at {place} mm"))
         return to_parent[(distance < tolerance).any(axis=1)]
 
     def _size(self) -> float:
@@ -218,7 +218,7 @@ class ElasticBody:
         if loose:
             name = self.body.name
             message = f"the {name} is free to {' and to '.join(loose)}, friction pulls it"
-            raise CaseError(Problem(f"{name}.supports", message))
+            raise CaseError(InputError(f"{name}.supports", message))
         return list((basis @ echelon).T.copy()), [names[columns[p]] for p in pivots]
 
     def _owned_dofs(self, supports: list[fem.DirichletBC]) -> NDArray[np.int32]:
@@ -293,7 +293,7 @@ def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.fl
         known = ", ".join(sorted({*body.curves, *body.points}))
         entity = ENTITIES[body.mesh.topology.dim - 1]
         message = f"no physical {entity} or point {support.on!r} on the {body.name}; the geometry has {known}"
-        raise CaseError(Problem(f"{key}.on", message))
+        raise CaseError(InputError(f"{key}.on", message))
     return body.points[support.on]
 
 

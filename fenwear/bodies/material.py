@@ -16,7 +16,7 @@ from dolfinx.mesh import Mesh
 
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Kind, Material
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 
 def strain(u: Any) -> Any:
@@ -190,14 +190,14 @@ def isotropic(body: BodyMesh, regions: dict[str, str], materials: dict[str, Mate
 
 def _check_regions(body: BodyMesh, regions: dict[str, str]) -> None:
     problems = [
-        Problem(
+        InputError(
             f"{body.name}.regions.{name}",
             f"no physical surface of that name; the geometry has {', '.join(body.regions)}",
         )
         for name in regions
         if name not in body.regions
     ] + [
-        Problem(f"{body.name}.regions", f"no material for the physical surface {name!r}")
+        InputError(f"{body.name}.regions", f"no material for the physical surface {name!r}")
         for name in body.regions
         if name not in regions
     ]

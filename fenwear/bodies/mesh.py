@@ -23,7 +23,7 @@ from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.mesh_check import element_problems
 from fenwear.case import Geometry, Kind
-from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.parallel import on_root
 
 BODIES = ("punch", "strip")
@@ -57,7 +57,7 @@ class BodyMesh:
         """
         if group not in self.curves:
             entity = ENTITIES[self.mesh.topology.dim - 1]
-            raise CaseError(Problem(key, f"no physical {entity} {group!r} on the {self.name}{_known(self.curves)}"))
+            raise CaseError(InputError(key, f"no physical {entity} {group!r} on the {self.name}{_known(self.curves)}"))
         return self.curves[group]
 
 
@@ -73,17 +73,17 @@ def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]
         CaseError: the name is another one, or a group is missing or has no facets.
     """
     if name not in BODIES:
-        raise CaseError(Problem("name", f"expected one of {' and '.join(BODIES)}, got {name!r}"))
+        raise CaseError(InputError("name", f"expected one of {' and '.join(BODIES)}, got {name!r}"))
     fdim = mesh.topology.dim - 1
     facets, values = [], []
     for tag, (group, marker) in enumerate(groups.items(), start=1):
         found = locate_entities_boundary(mesh, fdim, marker)
         if mesh.comm.allreduce(len(found)) == 0:
-            raise CaseError(Problem(group, f"no facet on the boundary of the {name} belongs to it"))
+            raise CaseError(InputError(group, f"no facet on the boundary of the {name} belongs to it"))
         facets.append(found)
         values.append(np.full(len(found), tag, dtype=np.int32))
     if f"{name}_contact" not in groups:
-        raise CaseError(Problem(f"{name}_contact", f"missing, but required{_known(groups)}"))
+        raise CaseError(InputError(f"{name}_contact", f"missing, but required{_known(groups)}"))
     order = np.argsort(np.concatenate(facets), kind="stable")
     every, first = np.unique(np.concatenate(facets)[order], return_index=True)
     facet_tags = meshtags(mesh, fdim, every.astype(np.int32), np.concatenate(values)[order][first])
@@ -116,13 +116,13 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
     path = next((p for p in (*places, ready / geometry.file) if p.is_file()), None)
     if path is None:
         names = ", ".join(sorted(p.name for p in ready.glob("*.geo")))
-        raise CaseError(Problem("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
+        raise CaseError(InputError("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
     if path.suffix not in (".geo", ".msh"):
-        raise CaseError(Problem("geometry.file", f"expected a .geo or a .msh file, got {geometry.file!r}"))
+        raise CaseError(InputError("geometry.file", f"expected a .geo or a .msh file, got {geometry.file!r}"))
     if path.suffix == ".msh" and geometry.order != 1:
-        raise CaseError(Problem("geometry.order", "a .msh file has its own; it belongs to a .geo file"))
+        raise CaseError(InputError("geometry.order", "a .msh file has its own; it belongs to a .geo file"))
     if path.suffix == ".msh" and geometry.parameters:
-        raise CaseError(Problem("geometry.parameters", "a .msh file has none; they belong to a .geo file"))
+        raise CaseError(InputError("geometry.parameters", "a .msh file has none; they belong to a .geo file"))
     return path
 
 
@@ -167,7 +167,7 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path, kind: Kind = 
         try:
             path.touch()
         except OSError as error:
-            raise CaseError(Problem(str(path), f"cannot be written: {error.strerror}")) from None
+            raise CaseError(InputError(str(path), f"cannot be written: {error.strerror}")) from None
         gmsh.write(str(path))
         if not path.read_bytes().endswith(b"$EndElements\n"):  # gmsh does not tell
             path.unlink()
@@ -205,7 +205,7 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind) -> None:
             gmsh.model.mesh.generate(_dim(kind))
             gmsh.model.mesh.setOrder(geometry.order)
     except Exception as error:  # gmsh raises bare Exception only
-        raise CaseError(Problem("geometry.file", f"gmsh on {path.name}: {error}")) from None
+        raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
     _check_groups(gmsh, path, kind)
 
 
@@ -237,13 +237,13 @@ def _check_parameters(geometry: Geometry, path: Path) -> None:
         message = (
             f"{path.name} defines a Macro, which gmsh reads safely only once in a process: write it out, or give a .msh"
         )
-        raise CaseError(Problem("geometry.file", message))
+        raise CaseError(InputError("geometry.file", message))
     blocks = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", text, re.DOTALL)
     known = sorted({name for block in blocks for name in re.findall(r"(\w+)\s*=", block)})
     unknown = [name for name in geometry.parameters if name not in known]
     if unknown:
         message = f"{path.name} has no such parameter; it has {', '.join(known)}"
-        raise CaseError([Problem(f"geometry.parameters.{name}", message) for name in unknown])
+        raise CaseError([InputError(f"geometry.parameters.{name}", message) for name in unknown])
 
 
 def _groups(gmsh: Any, dim: int) -> dict[str, int]:
@@ -275,7 +275,7 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
         found = element_problems(gmsh, groups, axisymmetric=kind == "axisymmetric")
         problems = [f"{path.name}: {text}" for text in found]
     if problems:
-        raise CaseError([Problem("geometry.file", text) for text in problems])
+        raise CaseError([InputError("geometry.file", text) for text in problems])
 
 
 def _element_types(gmsh: Any, dim: int, tag: int) -> set[int]:

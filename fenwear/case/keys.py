@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from fenwear.case.schema import Body, Case, Dependence, Unit, WearLaw, part_models
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false"}
 
@@ -71,7 +71,7 @@ def find_keys(path: str) -> list[Key]:
         same = [key for key in known if key.rpartition(".")[2] == last]
         close = same or difflib.get_close_matches(path, known, 3, 0.5)
         hint = f"; did you mean {' or '.join(close[:3])}?" if close else "; fenwear info KEY explains one key or table"
-        raise CaseError(Problem(path, f"no such key{hint}"))
+        raise CaseError(InputError(path, f"no such key{hint}"))
     below = [key for key in keys if any(f.table and key.path.startswith(f"{f.path}.") for f in found)]
     return [*found, *below]
 

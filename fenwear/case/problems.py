@@ -8,7 +8,7 @@ from typing import Any
 
 from fenwear.case.schema import Case, Dependence, OneWay, Oscillation, Reciprocating, Rotation, Tabulated, part_models
 from fenwear.case.units import shown
-from fenwear.errors import Problem
+from fenwear.errors import InputError
 
 MOTIONS: dict[str | int, type] = {
     "reciprocating": Reciprocating,
@@ -29,7 +29,7 @@ EXPECTED = {
 }
 
 
-def problems_of(error: Any, data: Mapping[str, Any]) -> list[Problem]:  # noqa: PLR0911
+def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noqa: PLR0911
     """Turn one error of pydantic into problems with the key's path as in the case file.
 
     Args:
@@ -41,30 +41,30 @@ def problems_of(error: Any, data: Mapping[str, Any]) -> list[Problem]:  # noqa: 
     got = f", got {shown(error['input'])}"
     match error["type"]:
         case "extra_forbidden":
-            return [Problem(key, f"unknown key{_suggestion(error['loc'])}")]
+            return [InputError(key, f"unknown key{_suggestion(error['loc'])}")]
         case "missing":
-            return [Problem(key, "missing, but required")]
+            return [InputError(key, "missing, but required")]
         case "union_tag_not_found" | "union_tag_invalid":
-            return [Problem(f"{key}.kind", f"expected one of {', '.join(map(str, MOTIONS))}")]
+            return [InputError(f"{key}.kind", f"expected one of {', '.join(map(str, MOTIONS))}")]
         case "too_short":
-            return [Problem(key, f"expected {_entries('at least', error['ctx']['min_length'], error)}")]
+            return [InputError(key, f"expected {_entries('at least', error['ctx']['min_length'], error)}")]
         case "too_long":
-            return [Problem(key, f"expected {_entries('at most', error['ctx']['max_length'], error)}")]
+            return [InputError(key, f"expected {_entries('at most', error['ctx']['max_length'], error)}")]
         case "literal_error":
-            return [Problem(key, f"expected {message}{got}{_nearest(error['input'], message)}")]
+            return [InputError(key, f"expected {message}{got}{_nearest(error['input'], message)}")]
         case "value_error":
             return _own_problems(key, message)
         case kind if kind in EXPECTED:
-            return [Problem(key, f"expected {EXPECTED[kind]}{got}")]
-    return [Problem(key, f"expected {message[:1].lower()}{message[1:]}{got}")]
+            return [InputError(key, f"expected {EXPECTED[kind]}{got}")]
+    return [InputError(key, f"expected {message[:1].lower()}{message[1:]}{got}")]
 
 
-def _own_problems(key: str, message: str) -> list[Problem]:
+def _own_problems(key: str, message: str) -> list[InputError]:
     """Return the problems that a check of the schema tells."""
     if not key:
-        return [Problem(*line.split(": ", 1)) for line in message.splitlines()]
+        return [InputError(*line.split(": ", 1)) for line in message.splitlines()]
     name, colon, rest = message.partition(": ")
-    return [Problem(f"{key}.{name}", rest) if colon and name.isidentifier() else Problem(key, message)]
+    return [InputError(f"{key}.{name}", rest) if colon and name.isidentifier() else InputError(key, message)]
 
 
 def _entries(how: str, count: int, error: Any) -> str:

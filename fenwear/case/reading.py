@@ -14,7 +14,7 @@ from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
 from fenwear.case.schema import Case
 from fenwear.case.units import shown
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 
 def builtin_cases() -> dict[str, str]:
@@ -46,23 +46,23 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if path.suffix != ".toml" and not path.exists():
         if source not in builtin_cases():
             known = ", ".join(builtin_cases())
-            raise CaseError(Problem(source, f"no such case file, nor a built-in case ({known})"))
+            raise CaseError(InputError(source, f"no such case file, nor a built-in case ({known})"))
         text, folder = (resources.files("fenwear") / "cases" / f"{source}.toml").read_text("utf-8"), None
     else:
         text, folder = _read_text(path), path.parent
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise CaseError(Problem(source, f"not a TOML file: {error}")) from None
+        raise CaseError(InputError(source, f"not a TOML file: {error}")) from None
     except RecursionError:
-        raise CaseError(Problem(source, "not a TOML file that can be read: it nests too deeply")) from None
+        raise CaseError(InputError(source, "not a TOML file that can be read: it nests too deeply")) from None
     base = data.pop("base", None)
     if base is None:
         return data, folder
     if not isinstance(base, str):
-        raise CaseError(Problem("base", f"expected the name of a case, got {shown(base)}"))
+        raise CaseError(InputError("base", f"expected the name of a case, got {shown(base)}"))
     if base in base_of or len(base_of) > 8:
-        raise CaseError(Problem("base", f"{base!r} has itself as its base"))
+        raise CaseError(InputError("base", f"{base!r} has itself as its base"))
     if folder is not None and base.endswith(".toml"):
         base = str(folder / base)
     below, base_folder = _read_tables(base, (*base_of, base))
@@ -97,9 +97,9 @@ def _read_text(path: Path) -> str:
     try:
         return path.read_bytes().decode("utf-8")
     except UnicodeDecodeError as error:
-        raise CaseError(Problem(str(path), f"not a UTF-8 text (byte {error.start})")) from None
+        raise CaseError(InputError(str(path), f"not a UTF-8 text (byte {error.start})")) from None
     except OSError as error:
-        raise CaseError(Problem(str(path), f"cannot be read: {error.strerror}")) from None
+        raise CaseError(InputError(str(path), f"cannot be read: {error.strerror}")) from None
 
 
 def _apply(data: dict[str, Any], setting: str) -> None:
@@ -107,7 +107,7 @@ def _apply(data: dict[str, Any], setting: str) -> None:
     key, equals, text = setting.partition("=")
     names = [name.strip() for name in key.split(".")]
     if not equals or not all(names):
-        raise CaseError(Problem("--set", f"expected key.path=value, got {setting!r}"))
+        raise CaseError(InputError("--set", f"expected key.path=value, got {setting!r}"))
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
@@ -127,7 +127,7 @@ def _step(place: Any, name: str, setting: str) -> Any:
         return place[int(name)]
     if isinstance(place, dict):
         return place.setdefault(name, {})
-    raise CaseError(Problem("--set", f"{setting!r} reaches into {name!r}, which is not a table"))
+    raise CaseError(InputError("--set", f"{setting!r} reaches into {name!r}, which is not a table"))
 
 
 def changed_case(case: Case, *settings: str) -> Case:

@@ -29,7 +29,7 @@ from pydantic import (
 from fenwear.arrays import Array
 from fenwear.case.dependence import evaluate, parse_expression, variables_of
 from fenwear.case.units import convert, quantity_text, shown
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ class Dependence(_Part):
         if wrong.any():
             node = int(np.flatnonzero(wrong)[0])
             at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g}" for name in ("T", "p", "v"))
-            raise CaseError(Problem(key, f"expected zero or more, got {values[node]:g} at {at} (K, MPa, mm/s)"))
+            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at} (K, MPa, mm/s)"))
         return values * factor
 
 

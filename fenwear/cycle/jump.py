@@ -43,7 +43,7 @@ from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled
 from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Watch, drive, unwatched
 from fenwear.cycle.state import RunState, beginning, joined, parted
-from fenwear.errors import CaseError, ConvergenceError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn, WornLayer
@@ -84,7 +84,7 @@ def jump(
     strokes = system.motion.half_cycles
     if start is not None and start.half_cycle % strokes:
         message = f"jumps go on from a whole cycle only, got half-cycle {start.half_cycle}"
-        raise CaseError(Problem("run.integration", message))
+        raise CaseError(InputError("run.integration", message))
     stepper = _Stepper(system, watch)
     whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
     course = Course(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watch)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, steady_exchange
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 DIRECTIONS = (-1, 1)
 
@@ -40,7 +40,7 @@ def monotonic(system: Tribosystem) -> Monotonic:
         CaseError: the case has no heat, or a body loses heat nowhere.
     """
     if system.heat is None:
-        raise CaseError(Problem("heat", "missing, but required here"))
+        raise CaseError(InputError("heat", "missing, but required here"))
     speed = system.motion.mean_speed
     exchange = steady_exchange(system, [d * speed for d in DIRECTIONS])
     pressures = [system.optimum(d).pressure for d in DIRECTIONS]

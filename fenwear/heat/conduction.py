@@ -37,7 +37,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import Factor
 from fenwear.bodies.material import measure
 from fenwear.case import Body, Heat, Kind
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.heat.material import ConductionLaw
 from fenwear.interface.placement import ZERO
 from fenwear.sliding.field import ALONG_X, SlidingField
@@ -116,7 +116,7 @@ class HeatBody:
             tag = body.curve(prescribed.on, f"{body.name}.temperatures.{number}.on")
             if prescribed.on == f"{body.name}_contact":
                 key = f"{body.name}.temperatures.{number}.on"
-                raise CaseError(Problem(key, "the contact surface takes friction heat: it cannot be held"))
+                raise CaseError(InputError(key, "the contact surface takes friction heat: it cannot be held"))
             chosen = body.facet_tags.find(tag)
             marker[chosen] = HELD
             held.x.array[fem.locate_dofs_topological(self.space, dim, chosen)] = prescribed.temperature
@@ -193,7 +193,7 @@ class HeatBody:
         """
         if not self.loses_heat(speed, surroundings):
             message = f"the {self.body.name} loses heat nowhere: expected convection or a held temperature"
-            raise CaseError(Problem("heat.convection", message))
+            raise CaseError(InputError("heat.convection", message))
 
     def function(self, theta: Array) -> fem.Function:
         """Return the temperature of the owned degrees of freedom as a function; collective."""

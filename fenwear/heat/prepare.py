@@ -8,7 +8,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Heat
-from fenwear.errors import CaseError, HeatError, Problem
+from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
@@ -51,7 +51,7 @@ def prepare_exchange(
         HeatError: no basis gives temperatures that die out.
     """
     if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
-        raise CaseError(Problem("motion", "expected half-cycles of equal duration with heat"))
+        raise CaseError(InputError("motion", "expected half-cycles of equal duration with heat"))
     count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
     duration = motion.phases[0].duration / count
     speeds = motion.mean_speeds(count)

@@ -16,7 +16,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.interface.overlap import ChartedSurface, Overlap, overlap
 from fenwear.interface.placement import HERE, Placement
 from fenwear.interface.transfer import dual_transfer, wear_transfer
@@ -191,7 +191,7 @@ def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurfac
             "(are the names of punch and strip exchanged?)"
         )
     raise CaseError(
-        Problem(
+        InputError(
             "motion",
             f"the stroke runs off the meshed strip: {placement}, strip_contact spans x = {spans[1]} mm, "
             f"but punch_contact {spans[0]} mm (lengths of a mesh are taken as mm)",
@@ -215,7 +215,7 @@ def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int
 
 
 def _not_facing(reason: str) -> None:
-    raise CaseError(Problem("geometry", f"the contact surfaces do not face each other: {reason}"))
+    raise CaseError(InputError("geometry", f"the contact surfaces do not face each other: {reason}"))
 
 
 def interpolation(nodes: Array, degree: int, x: Array) -> Array:

@@ -19,7 +19,7 @@ from scipy import stats
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.errors import CaseError, ConvergenceError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.data import DataSet, Series
 from fenwear.life.keys import find_key, value_of, with_values
 from fenwear.life.model import Model, Snapshot
@@ -74,7 +74,7 @@ def parse_unknown(case: Case, text: str) -> Unknown:
         return Unknown(path)
     ends = bounds.split("..")
     if len(ends) != 2:
-        raise CaseError(Problem(f"--unknown {path}", f"expected bounds such as LOW..HIGH, got {bounds!r}"))
+        raise CaseError(InputError(f"--unknown {path}", f"expected bounds such as LOW..HIGH, got {bounds!r}"))
     low, high = (value_of(case, path, end, "--unknown") for end in ends)
     return Unknown(path, low, high)
 
@@ -168,7 +168,7 @@ class Calibration:
             CaseError: the data do not determine them.
         """
         if self.not_known:
-            raise CaseError([Problem("calibration", f"gives no distribution: {line}") for line in self.not_known])
+            raise CaseError([InputError("calibration", f"gives no distribution: {line}") for line in self.not_known])
         return Scatter.joint(
             [one.key for one in self.fitted],
             [one.value for one in self.fitted],
@@ -307,7 +307,7 @@ def _profile(series: Series, snapshot: Snapshot, x: Array, *, strict: bool) -> A
     cut = (x.min() < surface.x[0] - edge and depth[0] > worn) or (x.max() > surface.x[-1] + edge and depth[-1] > worn)
     if strict and cut:
         raise CaseError(
-            Problem(
+            InputError(
                 "geometry",
                 f"the profile goes from x = {x.min():g} to {x.max():g} mm, and the scar reaches the end of the contact "
                 f"surface, which goes from {surface.x[0]:g} to {surface.x[-1]:g} mm; expected a wider one",
@@ -366,31 +366,33 @@ class LeastSquares:
         self._lines, self.baseline_names = self._baselines()
         count = len(self.unknowns) + self._lines.shape[1]
         if len(self.observed) <= count:
-            raise CaseError(Problem("data", f"{len(self.observed)} measurements for {count} unknowns; expected more"))
+            raise CaseError(
+                InputError("data", f"{len(self.observed)} measurements for {count} unknowns; expected more")
+            )
 
     def _check(self, unknowns: Sequence[Unknown]) -> None:
         if not self.series:
-            raise CaseError(Problem("data", "expected at least one file of measurements"))
+            raise CaseError(InputError("data", "expected at least one file of measurements"))
         if not unknowns:
-            raise CaseError(Problem("--unknown", "expected at least one key"))
+            raise CaseError(InputError("--unknown", "expected at least one key"))
         keys = [unknown.key for unknown in unknowns]
-        problems = [Problem(f"--unknown {key}", "given twice") for key in dict.fromkeys(keys) if keys.count(key) > 1]
+        problems = [InputError(f"--unknown {key}", "given twice") for key in dict.fromkeys(keys) if keys.count(key) > 1]
         for name in self.baseline:
             if name not in BASELINES:
-                problems.append(Problem("--baseline", f"expected {' or '.join(BASELINES)}, got {name!r}"))
+                problems.append(InputError("--baseline", f"expected {' or '.join(BASELINES)}, got {name!r}"))
         if self.baseline and all(series.x is None for series in self.series):
-            problems.append(Problem("--baseline", "expected with profiles only: the data hold none"))
+            problems.append(InputError("--baseline", "expected with profiles only: the data hold none"))
         for one in self.data:
             for setting in one.settings:
                 key = setting.partition("=")[0]
                 if key in keys:
-                    problems.append(Problem(f"{one.name}: # set {key}", "is an unknown of the calibration too"))
+                    problems.append(InputError(f"{one.name}: # set {key}", "is an unknown of the calibration too"))
         kinds = {series.quantity for series in self.series}
         given = {series.sigma is not None for series in self.series}
         if len(given) > 1 or (len(kinds) > 1 and given == {False}):
             names = ", ".join(dict.fromkeys(one.name for one in self.data if any(s.sigma is None for s in one.series)))
-            problems.append(Problem(names, "gives no sigma; expected the standard deviation of every measurement where "
-                                    f"{' and '.join(sorted(kinds))} are fitted together"))  # fmt: skip
+            text = "gives no sigma; expected the standard deviation of every measurement where "
+            problems.append(InputError(names, text + f"{' and '.join(sorted(kinds))} are fitted together"))
         if problems:
             raise CaseError(problems)
 
@@ -458,7 +460,7 @@ class LeastSquares:
         """
         scale = float(np.abs(self.predicted(z)).max()) or 1.0
         problems = [
-            Problem(f"--unknown {one.unknown.key}", "has no influence on what was measured")
+            InputError(f"--unknown {one.unknown.key}", "has no influence on what was measured")
             for one, column in zip(self.unknowns, jacobian.T, strict=True)
             if np.abs(column).max() <= NO_INFLUENCE * scale
         ]
@@ -534,13 +536,13 @@ def _scaled(case: Case, unknown: Unknown) -> _Scaled:
     key = find_key(case, unknown.key, "--unknown")
     name = f"--unknown {unknown.key}"
     if not unknown.low < unknown.high:
-        raise CaseError(Problem(name, f"expected bounds that rise, got {unknown.low:g}..{unknown.high:g}"))
+        raise CaseError(InputError(name, f"expected bounds that rise, got {unknown.low:g}..{unknown.high:g}"))
     start = key.value if unknown.start is None else unknown.start
     if not unknown.low <= start <= unknown.high:
         ends = [bound for bound in (unknown.low, unknown.high) if np.isfinite(bound)]
         if unknown.start is not None or len(ends) < 2:
             raise CaseError(
-                Problem(name, f"its start {start:g} is outside of its bounds {unknown.low:g}..{unknown.high:g}")
+                InputError(name, f"its start {start:g} is outside of its bounds {unknown.low:g}..{unknown.high:g}")
             )
         # The case's own value says nothing then.
         start = float(np.sqrt(ends[0] * ends[1])) if ends[0] > 0 else float(np.mean(ends))
@@ -791,14 +793,14 @@ def between(found: Sequence[Calibration]) -> Scatter:
 def _between(found: Sequence[Calibration]) -> tuple[Array, Array, list[bool]]:
     """Return middle values, covariance between tests, and which unknowns are taken by their logarithms."""
     if len(found) < LEAST_TESTS:
-        raise CaseError(Problem("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(found)}"))
+        raise CaseError(InputError("--each", f"expected {LEAST_TESTS} tests or more for a scatter, got {len(found)}"))
     if len({tuple(one.values) for one in found}) > 1:
-        raise CaseError(Problem("--each", "expected the same unknowns in every calibration"))
+        raise CaseError(InputError("--each", "expected the same unknowns in every calibration"))
     logarithmic = [one.logarithmic for one in found[0].fitted]
     table = np.array([[np.log(u.value) if u.logarithmic else u.value for u in one.fitted] for one in found])
     covariance = np.atleast_2d(np.cov(table.T))
     if not (np.diag(covariance) > 0).all() or len(found) <= table.shape[1]:
-        raise CaseError(Problem("--each", "expected more tests than unknowns, and results that differ"))
+        raise CaseError(InputError("--each", "expected more tests than unknowns, and results that differ"))
     middle = table.mean(axis=0)
     return np.where(logarithmic, np.exp(middle), middle), covariance, logarithmic
 

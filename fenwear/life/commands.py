@@ -13,7 +13,7 @@ from typing import Any
 from mpi4py import MPI
 
 from fenwear.case import Case
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.life.calibrate import (
     Calibration,
     LeastSquares,
@@ -44,7 +44,7 @@ def _need(package: str, what: str) -> None:
         CaseError: it is not.
     """
     if find_spec(package) is None:
-        raise CaseError(Problem(what, f"needs the package {package}: on Debian, install python3-{package}"))
+        raise CaseError(InputError(what, f"needs the package {package}: on Debian, install python3-{package}"))
 
 
 def _folder(output: Path | None, what: str, name: str, comm: MPI.Comm) -> Path:
@@ -143,7 +143,7 @@ def run_calibrate(
     if found.at_bound:
         raise CaseError(
             [
-                Problem(f"--unknown {key}", "the data want a value beyond its bound; expected bounds that hold it "
+                InputError(f"--unknown {key}", "the data want a value beyond its bound; expected bounds that hold it "
                         f"(what was found is in {folder})")
                 for key in found.at_bound
             ]
@@ -233,10 +233,12 @@ def run_life(
         one = parse_scatter(case, text)
         scatter = one if scatter is None else scatter.and_also(one)
     if scatter is None:
-        raise CaseError(Problem("--scatter", "expected the distribution of at least one key, or --from a calibration"))
+        raise CaseError(
+            InputError("--scatter", "expected the distribution of at least one key, or --from a calibration")
+        )
     scatter.check(case)
     if resume and output is None:
-        raise CaseError(Problem("--resume", "expected the folder of the sampling to go on with, as -o DIR"))
+        raise CaseError(InputError("--resume", "expected the folder of the sampling to go on with, as -o DIR"))
     level = None if wanted is None else _wanted(case, quantity.life, wanted)
     folder = output if resume and output is not None else _folder(output, "life", name, comm)
     if resume:
@@ -264,13 +266,13 @@ def _check_folder(folder: Path, case: Case) -> None:
         CaseError: it does not.
     """
     if not (folder / SAMPLES).is_file():
-        raise CaseError(Problem("--resume", f"{folder} holds no {SAMPLES} to go on with"))
+        raise CaseError(InputError("--resume", f"{folder} holds no {SAMPLES} to go on with"))
     try:
         before = (folder / CASE).read_text("utf-8")
     except (OSError, UnicodeDecodeError):
-        raise CaseError(Problem("--resume", f"{folder / CASE} cannot be read")) from None
+        raise CaseError(InputError("--resume", f"{folder / CASE} cannot be read")) from None
     if before != case.to_toml():
-        raise CaseError(Problem("--resume", f"the case differs from {folder / CASE}, of which the samples are"))
+        raise CaseError(InputError("--resume", f"the case differs from {folder / CASE}, of which the samples are"))
 
 
 def _wanted(case: Case, life: str, text: str) -> float:

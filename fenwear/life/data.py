@@ -28,7 +28,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.case import Case, changed_case
 from fenwear.case.units import convert
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.life.quantities import UNITS, Quantity, check_quantity, parse_amount
 
 MEASURED = {"depth": "mm", "height": "mm", "volume": "mm^3", "mass": "N*s^2/mm", "friction": "", "temperature": "K"}
@@ -103,7 +103,7 @@ class _Reader:
         self.directives: dict[str, str] = {}
 
     def _fail(self, where: str, message: str) -> CaseError:
-        return CaseError(Problem(f"{self.path}{where and ': ' + where}", message))
+        return CaseError(InputError(f"{self.path}{where and ': ' + where}", message))
 
     def read(self) -> DataSet:
         rows = self._rows()

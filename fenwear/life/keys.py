@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fenwear.case import Case, changed_case
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 EXPONENTS = ("pressure_exponent", "speed_exponent")
 
@@ -65,7 +65,7 @@ def find_key(case: Case, path: str, option: str = "") -> Key:
         return keys[path]
     near = difflib.get_close_matches(path, keys, n=3)
     hint = f"; did you mean {' or '.join(near)}?" if near else "; `fenwear check` prints all keys"
-    raise CaseError(Problem(f"{option} {path}".strip(), f"the case has no such key with a real number{hint}"))
+    raise CaseError(InputError(f"{option} {path}".strip(), f"the case has no such key with a real number{hint}"))
 
 
 def settings_of(case: Case, values: Mapping[str, float]) -> list[str]:

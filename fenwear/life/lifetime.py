@@ -19,7 +19,7 @@ from scipy import stats
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.errors import CaseError, ConvergenceError, FenwearError, Problem
+from fenwear.errors import CaseError, ConvergenceError, FenwearError, InputError
 from fenwear.life.model import Model
 from fenwear.life.quantities import LIMIT, Quantity, check_quantity, evaluate, parse_quantity
 from fenwear.life.ranks import in_chunks
@@ -186,11 +186,11 @@ def lifetime(
     quantity = parse_quantity(until, "--until") if isinstance(until, str) else until
     if quantity.kind != "life":
         raise CaseError(
-            Problem("--until", f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}")
+            InputError("--until", f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}")
         )
     check_quantity(quantity, case, "--until")
     if samples < 2:
-        raise CaseError(Problem("--samples", f"expected two or more, got {samples}"))
+        raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))
     scatter.check(case)
     with_indices = len(scatter.keys) > 1 and not scatter.correlated
     design = _design(scatter, samples, seed, with_indices=with_indices)
@@ -269,7 +269,7 @@ class _Record:
             CaseError: the file exists, or belongs to another sampling.
         """
         if not resume and self.path.exists():
-            raise CaseError(Problem("-o", f"{self.path} exists already; expected a new folder, or --resume"))
+            raise CaseError(InputError("-o", f"{self.path} exists already; expected a new folder, or --resume"))
         with writing(self.path):
             self.folder.mkdir(parents=True, exist_ok=True)
             if not self.path.exists():
@@ -294,11 +294,11 @@ class _Record:
         try:
             text = self.path.read_bytes().decode("utf-8")
         except (OSError, UnicodeDecodeError):
-            raise CaseError(Problem("--resume", f"{self.path} cannot be read")) from None
+            raise CaseError(InputError("--resume", f"{self.path} cannot be read")) from None
         whole = text[: text.rfind("\n") + 1]  # an interrupted write leaves half a row behind
         rows = list(csv.reader(whole.splitlines()))
         if not rows or rows[0] != self.heading:
-            raise CaseError(Problem("--resume", f"{self.path} is of another sampling: expected the heading "
+            raise CaseError(InputError("--resume", f"{self.path} is of another sampling: expected the heading "
                                     f"{', '.join(self.heading)}"))  # fmt: skip
         done: dict[int, tuple[float, str]] = {}
         for line, row in enumerate(rows[1:], 2):
@@ -306,11 +306,13 @@ class _Record:
                 number, *values, life = int(row[0]), *map(float, row[1:-1])
             except (ValueError, IndexError):
                 raise CaseError(
-                    Problem("--resume", f"{self.path}: row {line}: is damaged; remove it and go on")
+                    InputError("--resume", f"{self.path}: row {line}: is damaged; remove it and go on")
                 ) from None
             if not 0 <= number < len(self.design) or not np.array_equal(values, self.design[number]):
-                raise CaseError(Problem("--resume", f"{self.path}: row {line} is of another sample: expected the same "
-                                        "--seed, --samples and --scatter"))  # fmt: skip
+                text = (
+                    f"{self.path}: row {line} is of another sample: expected the same --seed, --samples and --scatter"
+                )
+                raise CaseError(InputError("--resume", text))
             done[number] = (life, row[-1])
         if whole != text:
             with writing(self.path):

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.life.calibrate import Calibration, LeastSquares
 
 WALKERS_EACH = 4  # walkers for each variable; emcee wants two at least
@@ -53,9 +53,9 @@ def posterior(problem: LeastSquares, found: Calibration, steps: int, seed: int =
         CaseError: emcee is not installed, or too few steps.
     """
     if find_spec("emcee") is None:
-        raise CaseError(Problem("--posterior", "needs the package emcee: on Debian, install python3-emcee"))
+        raise CaseError(InputError("--posterior", "needs the package emcee: on Debian, install python3-emcee"))
     if steps < 10:
-        raise CaseError(Problem("--posterior", f"expected 10 steps or more, got {steps}"))
+        raise CaseError(InputError("--posterior", f"expected 10 steps or more, got {steps}"))
     z = [one.fitted(value) for one, value in zip(problem.unknowns, found.values.values(), strict=True)]
     problem.keep_jumps(z)
     minimizer = problem.minimizer(start=z)

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.case.units import convert
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.life.model import Model, Snapshot, WornSurface
 
 EDGE = 0.01  # of the largest depth: where a scar ends
@@ -132,9 +132,9 @@ def parse_amount(text: str, option: str) -> tuple[float, str]:
         except ValueError:
             continue
         if amount <= 0:
-            raise CaseError(Problem(option, f"expected more than zero, got {text!r}"))
+            raise CaseError(InputError(option, f"expected more than zero, got {text!r}"))
         return amount, what
-    raise CaseError(Problem(option, f"expected cycles, a distance or a time such as '3600 m', got {text!r}"))
+    raise CaseError(InputError(option, f"expected cycles, a distance or a time such as '3600 m', got {text!r}"))
 
 
 def parse_quantity(text: str, option: str = "--of") -> Quantity:
@@ -153,12 +153,12 @@ def parse_quantity(text: str, option: str = "--of") -> Quantity:
     if match is None or match["name"] not in UNITS:
         known = ", ".join([*UNITS, *WHOLE])
         examples = "'depth of punch at 3 mm after 3600 m', 'steady pressure' or 'cycles until depth 0.2 mm'"
-        raise CaseError(Problem(option, f"expected a quantity such as {examples}, got {text!r}; known are {known}"))
+        raise CaseError(InputError(option, f"expected a quantity such as {examples}, got {text!r}; known are {known}"))
     name, is_steady = match["name"], match["steady"] is not None
     if is_steady and (name in OF_RUNS or match["after"]):
-        raise CaseError(Problem(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
+        raise CaseError(InputError(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
     if name.startswith("lambda_") and not is_steady:
-        raise CaseError(Problem(option, f"expected 'steady {name}', got {words!r}"))
+        raise CaseError(InputError(option, f"expected 'steady {name}', got {words!r}"))
     body, at = _place(name, match, words, option)
     after = None if match["after"] is None else parse_amount(match["after"], option)
     return Quantity(words, name, "steady" if is_steady else "snapshot", UNITS[name], body, at, after)
@@ -167,18 +167,18 @@ def parse_quantity(text: str, option: str = "--of") -> Quantity:
 def _life(words: str, match: re.Match[str], option: str) -> Quantity:
     name, life = match["name"], match["life"] or "cycles"
     if life not in LIVES:
-        raise CaseError(Problem(option, f"expected cycles, distance or time until a level, got {words!r}"))
+        raise CaseError(InputError(option, f"expected cycles, distance or time until a level, got {words!r}"))
     if name not in GROWING:
-        raise CaseError(Problem(option, f"expected one of {', '.join(GROWING)} with a level, got {words!r}"))
+        raise CaseError(InputError(option, f"expected one of {', '.join(GROWING)} with a level, got {words!r}"))
     body, at = _place(name, match, words, option)
     try:
         level = convert(match["level"], UNITS[name])
     except ValueError as error:
-        raise CaseError(Problem(option, f"{words!r}: {error}")) from None
+        raise CaseError(InputError(option, f"{words!r}: {error}")) from None
     if re.fullmatch(r"[-+\d.eE]+", match["level"]):
-        raise CaseError(Problem(option, f"expected a level with its unit, such as '0.2 mm', got {words!r}"))
+        raise CaseError(InputError(option, f"expected a level with its unit, such as '0.2 mm', got {words!r}"))
     if level <= 0:
-        raise CaseError(Problem(option, f"expected a level above zero, got {words!r}"))
+        raise CaseError(InputError(option, f"expected a level above zero, got {words!r}"))
     return Quantity(words, name, "life", LIVES[life], body, at, None, level, life)
 
 
@@ -186,16 +186,16 @@ def _place(name: str, match: re.Match[str], words: str, option: str) -> tuple[st
     body = match["body"] or "punch"
     if body not in ("punch", "strip") or (match["body"] and name not in OF_A_BODY):
         raise CaseError(
-            Problem(option, f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
+            InputError(option, f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
         )
     if match["at"] is None:
         return body, None
     if name not in AT_A_PLACE:
-        raise CaseError(Problem(option, f"expected a place behind {', '.join(AT_A_PLACE)} only, got {words!r}"))
+        raise CaseError(InputError(option, f"expected a place behind {', '.join(AT_A_PLACE)} only, got {words!r}"))
     try:
         return body, convert(match["at"], "mm")
     except ValueError as error:
-        raise CaseError(Problem(option, f"{words!r}: {error}")) from None
+        raise CaseError(InputError(option, f"{words!r}: {error}")) from None
 
 
 def check_quantity(quantity: Quantity, case: Case, option: str = "--of") -> None:
@@ -205,11 +205,11 @@ def check_quantity(quantity: Quantity, case: Case, option: str = "--of") -> None
         CaseError: it needs heat, or the wear of a body that does not wear.
     """
     if quantity.name in ("temperature", "critical speed") and case.heat is None:
-        raise CaseError(Problem(option, f"{quantity.text!r} needs the table heat, which the case does not have"))
+        raise CaseError(InputError(option, f"{quantity.text!r} needs the table heat, which the case does not have"))
     if quantity.name in OF_A_BODY and getattr(case.wear, quantity.body) is None:
         other = "strip" if quantity.body == "punch" else "punch"
         message = f"{quantity.text!r}: the case has no wear.{quantity.body}; expected it 'of {other}'"
-        raise CaseError(Problem(option, message))
+        raise CaseError(InputError(option, message))
 
 
 # ---- Values of a snapshot ---------------------------------------------------------------------
@@ -218,14 +218,14 @@ def check_quantity(quantity: Quantity, case: Case, option: str = "--of") -> None
 def _at(x: Array, values: Array, place: float, text: str) -> float:
     slack = 1e-9 * (x[-1] - x[0])
     if not x[0] - slack <= place <= x[-1] + slack:
-        raise CaseError(Problem(text, f"x = {place:g} mm is not on the contact, from {x[0]:g} to {x[-1]:g} mm"))
+        raise CaseError(InputError(text, f"x = {place:g} mm is not on the contact, from {x[0]:g} to {x[-1]:g} mm"))
     return float(np.interp(place, x, values))
 
 
 def _worn(quantity: Quantity, snapshot: Snapshot) -> tuple[WornSurface, Array]:
     surface = snapshot.surfaces[quantity.body]
     if surface.depth is None:
-        raise CaseError(Problem(quantity.text, "a steady state knows no worn depth: it grows without end"))
+        raise CaseError(InputError(quantity.text, "a steady state knows no worn depth: it grows without end"))
     return surface, surface.depth
 
 
@@ -271,7 +271,7 @@ def _pressure(quantity: Quantity, snapshot: Snapshot) -> float:
 
 def _temperature(quantity: Quantity, snapshot: Snapshot) -> float:
     if snapshot.temperature is None:
-        raise CaseError(Problem(quantity.text, "needs the table heat, which the case does not have"))
+        raise CaseError(InputError(quantity.text, "needs the table heat, which the case does not have"))
     highest = snapshot.temperature.max(axis=(0, 1))
     return float(highest.max()) if quantity.at is None else _at(snapshot.x, highest, quantity.at, quantity.text)
 
@@ -284,7 +284,7 @@ def _volume_rate(quantity: Quantity, snapshot: Snapshot) -> float:
 def _velocity(quantity: Quantity, snapshot: Snapshot) -> float:
     if quantity.name not in snapshot.velocity:
         known = " and ".join(snapshot.velocity) or "none"
-        raise CaseError(Problem(quantity.text, f"the punch does not move so; its rigid motions are {known}"))
+        raise CaseError(InputError(quantity.text, f"the punch does not move so; its rigid motions are {known}"))
     return snapshot.velocity[quantity.name]
 
 

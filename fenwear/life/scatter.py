@@ -18,7 +18,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.life.keys import find_key, value_of, with_values
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Scatter:
 
         twice = [key for key in self.keys if key in other.keys]
         if twice:
-            raise CaseError([Problem(f"--scatter {key}", "has a distribution already") for key in twice])
+            raise CaseError([InputError(f"--scatter {key}", "has a distribution already") for key in twice])
         return Scatter(
             (*self.keys, *other.keys),
             ot.BlockIndependentDistribution([self.distribution, other.distribution]),
@@ -113,7 +113,7 @@ class Scatter:
                 except CaseError as error:
                     share = self._share_of_impossible(case, key, marginal)
                     problems.append(
-                        Problem(
+                        InputError(
                             f"--scatter {key}",
                             f"gives impossible values with a probability of {share:.2g}, such as {value:.4g} "
                             f"({error.problems[0].message}); expected one of possible values, such as lognormal",
@@ -160,21 +160,23 @@ def parse_scatter(case: Case, text: str) -> Scatter:
     match = _FORM.fullmatch(form)
     name = f"--scatter {path}"
     if not equals or match is None or match["kind"].lower() not in KINDS:
-        raise CaseError(Problem("--scatter", f"expected KEY=KIND(FIRST, SECOND) with {', '.join(KINDS)}, got {text!r}"))
+        raise CaseError(
+            InputError("--scatter", f"expected KEY=KIND(FIRST, SECOND) with {', '.join(KINDS)}, got {text!r}")
+        )
     find_key(case, path, "--scatter")
     kind, first, second = match["kind"].lower(), match["first"].strip(), match["second"].strip()
     middle = value_of(case, path, first, "--scatter")
     if kind == "uniform":
         high = value_of(case, path, second, "--scatter")
         if not middle < high:
-            raise CaseError(Problem(name, f"expected ends that rise, got {form!r}"))
+            raise CaseError(InputError(name, f"expected ends that rise, got {form!r}"))
         return Scatter((path,), ot.Uniform(middle, high), False, (f"{path}: uniform from {middle:.6g} to {high:.6g}",))
     spread = _spread(case, path, name, middle, second)
     if kind == "normal":
         line = f"{path}: normal, mean {middle:.6g}, standard deviation {spread:.4g}"
         return Scatter((path,), ot.Normal(middle, spread), False, (line,))
     if middle <= 0:
-        raise CaseError(Problem(name, f"expected a median above zero, got {first!r}"))
+        raise CaseError(InputError(name, f"expected a median above zero, got {first!r}"))
     variation = spread / middle
     width = float(np.sqrt(np.log1p(variation**2)))
     line = f"{path}: lognormal, median {middle:.6g}, coefficient of variation {100 * variation:.3g} %"
@@ -187,9 +189,9 @@ def _spread(case: Case, path: str, name: str, middle: float, text: str) -> float
     try:
         spread = abs(middle) * float(percentage[1]) / 100 if percentage else value_of(case, path, text, "--scatter")
     except ValueError:
-        raise CaseError(Problem(name, f"expected a percentage such as 50 %, got {text!r}")) from None
+        raise CaseError(InputError(name, f"expected a percentage such as 50 %, got {text!r}")) from None
     if not spread > 0:
-        raise CaseError(Problem(name, f"expected a spread above zero, got {text!r}"))
+        raise CaseError(InputError(name, f"expected a spread above zero, got {text!r}"))
     return spread
 
 
@@ -207,12 +209,12 @@ def load_scatter(path: Path, case: Case) -> Scatter:
         logarithmic = [bool(row["logarithmic"]) for row in rows]
         not_known = list(found["not_known"])
     except OSError as error:
-        raise CaseError(Problem(f"--from {place}", f"cannot be read: {error.strerror}")) from None
+        raise CaseError(InputError(f"--from {place}", f"cannot be read: {error.strerror}")) from None
     except (ValueError, KeyError, TypeError):
-        raise CaseError(Problem(f"--from {place}", "is not what `fenwear calibrate` writes")) from None
+        raise CaseError(InputError(f"--from {place}", "is not what `fenwear calibrate` writes")) from None
     if not_known or covariance is None:
         lines = not_known or ["its unknowns have no standard errors"]
-        raise CaseError([Problem(f"--from {place}", f"gives no distribution: {line}") for line in lines])
+        raise CaseError([InputError(f"--from {place}", f"gives no distribution: {line}") for line in lines])
     for key in keys:
         find_key(case, key, f"--from {place}:")
     return Scatter.joint(keys, values, np.array(covariance, dtype=float), logarithmic)

@@ -16,7 +16,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.case import Case
-from fenwear.errors import CaseError, ConvergenceError, Problem
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.keys import Key, find_key, with_values
 from fenwear.life.linearised import SteadyTangent, differentiable
 from fenwear.life.model import Model, Snapshot
@@ -132,18 +132,20 @@ def sensitivity(
         ConvergenceError: a state did not converge.
     """
     if not 0 <= spread < 1:
-        raise CaseError(Problem("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
+        raise CaseError(InputError("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
     wanted = [parse_quantity(q) if isinstance(q, str) else q for q in quantities]
     for quantity in wanted:
         check_quantity(quantity, case)
     found = [find_key(case, key, "--to") for key in keys]
     if not wanted or not found:
-        raise CaseError(Problem("--of" if not wanted else "--to", "expected at least one"))
+        raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
     model = Model(case)
     bases = [evaluate(model, quantity, {}) for quantity in wanted]
     for quantity, (value, _) in zip(wanted, bases, strict=True):
         if not np.isfinite(value):
-            raise CaseError(Problem("--of", f"{quantity.text!r} is never reached in this case: it has no derivative"))
+            raise CaseError(
+                InputError("--of", f"{quantity.text!r} is never reached in this case: it has no derivative")
+            )
     methods = [_method(model, quantity, method) for quantity in wanted]
     tangent = SteadyTangent(model.system(), model.steady({})) if "implicit" in methods else None
 
@@ -166,7 +168,7 @@ def _method(model: Model, quantity: Quantity, asked: Method | None) -> Method:
         return "implicit"
     if asked == "implicit":
         raise CaseError(
-            Problem("--method", f"{quantity.text!r} is not differentiated implicitly; expected 'differences'")
+            InputError("--method", f"{quantity.text!r} is not differentiated implicitly; expected 'differences'")
         )
     return "differences"
 
@@ -231,7 +233,7 @@ def _sides(case: Case, key: Key) -> tuple[bool, bool]:
     """
     below, above = (_possible(case, {key.path: key.value + sign * _step(key, STEPS[0])}) for sign in (-1, 1))
     if not (below or above):
-        raise CaseError(Problem(key.path, f"no value beside {key.value:g} is possible: it has no derivative"))
+        raise CaseError(InputError(key.path, f"no value beside {key.value:g} is possible: it has no derivative"))
     return below, above
 
 

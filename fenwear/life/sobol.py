@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 if TYPE_CHECKING:
     import openturns as ot
@@ -70,7 +70,7 @@ def sobol_design(distribution: ot.Distribution, size: int, seed: int) -> Array:
     if distribution.getDimension() == 1:
         return np.array(distribution.getSample(size))
     if not distribution.hasIndependentCopula():
-        raise CaseError(Problem("--sobol", "Sobol indices need inputs that are independent of each other"))
+        raise CaseError(InputError("--sobol", "Sobol indices need inputs that are independent of each other"))
     return np.array(ot.SobolIndicesExperiment(distribution, size, False).generate())
 
 
@@ -83,9 +83,9 @@ def sobol_indices(names: tuple[str, ...], design: Array, outputs: Array, size: i
     import openturns as ot
 
     if not np.isfinite(outputs).all():
-        raise CaseError(Problem("--sobol", "some results are not finite: Sobol indices need all of them"))
+        raise CaseError(InputError("--sobol", "some results are not finite: Sobol indices need all of them"))
     if np.ptp(outputs) == 0:
-        raise CaseError(Problem("--sobol", "all results are the same: nothing to share out"))
+        raise CaseError(InputError("--sobol", "all results are the same: nothing to share out"))
     ot.RandomGenerator.SetSeed(seed)
     centred = outputs - outputs.mean()
     found = ot.MartinezSensitivityAlgorithm(ot.Sample(design), ot.Sample(centred[:, None]), size)

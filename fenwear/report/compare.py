@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray
 
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.report.figures import directions_present, mark_few, read_history
 from fenwear.report.key_numbers import flat, number_text, read_case, read_summary
 from fenwear.report.style import DIRECTIONS, contact_axis, legend_beside, panels, run_style
@@ -64,8 +64,8 @@ def compare(directories: Sequence[Path]) -> Comparison:
         CaseError: fewer than two, or one is no run; lists all that are wrong.
     """
     if len(directories) < 2:
-        raise CaseError(Problem("DIR", "expected the folders of at least two runs"))
-    problems: list[Problem] = []
+        raise CaseError(InputError("DIR", "expected the folders of at least two runs"))
+    problems: list[InputError] = []
     read = []
     for directory in directories:
         try:
@@ -132,11 +132,11 @@ def draw_comparison(comparison: Comparison, path: Path) -> Path:
         OutputError: there is no room for it.
     """
     if path.suffix not in FORMATS:
-        raise CaseError(Problem("-o", f"expected a file ending in {', '.join(FORMATS)}, got {str(path)!r}"))
+        raise CaseError(InputError("-o", f"expected a file ending in {', '.join(FORMATS)}, got {str(path)!r}"))
     try:
         path.touch()
     except OSError as error:
-        raise CaseError(Problem("-o", f"{path} cannot be written: {error.strerror}")) from None
+        raise CaseError(InputError("-o", f"{path} cannot be written: {error.strerror}")) from None
     with writing(path):
         comparison_figure(comparison).savefig(path, dpi=150)
     return path

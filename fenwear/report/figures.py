@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.report.boundary import boundary_figure
 from fenwear.report.style import (
     DIRECTIONS,
@@ -40,7 +40,7 @@ def open_history(directory: Path) -> xarray.Dataset:
     try:
         return xarray.open_dataset(path, engine="h5netcdf")
     except (OSError, ValueError) as error:
-        raise CaseError(Problem(str(path), f"no readable history of a run: {error}")) from None
+        raise CaseError(InputError(str(path), f"no readable history of a run: {error}")) from None
 
 
 def read_history(directory: Path) -> xarray.Dataset:
@@ -51,9 +51,9 @@ def read_history(directory: Path) -> xarray.Dataset:
     """
     with open_history(directory) as history:
         if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
-            raise CaseError(Problem(str(directory / HISTORY), "no history of a run: it has other variables"))
+            raise CaseError(InputError(str(directory / HISTORY), "no history of a run: it has other variables"))
         if history.sizes["half_cycle"] == 0:
-            raise CaseError(Problem(str(directory / HISTORY), "holds no half-cycle yet"))
+            raise CaseError(InputError(str(directory / HISTORY), "holds no half-cycle yet"))
         return history.load()
 
 

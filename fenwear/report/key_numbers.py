@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 
 UNITS = {"_per_s": "1/s", "_MPa": "MPa", "_mm2": "mm²", "_mm": "mm", "_K": "K", "_mJ": "mJ", "_seconds": "s"}
@@ -50,9 +50,9 @@ def read_summary(directory: Path) -> dict[str, Any]:
     except FileNotFoundError:
         return {}
     except (OSError, ValueError) as error:
-        raise CaseError(Problem(str(path), f"no readable summary of a run: {error}")) from None
+        raise CaseError(InputError(str(path), f"no readable summary of a run: {error}")) from None
     if not isinstance(summary, dict):
-        raise CaseError(Problem(str(path), "no summary of a run"))
+        raise CaseError(InputError(str(path), "no summary of a run"))
     return summary
 
 
@@ -67,9 +67,9 @@ def read_case(directory: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text("utf-8"))
     except OSError as error:
         message = f"{error.strerror}; expected the folder of a run"
-        raise CaseError(Problem(str(path), message)) from None
+        raise CaseError(InputError(str(path), message)) from None
     except ValueError as error:
-        raise CaseError(Problem(str(path), f"no readable case of a run: {error}")) from None
+        raise CaseError(InputError(str(path), f"no readable case of a run: {error}")) from None
 
 
 def flat(tables: Any, prefix: str = "") -> dict[str, Any]:

@@ -22,7 +22,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
-from fenwear.errors import CaseError, OutputError, Problem
+from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
@@ -155,14 +155,14 @@ def _read_temperature(folder: Path, body: HeatBody) -> Array:
 
 
 def _damaged(folder: Path) -> CaseError:
-    return CaseError(Problem("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
+    return CaseError(InputError("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
 
 
 def _find(directory: Path) -> Path:
     for name in (FOLDER, OLD):  # killed between two renames only the old one is left
         if (directory / name / ARRAYS).is_file():
             return directory / name
-    raise CaseError(Problem("--resume", f"no checkpoint in {directory}"))
+    raise CaseError(InputError("--resume", f"no checkpoint in {directory}"))
 
 
 def reached(directory: Path) -> int | None:
@@ -190,12 +190,12 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
     present = _flat(tomllib.loads(system.case.to_toml()))
     keys = sorted({*saved, *present})
     problems = [
-        Problem(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")
+        InputError(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")
         for key in keys
         if saved.get(key) != present.get(key) and not key.startswith(FREE_KEYS)
     ]
     if problems:
-        raise CaseError([Problem("--resume", "the checkpoint is of another case"), *problems])
+        raise CaseError([InputError("--resume", "the checkpoint is of another case"), *problems])
     arrays = _arrays(folder)
     for names in (WEAR, FOLLOWED):
         for name, unworn in _depths(names, system.unworn()).items():

@@ -17,7 +17,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.versions import versions
@@ -118,12 +118,12 @@ def make_directory(path: Path) -> None:
     """
     try:
         if path.exists() and (not path.is_dir() or any(path.iterdir())):
-            raise CaseError(Problem("-o", f"{path} exists already; expected a new or an empty folder"))
+            raise CaseError(InputError("-o", f"{path} exists already; expected a new or an empty folder"))
         path.mkdir(parents=True, exist_ok=True)
         probe = path / CASE
         probe.touch()
     except OSError as error:
-        raise CaseError(Problem("-o", f"{path} cannot be written: {error.strerror}")) from None
+        raise CaseError(InputError("-o", f"{path} cannot be written: {error.strerror}")) from None
 
 
 def free_directory(stem: Path) -> Path:
@@ -200,7 +200,7 @@ class HistoryWriter:
                 raise KeyError(missing[0])  # of an older version
         except (OSError, KeyError, RuntimeError):
             message = "cannot be read; remove it to go on with a new one, which begins at the checkpoint"
-            raise CaseError(Problem(str(self.path), message)) from None
+            raise CaseError(InputError(str(self.path), message)) from None
         self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
         if self.rows < len(stored):
             self._copy()

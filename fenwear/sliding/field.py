@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.interface.placement import ZERO, Placement, Vector, in_space
 
 
@@ -36,7 +36,7 @@ class SlidingField:
     def __post_init__(self) -> None:
         """Raise where it shifts and turns at once: its axis would have to move along."""
         if ZERO not in (self.shift, self.turn):
-            raise CaseError(Problem("motion", "expected a translation or a rotation of the counter-body, not both"))
+            raise CaseError(InputError("motion", "expected a translation or a rotation of the counter-body, not both"))
 
     def rate(self, x: Array, normal: Array) -> Array:
         """Return what each point slides for a unit of the stroke's law (n,): 1, or mm/rad; e_n (n, d) its normal."""

@@ -18,7 +18,7 @@ from scipy.special import beta, betainc
 
 from fenwear.arrays import Array
 from fenwear.case import Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 
 DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
 
@@ -221,7 +221,7 @@ def _power(stroke: _Stroke, begin: float, end: float, exponent: float) -> float:
     except (OverflowError, ZeroDivisionError):
         power = math.inf
     if not math.isfinite(power):
-        raise CaseError(Problem("motion", f"its speed to the power of {exponent:g} is beyond all numbers"))
+        raise CaseError(InputError("motion", f"its speed to the power of {exponent:g} is beyond all numbers"))
     return power
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fenwear.errors import CaseError, Problem
+from fenwear.errors import CaseError, InputError
 from fenwear.paper import BRIEF, FULL, Scope, paper_rows, section
 from fenwear.parallel import on_root
 from fenwear.results.history import CASE, free_directory, make_directory
@@ -102,7 +102,7 @@ def _write(directory: Path, found: dict[str, Any], text: str) -> None:
         (directory / NUMBERS).write_text(json.dumps(found, indent=2) + "\n", "utf-8")
         (directory / PAGE).write_text(text, "utf-8")
     except OSError as error:
-        raise CaseError(Problem("-o", f"{directory} cannot be written: {error.strerror}")) from None
+        raise CaseError(InputError("-o", f"{directory} cannot be written: {error.strerror}")) from None
 
 
 def _lines(outcome: Outcome) -> list[str]:

@@ -15,7 +15,7 @@ from typing import Any, Literal, SupportsFloat
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.errors import CaseError, FenwearError, Problem
+from fenwear.errors import CaseError, FenwearError, InputError
 
 Verdict = Literal["agrees", "differs", "not run"]
 
@@ -213,7 +213,7 @@ def registered(names: Sequence[str] = (), besides: Sequence[str] = ()) -> list[V
         CaseError: a name that no case has.
     """
     known = [*_CASES, *besides]
-    problems = [Problem("--only", _unknown(name, known)) for name in names if name not in known]
+    problems = [InputError("--only", _unknown(name, known)) for name in names if name not in known]
     if problems:
         raise CaseError(problems)
     return [_CASES[name] for name in names if name in _CASES] if names else list(_CASES.values())

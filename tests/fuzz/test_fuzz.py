@@ -18,7 +18,7 @@ import cases
 
 from fenwear import CaseError, assemble, make_case
 from fenwear.case.dependence import evaluate, parse_expression
-from fenwear.errors import FenwearError, Problem
+from fenwear.errors import FenwearError, InputError
 
 
 @pytest.mark.process
@@ -66,8 +66,8 @@ def test_messages_speak_no_python() -> None:
 def test_python_is_noticed(text: str) -> None:
     """What the test above looks for is found."""
     key, _, message = text.partition(": ")
-    assert cases.said(CaseError(Problem(key, message))).startswith("BAD")
-    assert not cases.said(CaseError(Problem("contact.friction", f"got {text!r}"))).startswith("BAD")  # quoted only
+    assert cases.said(CaseError(InputError(key, message))).startswith("BAD")
+    assert not cases.said(CaseError(InputError("contact.friction", f"got {text!r}"))).startswith("BAD")  # quoted only
 
 
 @pytest.mark.process

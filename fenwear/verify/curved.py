@@ -7,6 +7,7 @@ import numpy as np
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
+from fenwear.clipped import contact_ends
 from fenwear.verify.bodies import STEEL, builtin
 from fenwear.verify.contact import measured_half_width, semi_ellipse
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
@@ -129,3 +130,29 @@ def rounded_punch() -> Result:
         lines.append(Line(f"exact, {case}", dense, rounded(dense, b, load), reference=True))
         lines.append(Line(f"fenwear, {case}", x, p))
     return Result(rows, [Plot("Punch with rounded edges: pressure", "x (mm)", "pressure (MPa)", lines)])
+
+
+@verification(
+    "clipped",
+    "Contact that its meshed surface clips: it is told, with the width that is needed",
+    "Hertz for the first contact; the chord c of a cylinder worn flat, A = c³ / (12 R)",
+)
+def clipped_contact() -> Result:
+    """A surface of 0.1 mm under loads whose contact is wider, then worn to a chord of 0.5 mm; and one wide enough."""
+    modulus = 1 / sum((1 - m["poisson"] ** 2) / m["young"] for m in (LIGHT, STEEL))
+    rows: list[Row] = []
+    for width, load in ((0.1, 150.0), (0.6, 150.0)):
+        settings = (f"geometry.parameters.contact_width={width}", "geometry.parameters.elements_along_contact=20")
+        system = vary(cylinder(20), *settings)
+        a = 2 * np.sqrt(load * RADIUS / (np.pi * modulus))
+        _, p = pressed(system, load)
+        ends = contact_ends(system)
+        told = [] if ends is None else ends.reached((bool(p[0] > 0), bool(p[-1] > 0)))
+        clipped = 2.0 if 2 * a > width else 0.0
+        rows.append(number(f"surface of {width:g} mm: clipped ends", clipped, float(len(told)), 1e-12, scale=1.0))
+        if ends is not None and told:
+            rows.append(number("width needed, unworn (mm)", 2 * a, ends.width_needed(0.0, load), 0.01))
+            chord = 0.5
+            area = chord**3 / (12 * RADIUS)
+            rows.append(number("width needed, worn to 0.5 mm (mm)", chord, ends.width_needed(area, 1e-3), 0.01))
+    return Result(rows)

@@ -9,10 +9,11 @@ import pytest
 from petsc4py import PETSc
 from scipy.optimize import brentq
 
-from fenwear import ConvergenceError, Tribosystem
+from fenwear import ConvergenceError, Tribosystem, assemble
 from fenwear.arrays import Array
-from fenwear.contact import ContactState
+from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.full import FullContact
+from fenwear.sliding.wear import Worn
 
 P = 1000.0  # load per thickness, N/mm
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # c = 1.6: the rear edge lifts off
@@ -212,3 +213,26 @@ def test_crowned_punch(assembled: Callable[..., Tribosystem]) -> None:
     assert inner.sum() > 15
     np.testing.assert_allclose(pressure[inner], exact[inner], rtol=0.01)
     assert pressure[np.abs(x) > 1.1 * a].max() == 0
+
+
+def test_action_is_reaction_on_a_scarred_surface(assembled: Callable[..., Tribosystem]) -> None:
+    """A flat with a deep scar slides as a whole: in every position the condensed contact is that of the full bodies.
+
+    The frame turns with the scar, and what acts on one body acts on the other the other way: forces balance.
+    """
+    small = ("geometry.parameters.elements_along_contact=12", "motion.positions=3", "contact.friction=0.3")
+    flat = assembled("fretting", *small)
+    x = flat.pair.strip.x[:, 0]
+    scar = Worn(np.zeros(len(flat.pair.weights)), 4e-3 * np.maximum(1 - (x / 0.25) ** 2, 0) ** 2)
+    system = assemble(flat.case, followed=scar)
+    assert np.ptp(system.pair.normal[:, 0]) > 0.02  # radians that the frame turns by
+    thickness = flat.case.model.thickness
+    for phase, ratio in enumerate(system.friction_ratios()):
+        interface = system.interfaces[phase]
+        gap = system.gap(phase, scar)
+        condensed = CondensedContact([SlidingContact(interface, ratio)]).solve(gap)
+        full = FullContact(system.bodies.punch, system.bodies.strip, interface, ratio).solve(gap)
+        scale = condensed.pressure.max()
+        np.testing.assert_allclose(full.pressure, condensed.pressure, rtol=0, atol=1e-8 * scale)
+        force = (interface.pair.normal + ratio).T @ (interface.pair.weights * condensed.pressure[0])
+        assert force[1] * thickness == pytest.approx(18.5, rel=1e-9)  # down the guide, friction included

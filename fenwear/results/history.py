@@ -229,8 +229,9 @@ class HistoryWriter:
             OutputError: as `add`.
         """
         if self._last is not None:
-            seen = {int(n) for rows in self._pending for n in rows["half_cycle"]} | self._stored_tail()
-            new = np.array([int(n) not in seen for n in self._last["half_cycle"]])
+            seen = {int(n) for rows in self._pending for n in rows["half_cycle"]}
+            stored = max(self._stored_tail(), default=0)  # what comes before it has no place any more
+            new = np.array([int(n) not in seen and int(n) > stored for n in self._last["half_cycle"]])
             self._pending.append({name: values[new] for name, values in self._last.items()})
         self.flush()
         with writing(self._twin):
@@ -249,6 +250,8 @@ class HistoryWriter:
         self._seconds_of_copying = 0.0
         joined = {n: np.concatenate([rows[n] for rows in self._pending]) for n in self._variables if self._pending}
         if len(joined.get("half_cycle", ())):
+            order = np.argsort(joined["half_cycle"], kind="stable")  # the last cycle may begin before what was kept
+            joined = {name: values[order] for name, values in joined.items()}
             with writing(self.path):
                 try:
                     self._write(joined)

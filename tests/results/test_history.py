@@ -52,6 +52,7 @@ def test_history_is_what_was_computed(assembled: Callable[..., Tribosystem], tmp
     ("name", "every", "count", "kept"),
     [
         ("example1", 4, 21, [1, 2, 9, 10, 17, 18, 20, 21]),  # whole cycles, and the last half-cycles
+        ("example1", 4, 17, [1, 2, 9, 10, 16, 17]),  # the last one begins a cycle that is kept
         ("example1", 1, 5, [1, 2, 3, 4, 5]),
         ("example1", 100, 8, [1, 2, 7, 8]),
         ("monotonic-lz20", 3, 8, [1, 4, 7, 8]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -158,7 +159,7 @@ def test_disk_fills_up_during_the_run(fenwear: Run, small_disk: Callable[[int], 
     with running(folder) as process:
         filler = folder.parent / "filler"
         filler.write_bytes(b"0" * (shutil.disk_usage(folder).free - 100_000))
-        status, messages = ended(process, 60)
+        status, messages = ended(process)
     assert status == 1
     assert messages.count("No space left on device") == 1, messages
     assert "then go on from the checkpoint of half-cycle" in messages
@@ -174,7 +175,7 @@ def test_disk_turns_read_only(fenwear: Run, small_disk: Callable[[int], Path]) -
         assert mount("-o", "remount,ro", str(folder.parent)) or mount("-o", "remount,ro,force", str(folder.parent)), (
             "cannot be remounted"
         )
-        status, messages = ended(process, 60)
+        status, messages = ended(process)
     assert status == 1
     assert messages.count("Read-only file system") == 1, messages
     assert mount("-o", "remount,rw", str(folder.parent))
@@ -248,7 +249,7 @@ def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
     settings = ("run.integration=jump", "run.jump_tolerance=1e-4", "output.checkpoint=1")
     with running(folder, *settings, ranks=ranks, case="fretting") as process:
         os.kill((ranks_of(process) if ranks > 1 else [process.pid])[-1], signal.SIGTERM)
-        status, messages = ended(process, 20)
+        status, messages = ended(process)
     assert status == 1
     assert "interrupted" in messages
     with np.load(folder / "checkpoint" / "state.npz") as saved:
@@ -413,9 +414,9 @@ def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
     for ranks in (1, 2):
         done = fenwear(*failing, ranks=ranks)
         assert done.returncode == 3, done.stderr
-        assert done.stderr.count("half-cycle 41: ") == 1
+        (failed,) = re.findall(r"half-cycle (\d+): ", done.stderr)  # the first whose nodes in contact are others
         assert "DIVERGED_MAX_IT" in done.stderr
-        assert "results up to half-cycle 40" in done.stderr
+        assert f"results up to half-cycle {int(failed) - 1}" in done.stderr
         assert "Traceback" not in done.stderr
     check_goes_on(fenwear, folder)
 

@@ -79,7 +79,7 @@ def run(folder: Path, name: str | Path, *settings: str) -> tuple[dict[str, Any],
 def test_clipped_contact_is_told(tmp_path: Path) -> None:
     """A scar that outgrows its surface: in the log when it happens, in summary and report, with the width it needs."""
     settings = (*CYLINDER, "wear.punch.coefficient=2e-6", "wear.strip.coefficient=1e-9", "run.jump_tolerance=0.2")
-    narrow, said = run(tmp_path, "fretting", *settings, "run.half_cycles=6000", "geometry.parameters.contact_width=0.4")
+    narrow, said = run(tmp_path, "fretting", *settings, "run.half_cycles=4000", "geometry.parameters.contact_width=0.4")
     (warning,) = [text for text in narrow["warnings"] if "clipped" in text]
     assert "x = -0.2 and 0.2 mm" in warning
     assert "geometry.parameters.contact_width" in warning
@@ -87,7 +87,7 @@ def test_clipped_contact_is_told(tmp_path: Path) -> None:
     assert str(escape(warning)) in page(tmp_path / "run")
     needed = float(warning.partition("a width of about ")[2].partition(" mm")[0])
     (tmp_path / "wide").mkdir()
-    wide, _ = run(tmp_path / "wide", "fretting", *settings, "run.half_cycles=6000",
+    wide, _ = run(tmp_path / "wide", "fretting", *settings, "run.half_cycles=4000",
                   f"geometry.parameters.contact_width={1.1 * needed}")  # fmt: skip
     assert wide["warnings"] == []  # the width that it names is enough
     assert wide["rightward"]["contact_width_mm"] == pytest.approx(needed, rel=0.15)  # and not far from what is used

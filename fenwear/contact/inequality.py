@@ -106,6 +106,7 @@ class Inequality:
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: _Kept | None = None
         self._operator: Operator | None = None
+        self.singular = False  # whether the last set that SNES took had no factor
 
     @cached_property
     def _full_steps(self) -> PETSc.SNES:
@@ -222,12 +223,15 @@ class Inequality:
     def _by_snes(self, start: Array, line_search: bool) -> Array:
         snes = self._searching if line_search else self._full_steps
         x: Array = start.copy()
+        self.singular = False
         try:
             snes.solve(None, PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF))
         except (np.linalg.LinAlgError, PETSc.Error) as error:  # PETSc passes on what its callbacks raise, or wraps it
             if not isinstance(error.__cause__ or error, np.linalg.LinAlgError):
                 raise
             raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular") from None
+        if self.singular:
+            raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular")
         check(snes, self.name)
         self.iterations = snes.getIterationNumber()
         self.residual = self._function(x)
@@ -257,9 +261,17 @@ class _Matrix:
 class _Solver:
     """PETSc's preconditioner that solves with the factor that the inequality keeps."""
 
+    solve: Solve | None = None
+
     def setUp(self, pc: PETSc.PC) -> None:
+        """Take the factor; a set without one ends SNES: what is raised in here may bring petsc4py down."""
         context = pc.getOperators()[1].getPythonContext()
-        self.solve = context.inequality.factor(context.kept)
+        try:
+            self.solve = context.inequality.factor(context.kept)
+        except np.linalg.LinAlgError:
+            self.solve = None
+            context.inequality.singular = True
+            pc.setFailedReason(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.array_w[:] = self.solve(x.array_r)
+        y.array_w[:] = 0.0 if self.solve is None else self.solve(x.array_r)

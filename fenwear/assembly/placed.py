@@ -159,8 +159,7 @@ class Placed:
     @cached_property
     def slid(self) -> Array:
         """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
-        found = {id(pair): self.sliding.field.rate(pair.punch.x, pair.normal) for pair in self.pairs}
-        return np.array([found[id(pair)] for pair in self.pairs])
+        return np.array([self.sliding.field.rate(pair.punch.x, pair.normal) for pair in self.pairs])
 
     @cached_property
     def wear(self) -> Wear:

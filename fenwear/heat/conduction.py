@@ -159,9 +159,8 @@ class HeatBody:
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
         """
-        if math.isinf(duration):
-            if not self.loses_heat(speed, surroundings):
-                raise CaseError(no_heat_sink(self.body.name))
+        if math.isinf(duration) and not self.loses_heat(speed, surroundings):
+            raise CaseError(no_heat_sink(self.body.name))
         flow = self.flow(surroundings.sliding)
         forms = flow.forms
         forms.rate.value = 0.0 if math.isinf(duration) else 1 / duration

@@ -75,7 +75,7 @@ def prepare_exchange(
             )
         else:
             field = FullField(body, steps, inflow)
-        cooled = any(body.loses_heat(velocity, around) for velocity in own)  # collective: each is asked
+        cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
         sides.append(_side(field, steps, around, pair, rows, cooled=cooled))
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 

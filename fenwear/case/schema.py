@@ -790,11 +790,6 @@ class Case(_Part):
     def _track_problems(self) -> list[str]:
         """Return what does not go with wear of a strip that passes under the punch."""
         motion = self.motion
-        if self.model.kind == "solid" and isinstance(motion, OneWay | Rotation):
-            return [
-                "wear.strip: not followed in solids around a closed track yet; expected the wear of the punch alone, "
-                "an axisymmetric model, or sliding to and fro"
-            ]
         if isinstance(motion, OneWay) and motion.track is None:
             return ["motion.track: missing, but required where the strip wears in one-way sliding"]
         if not isinstance(motion, OneWay | Rotation) and motion.positions == 1:

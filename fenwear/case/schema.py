@@ -747,8 +747,6 @@ class Case(_Part):
             problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
-        if kind == "axisymmetric" and self.heat is not None:
-            problems.append("heat: expected a plane model or a solid: heat is not followed in rings yet")
         if kind != "plane" and self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' but in plane models")
         return problems
@@ -766,7 +764,7 @@ class Case(_Part):
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
         if self.wear.strip is not None and self.passes:
             problems += self._track_problems()
-        if not self.passes and self.heat is not None:
+        if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")

@@ -64,7 +64,7 @@ def test_what_is_wrong(tmp_path: Path) -> None:
     """Names the nearest template and dimension, what was expected of a value, and a file that is there."""
     with pytest.raises(CaseError, match="did you mean 'block-on-ring'"):
         find_template("blok-on-ring")
-    with pytest.raises(CaseError, match="There are ball-on-flat, .*pin-on-disc"):
+    with pytest.raises(CaseError, match=r"There are ball-on-flat, .*pin-on-disc"):
         find_template("")
     template = find_template("fretting")
     with pytest.raises(CaseError) as error:

@@ -183,7 +183,8 @@ class Placed:
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
         offsets = np.unique([phase.offset for phase in self.motion.phases])
-        return float(np.diff(offsets).max(initial=0.0) / np.median(np.diff(self.pair.x)))
+        moved = np.diff(offsets).max(initial=0.0) * self.slid.max()
+        return float(moved / np.median(np.diff(self.pair.x)))
 
     @property
     def track_deepens(self) -> bool:

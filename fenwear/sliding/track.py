@@ -38,17 +38,18 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
         field: The motion of the strip for a unit of the stroke.
         track: What closes the track: its length, mm, or 2 pi rad.
     """
+    rate = field.rate(pair.strip.x, pair.strip.outward)
     if pair.punch.dim == 2:
-        spread = np.broadcast_to(pair.weights / track, (len(pair.strip.weights), len(pair.weights)))
+        spread = np.broadcast_to(pair.weights / (track * rate.mean()), (len(pair.strip.weights), len(pair.weights)))
         return replace(pair, deposit=csr_array(spread))
     across = _across(field, pair.strip)
     punch, strip = _Crossing.of(pair.punch, across), _Crossing.of(pair.strip, across)
     count = int(np.clip(np.ceil(FINER * punch.span / punch.width), 1, RINGS))
     edges = np.linspace(punch.low.min(), punch.high.max(), count + 1)
     # A ring's area: as long as the motion is there, and as wide as the surface goes while s goes on by one.
-    s, length = across(pair.strip.x), track * field.rate(pair.strip.x, pair.strip.outward)
+    s = across(pair.strip.x)
     order = np.argsort(s)
-    along = np.interp(edges, s[order], (length / across.advance(pair.strip))[order])
+    along = np.interp(edges, s[order], (track * rate / across.advance(pair.strip))[order])
     areas = np.diff(edges) * (along[1:] + along[:-1]) / 2
     depths = diags_array(1 / areas) @ punch.shares(edges).T @ diags_array(pair.weights)
     shares = strip.shares(edges)

@@ -109,6 +109,7 @@ class Results(Written):
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
             "Where the strip wears": history.STRIP_VARIABLES,
+            "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
             "With heat": {**history.HEAT_VARIABLES, **heat},
         }
         for title, variables in groups.items():

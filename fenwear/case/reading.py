@@ -69,6 +69,8 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if folder is not None and base.endswith(".toml"):
         base = str(folder / base)
     below, base_folder = _read_tables(base, (*base_of, base))
+    if "program" in data and isinstance(below.get("run"), dict) and "half_cycles" not in data.get("run", {}):
+        below["run"].pop("half_cycles", None)  # the program tells how far the run goes
     own_geometry = "file" in data.get("geometry", {})
     return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
 

@@ -11,7 +11,12 @@ from fenwear.report.style import panels
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ACTED = {"load": "normal force (N)", "load_factor": "loads over the case's", "speed": "mean speed", "ambient": "ambient (K)"}
+ACTED = {
+    "load": "normal force (N)",
+    "load_factor": "loads over the case's",
+    "speed": "mean speed",
+    "ambient": "ambient (K)",
+}
 
 
 def program_figure(history: xarray.Dataset) -> Figure:

@@ -193,8 +193,9 @@ def test_table(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text('base = "example1"\n[program]\nfile = "program.csv"\nlevels = 3\n')
     written(tmp_path, "cycles, load_factor\n0, 1\n10, 2\n")
     with pytest.raises(CaseError, match="the program ends after 20 half-cycles"):
-        load_case(tmp_path / "case.toml")
-    case = load_case(tmp_path / "case.toml", ["run.half_cycles=20"])
+        load_case(tmp_path / "case.toml", ["run.half_cycles=21"])
+    case = load_case(tmp_path / "case.toml")
+    assert case.run.half_cycles == 20
     assert case.program is not None
     assert case.program.steps[0].load_factor == (1.0, 2.0)
 

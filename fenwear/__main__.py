@@ -46,6 +46,7 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
 
     from fenwear.cli import app
     from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError
+    from fenwear.signals import ignore_from_now_on
 
     try:
         result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
@@ -60,7 +61,11 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
     except ConvergenceError as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 3
-    except (InterruptedRunError, OutputError) as error:
+    except InterruptedRunError as error:
+        print(f"fenwear: {error}", file=sys.stderr)
+        ignore_from_now_on()
+        return 1
+    except OutputError as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 1
     except (click.Abort, KeyboardInterrupt):

@@ -61,12 +61,10 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
     except ConvergenceError as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 3
-    except InterruptedRunError as error:
+    except (InterruptedRunError, OutputError) as error:
         print(f"fenwear: {error}", file=sys.stderr)
-        ignore_from_now_on()
-        return 1
-    except OutputError as error:
-        print(f"fenwear: {error}", file=sys.stderr)
+        if isinstance(error, InterruptedRunError):
+            ignore_from_now_on()
         return 1
     except (click.Abort, KeyboardInterrupt):
         print("fenwear: interrupted", file=sys.stderr)

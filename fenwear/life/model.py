@@ -99,6 +99,16 @@ class Model:
     _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
 
+    def __post_init__(self) -> None:
+        """Refuse a test program.
+
+        Raises:
+            CaseError: the case has one.
+        """
+        if self.case.program is not None:
+            message = "not followed here; expected a case of constant loads and motion, or `run`"
+            raise CaseError(InputError("program", message))
+
     def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:
         """Return the assembled problem with keys at these values; what does not change is shared.
 

@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
+from fenwear.case import changed_case, load_case
 from fenwear.cli import app
 from fenwear.errors import CaseError
+from fenwear.life.model import Model
 
 SMALL = ["--set", "geometry.degree=2", "--set", "geometry.parameters.elements_along_contact=8"]
 K = "wear.punch.coefficient"

@@ -173,8 +173,13 @@ class Placed:
     @property
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
-        offsets = np.unique([phase.offset for phase in self.motion.phases])
-        return float(np.diff(offsets).max(initial=0.0) / np.median(np.diff(self.pair.x)))
+        offsets, pair = np.unique([phase.offset for phase in self.motion.phases]), self.pair
+        moved = np.diff(offsets).max(initial=0.0)
+        if pair.punch.dim == 2:
+            return float(moved / np.median(np.diff(pair.x)))
+        # Among the nodes of a solid there is no order; rates take an angle to what it slides.
+        rate = float(self.sliding.field.rate(pair.punch.x, pair.normal).max())
+        return float(moved * rate / np.sqrt(np.median(pair.weights)))
 
     @property
     def track_deepens(self) -> bool:

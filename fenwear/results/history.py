@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.assembly import Tribosystem
-from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
@@ -82,14 +81,15 @@ STRIP_VARIABLES = {
 }
 
 
-def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
+def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    case = system.case
     variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms}
     if case.model.kind == "plane":
         return variables
-    return on_surfaces(variables, solid=case.model.kind == "solid")
+    return on_surfaces(variables, solid=case.model.kind == "solid", track=system.sliding.track is not None)
 
 
 def _columns(system: Tribosystem) -> dict[str, Column]:
@@ -173,7 +173,7 @@ class HistoryWriter:
             OutputError: it cannot be written.
         """
         self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
-        self._variables = _variables(system.case)
+        self._variables = _variables(system)
         self._columns = _columns(system)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.

@@ -2,7 +2,7 @@
 
 A scar is where the depth is more than a hundredth of the largest one. Its edge is put between two nodes by linear
 interpolation, and so is right to an element, of which it takes rather too much. Length is along the sliding and width
-across it; on rings the scar goes all the way round, and its width is along the radius.
+across it; on rings and on closed tracks the scar goes all the way round, and has a width alone.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class ScarGeometry:
     """Where the nodes of a contact surface lie along and across the sliding.
 
     Attributes:
-        coordinates: Along and across the sliding in a solid (n, 2), radius of rings (n, 1), mm.
+        coordinates: Along and across the sliding (n, 2), or across it alone (n, 1), mm.
         edges: Pairs of neighbouring nodes (m, 2).
-        names: Of the extents: ("length", "width"), or ("width",) on rings.
+        names: Of the extents: ("length", "width"), or ("width",) of what is worn all the way round.
     """
 
     coordinates: Array
@@ -81,6 +81,8 @@ def scar_geometry(placed: Placed, surface: ContactSurface) -> ScarGeometry:
     if surface.dim == 2:
         return ScarGeometry(surface.x[:, :1], edges, ("width",))
     coordinates = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x)
+    if surface is placed.pair.strip and placed.sliding.track is not None:  # worn all along it
+        return ScarGeometry(coordinates[:, 1:], edges, ("width",))
     return ScarGeometry(coordinates, edges, ("length", "width"))
 
 
@@ -117,7 +119,8 @@ def scar_summary(block: Block) -> dict[str, Any]:
     for name, end, surface, weights, depth in worn:
         found[f"wear_{name}_max_mm"] = last[f"max_wear{end}"]
         found[f"deepest_{name}_mm"] = surface.x[int(depth.argmax())].tolist()
-        found[f"worn_volume_{name}_mm3"] = float(weights @ depth)
+        if name == "punch" or system.sliding.track is None:  # of a closed track a part alone is meshed
+            found[f"worn_volume_{name}_mm3"] = float(weights @ depth)
         for extent in ("length", "width"):
             if f"scar_{extent}{end}" in last:
                 found[f"scar_{extent}_{name}_mm"] = last[f"scar_{extent}{end}"]

@@ -50,17 +50,24 @@ SCARS: dict[str, Variable] = {
 }
 
 
-def on_surfaces(variables: dict[str, Variable], *, solid: bool) -> dict[str, Variable]:
-    """Return the variables of plane models as those of solids and rings have them, with those of the scars."""
+def on_surfaces(variables: dict[str, Variable], *, solid: bool, track: bool = False) -> dict[str, Variable]:
+    """Return the variables of plane models as those of solids and rings have them, with those of the scars.
+
+    Args:
+        variables: Of plane models.
+        solid: Whether scars have a length.
+        track: Whether that of the strip goes all along a closed track.
+    """
     found: dict[str, Variable] = {}
     for name, (dimensions, units, text) in variables.items():
         over = tuple(DIMENSIONS.get(d, d) for d in dimensions)
         new, unit, meaning = RENAMED.get(name, (name, units, text))
         found[new] = (over, unit, meaning)
-    scars = {name: v for name, v in SCARS.items() if solid or name != "scar_length"}
-    found |= scars
+    found |= {name: scar for name, scar in SCARS.items() if solid or name != "scar_length"}
     if "wear_strip" in variables:
-        found |= {f"{name}_strip": (d, u, text.replace("punch", "strip")) for name, (d, u, text) in scars.items()}
+        for name, (dimensions, units, text) in SCARS.items():
+            if name != "scar_length" or (solid and not track):
+                found[f"{name}_strip"] = (dimensions, units, text.replace("punch", "strip"))
     return found
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.assembly import Tribosystem
+from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS

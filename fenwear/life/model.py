@@ -18,6 +18,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import RunState, beginning, joined
+from fenwear.errors import CaseError, InputError
 from fenwear.life.keys import with_values
 
 BODIES = ("punch", "strip")

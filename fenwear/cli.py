@@ -84,7 +84,7 @@ def run(
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
+    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True)
     if as_json:
         _print_json(summary)
     else:

@@ -149,7 +149,7 @@ def turning_heat() -> Result:
             errors = [turning_error(body, duration) for body in bodies]
             what = f"{'tetrahedra' if tetrahedra else 'hexahedra'}, {name}"
             rows.append(number(f"{what}: error at the nodes, 10 elements", 0, errors[-1], 0.01, scale=1))
-            rows.append(order(f"{what}: order", 3, errors, 0.7))
+            rows.append(order(f"{what}: order", 3, errors, 0.5))
     return Result(rows)
 
 

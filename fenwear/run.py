@@ -76,9 +76,6 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    if case.model.kind != "plane":
-        reason = "results are written of plane models so far; `steady`, `optimum` and Python's march and jump take all"
-        raise CaseError(InputError("model.kind", reason))
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case))
     if not resume:

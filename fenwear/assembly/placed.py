@@ -182,9 +182,11 @@ class Placed:
     @property
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
-        offsets = np.unique([phase.offset for phase in self.motion.phases])
+        offsets, pair = np.unique([phase.offset for phase in self.motion.phases]), self.pair
         moved = np.diff(offsets).max(initial=0.0) * self.slid.max()
-        return float(moved / np.median(np.diff(self.pair.x)))
+        # Among the nodes of a solid there is no order along the sliding.
+        spacing = np.median(np.diff(pair.x)) if pair.punch.dim == 2 else np.sqrt(np.median(pair.weights))
+        return float(moved / spacing)
 
     @property
     def track_deepens(self) -> bool:

@@ -47,13 +47,14 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
     bc = fem.dirichletbc(PETSc.ScalarType(0), supports, space)
     matrix = assembled(a, [bc])
     matrix.setOption(PETSc.Mat.Option.SPD, True)
-    load, solution = matrix.createVecLeft(), fem.Function(space, name="displacement_out_of_plane")
+    solution = fem.Function(space, name="displacement_out_of_plane")
     owned = space.dofmap.index_map.size_local
-    load.array[:] = given.x.array[2 * to_node[:owned]]
-    load.array[supports[supports < owned]] = 0.0
+    load = given.x.array[2 * to_node[:owned]]
+    load[supports[supports < owned]] = 0.0
 
-    found = load.duplicate()
-    Factor(matrix, PREFIX, "cholesky").solve(load, found)
-    solution.x.array[:owned] = found.array_r
+    factor = Factor(matrix, PREFIX, "cholesky")
+    solution.x.array[:owned] = factor.solve(load)
+    factor.free()
+    matrix.destroy()
     solution.x.scatter_forward()
     return solution

@@ -76,6 +76,9 @@ def prepare_exchange(
         else:
             field = FullField(body, steps, inflow)
         sides.append(_side(field, steps, around, pair, rows))
+        if reduced:  # what is left of them is in the small field
+            for step in steps:
+                step.free()
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 
 

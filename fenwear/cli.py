@@ -84,7 +84,7 @@ def run(
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
+    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True)
     if as_json:
         _print_json(summary)
     else:
@@ -140,8 +140,9 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     """Print the state as soon as it is there: the way to it may take longer."""
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
+    words = system.sliding.field.words
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
-        print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
+        print(f"  strip moves {words[d]:9} largest pressure {p.max():8.3f} MPa, "
               f"contact {part.format(width)}")  # fmt: skip
     print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
@@ -179,7 +180,7 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
     from fenwear.assembly import place_case
 
     system = place_case(_load(case, settings))
-    found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
+    found = {name: system.optimum(d) for d, name in reversed(system.sliding.field.words.items())}
     if as_json:
         x = system.pair.x.tolist()
         _print_json(
@@ -216,6 +217,32 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
+
+
+@app.command("new")
+def new_command(
+    template: Annotated[
+        str | None, typer.Argument(metavar="TEST", help="Such as block-on-ring; without it all are listed.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The case file to write; by default TEST.toml.")
+    ] = None,
+    settings: Annotated[
+        list[str], typer.Option("--set", metavar="DIMENSION=VALUE", help='A dimension: --set load="50 N"; repeatable.')
+    ] = [],  # noqa: B006
+    list_dimensions: Annotated[bool, typer.Option("--list", help="Print the dimensions and end.")] = False,
+) -> None:
+    """Write a commented case of a usual test, with its dimensions, to go on from."""
+    from fenwear.case.templates import all_text, dimensions_text, write_case_of
+
+    if template is None:
+        print(all_text())
+    elif list_dimensions:
+        print(dimensions_text(template))
+    else:
+        path = output or Path(f"{template}.toml")
+        on_root(MPI.COMM_WORLD, lambda: write_case_of(template, path, settings))
+        log(f"case in {path}; next: fenwear check {path}")
 
 
 @app.command("mesh")

@@ -75,7 +75,8 @@ def prepare_exchange(
             )
         else:
             field = FullField(body, steps, inflow)
-        sides.append(_side(field, steps, around, pair, rows))
+        cooled = any(body.loses_heat(velocity, around) for velocity in own)  # collective: each is asked
+        sides.append(_side(field, steps, around, pair, rows, cooled=cooled))
         if reduced:  # what is left of them is in the small field
             for step in steps:
                 step.free()
@@ -102,7 +103,7 @@ def prepare_steady(
     for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
         around = _surroundings(body, pair, sliding, renewed=True)
         steps = [body.step(velocity, np.inf, around) for velocity in own]
-        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows))
+        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, cooled=True))
     return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
 
 
@@ -176,6 +177,8 @@ def _side(
     surroundings: Surroundings,
     pair: ContactPair,
     gap_rows: Array,
+    *,
+    cooled: bool,
 ) -> Side:
     body = field.basis.body
     onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
@@ -201,4 +204,5 @@ def _side(
         capacity,
         body.extremes(surroundings),
         surroundings.renewed or not moves or not body.flow(surroundings.sliding).is_open,
+        cooled,
     )

@@ -11,7 +11,7 @@ from typing import Any
 
 import xarray
 
-from fenwear.errors import CaseError, OutputError
+from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.report.figures import FOLDER, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
@@ -61,6 +61,8 @@ def write_report(
 
 def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
     case = read_case(directory)
+    if case.get("model", {}).get("kind", "plane") != "plane":
+        raise CaseError(InputError("model.kind", "figures are drawn of plane models so far"))
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
     if complete:
         from fenwear.report.animation import draw_animation

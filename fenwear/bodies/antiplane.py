@@ -84,4 +84,4 @@ def _held(elastic: ElasticBody) -> NDArray[np.int64]:
     owned = elastic.space.dofmap.index_map.size_local
     radius = elastic.space.tabulate_dof_coordinates()[:owned, 0]
     on_axis = 2 * np.flatnonzero(radius < ON_AXIS * elastic.surface.trace[:, 0].max())
-    return np.concatenate([np.flatnonzero(elastic.load.array_r), on_axis])
+    return np.concatenate([np.flatnonzero(elastic.load), on_axis])

@@ -25,7 +25,7 @@ from fenwear.assembly.tribosystem import (
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.assembly.variants import assemble, in_parts, place_case, vary, with_case
+from fenwear.assembly.variants import assemble, in_parts, place_case, set_up_by, vary, with_case
 
 __all__ = [
     "Bodies",
@@ -46,6 +46,7 @@ __all__ = [
     "place",
     "place_case",
     "preparation",
+    "set_up_by",
     "steady_exchange",
     "vary",
     "with_case",

@@ -15,7 +15,7 @@ from fenwear.bodies.mesh import meshes_folder
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history
+from fenwear.results import history, surfaces
 from fenwear.verify.suite import registered
 
 
@@ -100,6 +100,13 @@ class Commands(Written):
                 yield from _table(("option", "does"), rows)
 
 
+def _of_surfaces() -> dict[str, Any]:
+    """Return the variables that are others in solids and rings."""
+    plane = {**history.VARIABLES, **history.STRIP_VARIABLES}
+    found = surfaces.on_surfaces(plane, solid=True)
+    return {name: variable for name, variable in found.items() if plane.get(name, ("", "", ""))[1:] != variable[1:]}
+
+
 class Results(Written):
     """The variables of history.nc."""
 
@@ -109,7 +116,9 @@ class Results(Written):
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
             "Where the strip wears": history.STRIP_VARIABLES,
+            "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
             "With heat": {**history.HEAT_VARIABLES, **heat},
+            "Of solids and rings instead, or as well": _of_surfaces(),
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

@@ -11,7 +11,7 @@ from typing import Any
 
 import xarray
 
-from fenwear.errors import CaseError, OutputError
+from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.report.figures import FOLDER, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
@@ -22,6 +22,7 @@ from fenwear.results.history import CASE, HISTORY
 
 REPORT = "report.html"
 SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
+            "program": "Test program: what acted",
             "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
             "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
@@ -32,6 +33,7 @@ ALT = {
     "a line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
     "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
@@ -64,6 +66,8 @@ def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -
     case = read_case(directory)
     if case.get("contact", {}).get("law") == "coulomb":
         return write_stick_report(directory)
+    if case.get("model", {}).get("kind", "plane") != "plane":
+        raise CaseError(InputError("model.kind", "figures are drawn of plane models so far"))
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
     if complete:
         from fenwear.report.animation import draw_animation

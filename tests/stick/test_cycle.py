@@ -123,7 +123,9 @@ def test_large_strokes_slide_as_a_whole() -> None:
 
 def test_steps_are_doubled_until_they_are_fine_enough() -> None:
     """The stated change is that of the next doubling."""
-    load = "punch.loads=[{on='punch_top', force=['0 N', '-120 N'], over_cycle=[[0, 1], [0.3, 1.4], [0.7, 0.7], [1, 1]]}]"
+    load = (
+        "punch.loads=[{on='punch_top', force=['0 N', '-120 N'], over_cycle=[[0, 1], [0.3, 1.4], [0.7, 0.7], [1, 1]]}]"
+    )
     case = load_case("fretting-partial-slip", [*SMALL, load, "stick.steps=2", "stick.step_tolerance=0.02"])
     start = make_rig(case)
     found, fineness = fine_enough(start, case)

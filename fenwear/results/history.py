@@ -19,6 +19,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
+from fenwear.results import quantities
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.versions import versions
 
@@ -77,8 +78,9 @@ STRIP_VARIABLES = {
 }
 
 
-def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
-    variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
+def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    case, sheet = system.case, quantities.quantities_of(system)
+    variables = {**VARIABLES, **({} if case.wear.strip is None else STRIP_VARIABLES), **sheet}
     if case.heat is None:
         return variables
     terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
@@ -151,7 +153,7 @@ class HistoryWriter:
             OutputError: it cannot be written.
         """
         self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
-        self._variables = _variables(system.case)
+        self._variables = _variables(system)
         self._coordinates = _coordinates(system)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
@@ -214,7 +216,8 @@ class HistoryWriter:
         Raises:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
-        rows = {name: _values(block, name) for name in self._variables}
+        sheet = quantities.values(block)
+        rows = {n: sheet[n] if n in sheet else _values(block, n) for n in self._variables}
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
         before = self._last or {name: values[:0] for name, values in rows.items()}
@@ -332,7 +335,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
         "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
-        **_strip_summary(system, last),
+        **quantities.sheet(last),
         **{
             names[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
@@ -349,18 +352,6 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "degrees_of_freedom": system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0],
         "ranks": system.comm.size,
         "versions": versions(),
-    }
-
-
-def _strip_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
-    """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
-    if not system.strip_wears:
-        return {}
-    depth, nodes = last.wear_strip[-1], system.pair.strip
-    return {
-        "wear_strip_max_mm": float(depth.max()),
-        "worn_area_strip_mm2": float(nodes.weights @ depth),
-        "worn_area_punch_mm2": float(system.pair.weights @ last.wear[-1]),
     }
 
 

@@ -139,18 +139,6 @@ class PhasesWear:
             return np.broadcast_to(pair.weights / self.track, (len(pair.strip.weights), len(pair.weights)))
         return pair.deposit.toarray()
 
-    def worn_area(self, pressure: Array) -> tuple[float, float]:
-        """Return the cross-sections worn off punch and strip, mm²."""
-        areas = [
-            0.0 if body is None else float(np.vdot(body.depth(pressure), self._weights))
-            for body in (self.punch, self.strip)
-        ]
-        return areas[0], areas[1]
-
-    @cached_property
-    def _weights(self) -> Array:
-        return np.array([pair.weights for pair in self.pairs])
-
 
 @dataclass(frozen=True)
 class WornLayer:

@@ -221,6 +221,32 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
 
 
+@app.command("new")
+def new_command(
+    template: Annotated[
+        str | None, typer.Argument(metavar="TEST", help="Such as block-on-ring; without it all are listed.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The case file to write; by default TEST.toml.")
+    ] = None,
+    settings: Annotated[
+        list[str], typer.Option("--set", metavar="DIMENSION=VALUE", help='A dimension: --set load="50 N"; repeatable.')
+    ] = [],  # noqa: B006
+    list_dimensions: Annotated[bool, typer.Option("--list", help="Print the dimensions and end.")] = False,
+) -> None:
+    """Write a commented case of a usual test, with its dimensions, to go on from."""
+    from fenwear.case.templates import all_text, dimensions_text, write_case_of
+
+    if template is None:
+        print(all_text())
+    elif list_dimensions:
+        print(dimensions_text(template))
+    else:
+        path = output or Path(f"{template}.toml")
+        on_root(MPI.COMM_WORLD, lambda: write_case_of(template, path, settings))
+        log(f"case in {path}; next: fenwear check {path}")
+
+
 @app.command("mesh")
 def mesh_command(
     case: CaseArgument,

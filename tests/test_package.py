@@ -31,7 +31,8 @@ def test_wheel_is_complete(wheel: Path) -> None:
     sources = {p.relative_to(ROOT).as_posix() for p in (ROOT / "fenwear").rglob("*.py")}
     cases = {p.relative_to(ROOT).as_posix() for p in (ROOT / "fenwear" / "cases").glob("*.toml")}
     meshes = {f"fenwear/meshes/{p.name}" for p in meshes_folder().glob("*.geo")}
-    templates = {p.relative_to(ROOT).as_posix() for p in (ROOT / "fenwear/report/templates").iterdir()}
+    folders = (ROOT / "fenwear/report/templates", ROOT / "fenwear/templates")
+    templates = {p.relative_to(ROOT).as_posix() for folder in folders for p in folder.iterdir()}
     expected = sources | cases | meshes | templates | {"fenwear/py.typed"}
     assert expected <= names
     assert any(name.endswith("licenses/LICENSE") for name in names)

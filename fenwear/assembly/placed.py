@@ -12,7 +12,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.case import Case, Heat, Kind, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, InputError
 from fenwear.interface import (
     ContactPair,
@@ -174,7 +174,8 @@ class Placed:
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
         offsets = np.unique([phase.offset for phase in self.motion.phases])
-        return float(np.diff(offsets).max(initial=0.0) / np.median(np.diff(self.pair.x)))
+        moved = np.diff(offsets).max(initial=0.0) * self.slid.max()
+        return float(moved / np.median(np.diff(self.pair.x)))
 
     @property
     def track_deepens(self) -> bool:
@@ -329,6 +330,7 @@ def place(
     if bodies.followed is None:
         check_distance(middle)
     _check_axis(middle, sliding)
+    sliding = _around(middle, sliding, bodies.punch.law.kind)
     whole = heat is None
     pairs = {
         offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -374,6 +376,14 @@ def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
                 "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
             )
         )
+
+
+def _around(middle: ContactPair, sliding: Sliding, kind: Kind) -> Sliding:
+    """Return the sliding with its closed track where the strip of a plane model turns about an axis: 2 pi R."""
+    if kind not in ("stress", "strain") or not any(sliding.field.turn) or sliding.to_and_fro:
+        return sliding
+    radius = np.linalg.norm(in_space(middle.strip.x) - sliding.field.centre, axis=1)
+    return replace(sliding, track=float(2 * np.pi * radius.mean()))
 
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:

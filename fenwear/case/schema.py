@@ -739,8 +739,8 @@ class Case(_Part):
                 if vector is not None and len(vector) != len(axes)
             ]
         if isinstance(motion, Oscillation | Rotation):
-            if kind == "plane":
-                problems.append("motion.kind: expected reciprocating, one-way or table in a plane model")
+            if kind == "plane" and (motion.axis[0] or motion.axis[2] or not motion.axis[1]):
+                problems.append("motion.axis: expected [0, 1, 0], out of the plane, in a plane model")
             if kind == "axisymmetric" and (any(motion.axis[:2]) or any(motion.centre[:2])):
                 problems.append("motion.axis: expected the axis z of the rings, through x = y = 0")
         elif kind == "axisymmetric":

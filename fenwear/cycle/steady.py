@@ -33,7 +33,8 @@ from fenwear.contact.operators import WornShape
 from fenwear.cycle.coupled import Coupled
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
-from fenwear.errors import ConvergenceError
+from fenwear.errors import CaseError, ConvergenceError
+from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
 
@@ -226,8 +227,9 @@ def steady(system: Tribosystem) -> Steady:
     _check_exists(system)
     begin = time.perf_counter()
     problem = _SteadyInequality(system)
-    for body in system.bodies.heat or ():
-        body.check_heat_sink()
+    for body, side in zip(system.bodies.heat or (), system.exchange.sides if system.exchange else (), strict=True):
+        if not side.cooled:
+            raise CaseError(no_heat_sink(body.body.name))
     contact, heat, temperature = _solve(problem)
     return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
 

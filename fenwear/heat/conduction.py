@@ -67,6 +67,11 @@ class Surroundings:
 ALONE = Surroundings()
 
 
+def no_heat_sink(name: str) -> InputError:
+    """Return what is wrong where the body of this name has no steady temperature."""
+    return InputError("heat.convection", f"the {name} loses heat nowhere: expected convection or a held temperature")
+
+
 class HeatBody:
     """Conduction in one body, per thickness (of a whole ring or solid): A theta = B theta_before + f + C q.
 
@@ -154,8 +159,8 @@ class HeatBody:
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
         """
-        if math.isinf(duration):
-            self.check_heat_sink(speed, surroundings)
+        if math.isinf(duration) and not self.loses_heat(speed, surroundings):
+            raise CaseError(no_heat_sink(self.body.name))
         flow = self.flow(surroundings.sliding)
         forms = flow.forms
         forms.rate.value = 0.0 if math.isinf(duration) else 1 / duration
@@ -184,16 +189,6 @@ class HeatBody:
         met += [float(value) for value in self.held_values]
         comm = self.body.mesh.comm
         return comm.allreduce(min(met), MPI.MIN), comm.allreduce(max(met), MPI.MAX)
-
-    def check_heat_sink(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> None:
-        """Make sure that a steady temperature exists; collective.
-
-        Raises:
-            CaseError: the body loses heat nowhere.
-        """
-        if not self.loses_heat(speed, surroundings):
-            message = f"the {self.body.name} loses heat nowhere: expected convection or a held temperature"
-            raise CaseError(InputError("heat.convection", message))
 
     def function(self, theta: Array) -> fem.Function:
         """Return the temperature of the owned degrees of freedom as a function; collective."""

@@ -48,6 +48,7 @@ class Side:
         capacity: Heat capacity of the body, mJ/(mm K).
         extremes: Coldest and hottest of its initial, held, ambient and entering temperatures, K.
         bounded: Whether nothing but friction makes it hotter: not so where what has left comes back.
+        cooled: Whether it loses heat anywhere in some phase: convection, a held temperature or new material.
     """
 
     field: Field
@@ -60,6 +61,7 @@ class Side:
     capacity: float
     extremes: tuple[float, float]
     bounded: bool
+    cooled: bool
 
 
 # The heat of a half-cycle: done by friction, carried off by debris, gained by both bodies, lost to the

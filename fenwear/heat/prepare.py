@@ -75,7 +75,8 @@ def prepare_exchange(
             )
         else:
             field = FullField(body, steps, inflow)
-        sides.append(_side(field, steps, around, pair, rows))
+        cooled = any(body.loses_heat(velocity, around) for velocity in own)  # collective: each is asked
+        sides.append(_side(field, steps, around, pair, rows, cooled=cooled))
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 
 
@@ -99,7 +100,7 @@ def prepare_steady(
     for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
         around = _surroundings(body, pair, sliding, renewed=True)
         steps = [body.step(velocity, np.inf, around) for velocity in own]
-        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows))
+        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, cooled=True))
     return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
 
 
@@ -173,6 +174,8 @@ def _side(
     surroundings: Surroundings,
     pair: ContactPair,
     gap_rows: Array,
+    *,
+    cooled: bool,
 ) -> Side:
     body = field.basis.body
     onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
@@ -198,4 +201,5 @@ def _side(
         capacity,
         body.extremes(surroundings),
         surroundings.renewed or not moves or not body.flow(surroundings.sliding).is_open,
+        cooled,
     )

@@ -10,8 +10,10 @@ From Python:
     life = lifetime(case, "depth 0.2 mm", fit.scatter())
 """
 
-from fenwear.life.calibrate import Calibration, LeastSquares, Unknown, between, calibrate, repeated, without_values
+from fenwear.life.between_tests import between
+from fenwear.life.calibrate import Calibration, calibrate
 from fenwear.life.data import DataSet, Series, measured_folder, read_data
+from fenwear.life.least_squares import LeastSquares, repeated, without_values
 from fenwear.life.lifetime import Lifetime, lifetime
 from fenwear.life.model import Model, Snapshot
 from fenwear.life.posterior import Posterior, posterior
@@ -19,6 +21,7 @@ from fenwear.life.quantities import Quantity, evaluate, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Sensitivity, sensitivity
 from fenwear.life.sobol import SobolIndices, sobol_design, sobol_indices
+from fenwear.life.unknowns import Unknown
 
 __all__ = [
     "Calibration",

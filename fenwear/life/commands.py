@@ -14,15 +14,10 @@ from mpi4py import MPI
 
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
-from fenwear.life.calibrate import (
-    Calibration,
-    LeastSquares,
-    between,
-    between_as_json,
-    calibrate,
-    parse_unknown,
-)
+from fenwear.life.between_tests import between, between_as_json
+from fenwear.life.calibrate import Calibration, calibrate
 from fenwear.life.data import read_data
+from fenwear.life.least_squares import LeastSquares
 from fenwear.life.lifetime import SAMPLES, Lifetime, lifetime
 from fenwear.life.model import Model
 from fenwear.life.pictures import life_figure, residuals, save, tornado
@@ -30,6 +25,7 @@ from fenwear.life.posterior import Posterior, posterior
 from fenwear.life.quantities import UNITS, cycles_of, parse_amount, parse_quantity
 from fenwear.life.scatter import Scatter, load_scatter, parse_scatter
 from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
+from fenwear.life.unknowns import parse_unknown
 from fenwear.parallel import on_root
 from fenwear.results.disk import write_text
 from fenwear.results.history import CASE, free_directory, make_directory

@@ -10,7 +10,8 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
-from fenwear.life.calibrate import Calibration, LeastSquares
+from fenwear.life.calibrate import Calibration
+from fenwear.life.least_squares import LeastSquares
 
 WALKERS_EACH = 4  # walkers for each variable; emcee wants two at least
 

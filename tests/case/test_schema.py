@@ -178,7 +178,7 @@ def test_a_case_is_frozen() -> None:
         ("ring-on-ring", ["strip.supports.0.fix=['y']"], "strip.supports.0.fix.0", "axisymmetric"),
         ("ball-on-flat", ["model.thickness='2 mm'"], "model.thickness", "plane models"),
         ("ring-on-ring", ["model.plane=strain"], "model.plane", "plane models"),
-        ("example1", ["motion={kind='rotation', angular_speed=1, duration=1}"], "motion.kind", "plane model"),
+        ("example1", ["motion={kind='rotation', angular_speed=1, duration=1}"], "motion.axis", "out of the plane"),
         ("example1", ["motion.along=[1, 0, 0]"], "motion.along", "belongs to solids"),
         ("ball-on-flat", ["motion.along=[0, 0, 0]"], "motion.along", "got zero"),
         ("ball-on-flat", ["motion.axis=y"], "motion.along", "either along or axis"),

@@ -10,6 +10,7 @@ import pytest
 from scipy.linalg import eigvals
 
 from fenwear import Tribosystem, assemble, make_case, march, steady
+from fenwear.assembly import steady_exchange
 from fenwear.cycle import growth_rate
 from fenwear.errors import HeatError
 from fenwear.heat.field import ReducedField
@@ -178,3 +179,32 @@ def test_a_bad_factor_is_found() -> None:
     linear = step.advance(theta[:, None], sources=False)
     step._factor = good
     np.testing.assert_allclose(linear, step.advance(theta[:, None], sources=False), atol=1e-9)
+
+
+def test_new_material_is_a_heat_sink(assembled: Callable[..., Tribosystem]) -> None:
+    """A strip that is cooled by what comes in only has a steady state: that of its velocity, as the mesh gets finer.
+
+    The upwinding depends on the time step, so that on one mesh the two are not equal.
+    """
+    errors = []
+    for elements in (4, 16):
+        system = assembled(
+            "example1-heat",
+            "motion={kind='one-way',direction='leftward',speed='200 mm/s',duration='1 s'}",
+            f"geometry.parameters.elements_along_contact={elements}",
+            "geometry.degree=2",
+            "contact.friction=0.02",
+            "strip.temperatures=[]",
+            "punch.temperatures=[{on='punch_load',temperature='0 K'}]",
+            "heat.convection=0",
+        )
+        found = steady(system)
+        exchange = steady_exchange(system, [-200.0])
+        pressure = found.pressure[0]
+        end, _ = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
+        punch, strip = exchange.contact_temperatures(end)
+        assert found.heat is not None
+        assert np.abs(found.heat.punch[0] - punch).max() < 1e-4 * np.abs(punch).max()
+        errors.append(np.abs(found.heat.strip[0] - strip).max() / np.abs(strip).max())
+    assert errors[0] < 5e-3
+    assert errors[1] < errors[0] / 3

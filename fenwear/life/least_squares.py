@@ -1,0 +1,263 @@
+"""The least-squares problem of a calibration: chi^2 = sum ((prediction - value) / sigma)^2, and twin experiments."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.case import Case
+from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.life.data import DataSet
+from fenwear.life.identifiable import hardly_known, without_baselines
+from fenwear.life.model import Model
+from fenwear.life.predictor import Predictor
+from fenwear.life.ranks import share
+from fenwear.life.unknowns import Unknown, scaled
+
+if TYPE_CHECKING:
+    import lmfit
+
+STEP = 1e-5  # of the unknowns in the Jacobian, which are of order one
+NO_INFLUENCE = 1e-9  # relative change of all predictions over the relative change of an unknown
+KEPT = 16  # predictions
+REFUSED = 1e3  # times what was measured: the prediction of values that the model refuses
+MOST_TRIALS = 100
+BASELINES = ("offset", "tilt")
+
+Vector: TypeAlias = Sequence[float] | Array
+
+
+class LeastSquares:
+    """The least-squares problem of data sets and unknowns, kept for fits to several sets of values."""
+
+    def __init__(
+        self,
+        case: Case,
+        data: Sequence[DataSet],
+        unknowns: Sequence[Unknown],
+        baseline: Sequence[str] = (),
+        comm: MPI.Comm = MPI.COMM_WORLD,
+    ) -> None:
+        """Check what is asked for; computes nothing.
+
+        Raises:
+            CaseError: a key, bound or combination of data that makes no sense.
+        """
+        self.case, self.comm = case, comm
+        self.model = Model(case)
+        self.data = list(data)
+        self.series = [series for one in data for series in one.series]
+        self.unknowns = [scaled(case, unknown) for unknown in unknowns]
+        self.baseline = tuple(baseline)
+        self._check(unknowns)
+        self.predict = Predictor(self.model, data)
+        self._known: dict[bytes, Array] = {}  # predictions of fitted unknowns, on the jumps kept
+        self.observed = np.concatenate([series.values for series in self.series])
+        self.has_sigma = self.series[0].sigma is not None
+        self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
+        self._lines, self.baseline_names = self._baselines()
+        count = len(self.unknowns) + self._lines.shape[1]
+        if len(self.observed) <= count:
+            raise CaseError(
+                InputError("data", f"{len(self.observed)} measurements for {count} unknowns; expected more")
+            )
+
+    def _check(self, unknowns: Sequence[Unknown]) -> None:
+        if not self.series:
+            raise CaseError(InputError("data", "expected at least one file of measurements"))
+        if not unknowns:
+            raise CaseError(InputError("--unknown", "expected at least one key"))
+        keys = [unknown.key for unknown in unknowns]
+        problems = [InputError(f"--unknown {key}", "given twice") for key in dict.fromkeys(keys) if keys.count(key) > 1]
+        for name in self.baseline:
+            if name not in BASELINES:
+                problems.append(InputError("--baseline", f"expected {' or '.join(BASELINES)}, got {name!r}"))
+        if self.baseline and all(series.x is None for series in self.series):
+            problems.append(InputError("--baseline", "expected with profiles only: the data hold none"))
+        for one in self.data:
+            for setting in one.settings:
+                key = setting.partition("=")[0]
+                if key in keys:
+                    problems.append(InputError(f"{one.name}: # set {key}", "is an unknown of the calibration too"))
+        kinds = {series.quantity for series in self.series}
+        given = {series.sigma is not None for series in self.series}
+        if len(given) > 1 or (len(kinds) > 1 and given == {False}):
+            names = ", ".join(dict.fromkeys(one.name for one in self.data if any(s.sigma is None for s in one.series)))
+            text = "gives no sigma; expected the standard deviation of every measurement where "
+            problems.append(InputError(names, text + f"{' and '.join(sorted(kinds))} are fitted together"))
+        if problems:
+            raise CaseError(problems)
+
+    def _baselines(self) -> tuple[Array, list[tuple[int, str]]]:
+        """Return the columns (n, baselines) that offsets and tilts add to the prediction, and whose they are."""
+        columns, names, begin = [], [], 0
+        for number, series in enumerate(self.series):
+            rows = slice(begin, begin + len(series.values))
+            begin = rows.stop
+            if series.x is None:
+                continue
+            for name in self.baseline:
+                column = np.zeros(len(self.observed))
+                column[rows] = 1.0 if name == "offset" else series.x - (series.x.min() + series.x.max()) / 2
+                columns.append(column)
+                names.append((number, name))
+        return (np.array(columns).T if columns else np.zeros((len(self.observed), 0))), names
+
+    def keep_jumps(self, z: Vector) -> None:
+        """Let the runs from now on jump as those of these fitted unknowns do: predictions are smooth functions then."""
+        self.predict.keep_jumps(self.values(z))
+        self._known.clear()
+
+    def values(self, z: Vector) -> dict[str, float]:
+        """Return the keys' values of fitted unknowns."""
+        return {one.unknown.key: one.value(part) for one, part in zip(self.unknowns, z, strict=True)}
+
+    def predicted(self, z: Vector, *, strict: bool = False) -> Array:
+        """Return the predictions without baselines (n,); `strict` as of `Predictor`."""
+        return np.concatenate(self.predict(self.values(z), strict=strict))
+
+    def _tried(self, z: Array) -> Array:
+        """Return the predictions of a trial; far too large where the model refuses it, so that it is not kept."""
+        key, known = z.tobytes(), self._known
+        if key not in known:
+            while len(known) >= KEPT:
+                known.pop(next(iter(known)))
+            try:
+                known[key] = self.predicted(z)
+            except (CaseError, ConvergenceError):
+                if not known:
+                    raise
+                known[key] = self.observed + REFUSED * (np.abs(self.observed) + self.sigma)
+        return known[key]
+
+    def jacobian(self, z: Vector) -> Array:
+        """Return the predictions' derivatives by the fitted unknowns (n, m); collective, one on each rank."""
+        base = np.array(z, dtype=float)
+
+        def shifted(k: int) -> Array:
+            ends = []
+            for sign in (-1, 1):
+                moved = base.copy()
+                moved[k] += sign * STEP
+                ends.append(self.predicted(moved))
+            return np.asarray((ends[1] - ends[0]) / (2 * STEP))
+
+        return np.array(share(self.comm, len(base), shifted), dtype=float).T
+
+    def check_influence(self, jacobian: Array, z: Vector) -> None:
+        """Check that every unknown changes some prediction.
+
+        Raises:
+            CaseError: names those that do not.
+        """
+        scale = float(np.abs(self.predicted(z)).max()) or 1.0
+        problems = [
+            InputError(f"--unknown {one.unknown.key}", "has no influence on what was measured")
+            for one, column in zip(self.unknowns, jacobian.T, strict=True)
+            if np.abs(column).max() <= NO_INFLUENCE * scale
+        ]
+        if problems:
+            raise CaseError(problems)
+
+    def cannot_tell(self, z: Vector | None = None) -> list[str]:
+        """Return which unknowns these data cannot tell apart, before any fit; collective.
+
+        Only the places and conditions of the data count, not their values: a plan of a measurement will do.
+        """
+        jacobian = self.jacobian(np.zeros(len(self.unknowns)) if z is None else z)
+        weighted = np.hstack([jacobian, self._lines]) / self.sigma[:, None]
+        return hardly_known(
+            [one.unknown.key for one in self.unknowns], self.data, without_baselines(weighted, len(self.unknowns))
+        )
+
+    def fit(
+        self,
+        observed: Array | None = None,
+        start: Vector | None = None,
+        jacobian: Array | None = None,
+    ) -> lmfit.minimizer.MinimizerResult:
+        """Return lmfit's result; collective.
+
+        Args:
+            observed: Values in place of the measured ones (n,).
+            start: Fitted unknowns to start from; by default zero, the start of each.
+            jacobian: Of the predictions (n, m), kept instead of computed anew in each step: for data near those
+                it belongs to.
+        """
+
+        def derivative(parameters: lmfit.Parameters) -> Array:
+            z = self._parts(parameters)[0]
+            columns = self.jacobian(z) if jacobian is None else jacobian
+            return np.hstack([columns, self._lines]) / self.sigma[:, None]
+
+        minimizer = self.minimizer(observed, start)
+        minimizer.max_nfev = MOST_TRIALS
+        with warnings.catch_warnings(action="ignore"):  # a singular covariance is told in our words
+            return minimizer.minimize(method="least_squares", jac=derivative, x_scale="jac")
+
+    def minimizer(self, observed: Array | None = None, start: Vector | None = None) -> lmfit.Minimizer:
+        """Return lmfit's minimizer of the weighted residuals; arguments as of `fit`."""
+        import lmfit
+
+        values = self.observed if observed is None else observed
+        parameters = lmfit.Parameters()
+        begin = np.zeros(len(self.unknowns)) if start is None else start
+        for k, (one, z) in enumerate(zip(self.unknowns, begin, strict=True)):
+            bounds = (one.unknown.low, one.unknown.high)
+            low, high = (one.fitted(bound) if np.isfinite(bound) else bound for bound in bounds)
+            parameters.add(f"u{k}", value=float(np.clip(z, low, high)), min=low, max=high)
+        for k in range(self._lines.shape[1]):
+            parameters.add(f"b{k}", value=0.0)
+
+        def residual(parameters: lmfit.Parameters) -> Array:
+            z, lines = self._parts(parameters)
+            return np.asarray((self._tried(z) + self._lines @ lines - values) / self.sigma)
+
+        return lmfit.Minimizer(residual, parameters, scale_covar=not self.has_sigma)
+
+    def _parts(self, parameters: lmfit.Parameters) -> tuple[Array, Array]:
+        """Return fitted unknowns and baselines."""
+        numbers = np.array([parameters[name].value for name in parameters if name[0] in "ub" and name[1:].isdigit()])
+        return numbers[: len(self.unknowns)], numbers[len(self.unknowns) :]
+
+
+def repeated(problem: LeastSquares, truth: Vector, repetitions: int, seed: int = 0) -> tuple[Array, Array]:
+    """Return estimates and standard errors of fits to made-up data: a parametric bootstrap; twin experiments.
+
+    The data are the model's predictions at `truth` with normal noise of each measurement's sigma. Every
+    fit starts at the truth and keeps the Jacobian there, whose change is of second order in the noise.
+
+    Args:
+        problem: Unknowns and data sets; their values are not used, their sigma is.
+        truth: Fitted unknowns.
+        repetitions: How many.
+        seed: Of the noise.
+
+    Returns:
+        Estimates less truth, and standard errors (repetitions, m) each, of the fitted unknowns.
+    """
+    generator = np.random.default_rng(seed)
+    problem.keep_jumps(truth)
+    exact, jacobian = problem.predicted(truth), problem.jacobian(truth)
+    m = len(problem.unknowns)
+    noise = generator.standard_normal((repetitions, len(exact))) * problem.sigma
+
+    def one(k: int) -> tuple[Array, Array]:
+        result = problem.fit(exact + noise[k], truth, jacobian)
+        values = [(result.params[f"u{i}"].value, result.params[f"u{i}"].stderr) for i in range(m)]
+        return np.array([v for v, _ in values]) - np.asarray(truth), np.array([e for _, e in values], dtype=float)
+
+    found = share(problem.comm, repetitions, one)
+    return np.array([value for value, _ in found]), np.array([error for _, error in found])
+
+
+def without_values(one: DataSet, sigma: float) -> DataSet:
+    """Return a data set with zero values and this standard deviation: the plan of a measurement."""
+    series = tuple(replace(s, values=np.zeros(len(s.values)), sigma=np.full(len(s.values), sigma)) for s in one.series)
+    return replace(one, series=series)

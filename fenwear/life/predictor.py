@@ -1,0 +1,99 @@
+"""What a model predicts for the conditions and places of measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.errors import CaseError, InputError
+from fenwear.life.data import DataSet, Series
+from fenwear.life.model import Model, Snapshot
+from fenwear.life.quantities import UNITS, Quantity, cycles_of
+
+
+class Predictor:
+    """What a model predicts for data sets: one run for each condition, on jumps that can be kept."""
+
+    def __init__(self, model: Model, data: Sequence[DataSet]) -> None:
+        self.model, self.data = model, list(data)
+        self._sequences: dict[tuple[str, ...], tuple[int, ...]] = {}
+
+    def keep_jumps(self, values: Mapping[str, float]) -> None:
+        """Let the runs from now on jump as those at these values do."""
+        self._sequences = {}
+        made = {}
+        for settings, snapshots in self._runs(values).items():
+            made[settings] = tuple(int(s.cycle) for s in snapshots)
+        self._sequences = made
+
+    def __call__(self, values: Mapping[str, float], *, strict: bool = False) -> list[Array]:
+        """Return the predictions of every series, in the order of the data sets.
+
+        Args:
+            values: Of the keys.
+            strict: Whether a scar that outgrows the contact surface is an error; in a trial of a fit it is none.
+
+        Raises:
+            CaseError: a scar has outgrown the contact surface.
+        """
+        runs = self._runs(values)
+        found = []
+        for one in self.data:
+            measures = self.model.cycle_measures(values, one.settings)
+            found += [_predict(series, runs[one.settings], measures, strict=strict) for series in one.series]
+        return found
+
+    def _runs(self, values: Mapping[str, float]) -> dict[tuple[str, ...], list[Snapshot]]:
+        wanted: dict[tuple[str, ...], set[int]] = {}
+        for one in self.data:
+            measures = self.model.cycle_measures(values, one.settings)
+            stops = wanted.setdefault(one.settings, set())
+            for series in one.series:
+                stops |= {max(1, round(cycles_of((a, series.counted), *measures))) for a in np.unique(series.after)}
+        runs = {}
+        for settings, stops in wanted.items():
+            sequence = self._sequences.get(settings)
+            last = max(stops) if sequence is None else sequence[-1]
+            runs[settings] = list(
+                self.model.run(values, last, settings=settings, stops=sorted(stops), sequence=sequence)
+            )
+        return runs
+
+
+def _predict(series: Series, snapshots: Sequence[Snapshot], measures: tuple[float, float], *, strict: bool) -> Array:
+    ends = np.array([s.cycle for s in snapshots])
+    predicted = np.empty(len(series.values))
+    quantity = Quantity(series.quantity, series.quantity, "snapshot", UNITS[series.quantity], series.body)
+    for amount in np.unique(series.after):
+        cycles = cycles_of((float(amount), series.counted), *measures)
+        snapshot = snapshots[int(np.argmin(np.abs(ends - cycles)))].at_cycle(cycles)
+        own = series.after == amount
+        if series.x is None:
+            predicted[own] = quantity.of_snapshot(snapshot)
+        else:
+            predicted[own] = _profile(series, snapshot, series.x[own], strict=strict)
+    return predicted
+
+
+def _profile(series: Series, snapshot: Snapshot, x: Array, *, strict: bool) -> Array:
+    """Return the depth at places (k,); nothing is worn beyond the contact surface.
+
+    Raises:
+        CaseError: the scar reaches the end of the modelled contact surface, and the profile beyond it.
+    """
+    surface = snapshot.surfaces[series.body]
+    depth = np.zeros(len(surface.x)) if surface.depth is None else surface.depth
+    edge = 1e-9 * (surface.x[-1] - surface.x[0])
+    worn = 1e-3 * float(depth.max())
+    cut = (x.min() < surface.x[0] - edge and depth[0] > worn) or (x.max() > surface.x[-1] + edge and depth[-1] > worn)
+    if strict and cut:
+        raise CaseError(
+            InputError(
+                "geometry",
+                f"the profile goes from x = {x.min():g} to {x.max():g} mm, and the scar reaches the end of the contact "
+                f"surface, which goes from {surface.x[0]:g} to {surface.x[-1]:g} mm; expected a wider one",
+            )
+        )
+    return np.interp(x, surface.x, depth, left=0.0, right=0.0)

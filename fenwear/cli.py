@@ -75,7 +75,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
-    from fenwear.results.quantities import sheet_text
+    from fenwear.results.sheet import sheet_text
     from fenwear.run import Progress, run_case
 
     loaded = _load(case, settings)

@@ -15,7 +15,7 @@ from fenwear.bodies.mesh import meshes_folder
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history, quantities
+from fenwear.results import history, sheet
 from fenwear.verify.suite import registered
 
 
@@ -108,7 +108,7 @@ class Results(Written):
         heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in history.HEAT_TERMS.items()}
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
-            "What a tribometer measures, of each body that wears": quantities.quantities(),
+            "What a tribometer measures, of each body that wears": sheet.quantities(),
             "Where the strip wears": history.STRIP_VARIABLES,
             "With heat": {**history.HEAT_VARIABLES, **heat},
         }

@@ -19,7 +19,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
-from fenwear.results import quantities
+from fenwear.results import sheet
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.versions import versions
 
@@ -79,8 +79,8 @@ STRIP_VARIABLES = {
 
 
 def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
-    case, sheet = system.case, quantities.quantities_of(system)
-    variables = {**VARIABLES, **({} if case.wear.strip is None else STRIP_VARIABLES), **sheet}
+    case, own = system.case, sheet.quantities_of(system)
+    variables = {**VARIABLES, **({} if case.wear.strip is None else STRIP_VARIABLES), **own}
     if case.heat is None:
         return variables
     terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
@@ -216,8 +216,8 @@ class HistoryWriter:
         Raises:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
-        sheet = quantities.values(block)
-        rows = {n: sheet[n] if n in sheet else _values(block, n) for n in self._variables}
+        own = sheet.values(block)
+        rows = {n: own[n] if n in own else _values(block, n) for n in self._variables}
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
         before = self._last or {name: values[:0] for name, values in rows.items()}
@@ -335,7 +335,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
         "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
-        **quantities.sheet(last),
+        **sheet.sheet(last),
         **{
             names[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),

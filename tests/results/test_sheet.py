@@ -13,7 +13,7 @@ import xarray
 
 from fenwear import Tribosystem, jump, load_case, march
 from fenwear.cycle import Block, follow
-from fenwear.results.quantities import quantities_of, sheet, sheet_text, values
+from fenwear.results.sheet import quantities_of, sheet, sheet_text, values
 from fenwear.run import run_case
 
 Assemble = Callable[..., Tribosystem]

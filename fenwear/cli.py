@@ -85,7 +85,7 @@ def run(
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
+    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True)
     if as_json:
         _print_json(summary)
     else:
@@ -143,8 +143,9 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     """Print the state as soon as it is there: the way to it may take longer."""
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
+    words = system.sliding.field.words
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
-        print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
+        print(f"  strip moves {words[d]:9} largest pressure {p.max():8.3f} MPa, "
               f"contact {part.format(width)}")  # fmt: skip
     print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
@@ -182,7 +183,7 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
     from fenwear.assembly import place_case
 
     system = place_case(_load(case, settings))
-    found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
+    found = {name: system.optimum(d) for d, name in reversed(system.sliding.field.words.items())}
     if as_json:
         x = system.pair.x.tolist()
         _print_json(

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Any, Literal
 
 import numpy as np
@@ -35,6 +33,7 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
+from fenwear.signals import Signals
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -54,6 +53,7 @@ def run_case(
     resume: bool = False,
     progress: Progress = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
+    last: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
 
@@ -65,6 +65,7 @@ def run_case(
         resume: Go on from the checkpoint in `output`.
         progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
+        last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
 
     Returns:
         The summary and the folder.
@@ -76,9 +77,6 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    if case.model.kind != "plane":
-        reason = "results are written of plane models so far; `steady`, `optimum` and Python's march and jump take all"
-        raise CaseError(InputError("model.kind", reason))
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case))
     if not resume:
@@ -86,13 +84,14 @@ def run_case(
     setup = time.perf_counter() - begin
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
     try:
-        return _run(system, directory, log, progress, setup, resume=resume), directory
+        signals = Signals(comm, last=last)
+        return _run(system, directory, log, progress, setup, signals, resume=resume), directory
     except OutputError as error:
         raise OutputError(error.path, error.reason, on_root(comm, lambda: _way_on(directory))) from error
 
 
 def _run(
-    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
+    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, noted: Signals, *, resume: bool
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
@@ -106,7 +105,7 @@ def _run(
         how = {"stop": run.stop(failure), **times, "warnings": warnings, "retries": run.remedies}
         return run.finish(how, report=report)
 
-    with _Signals(system.comm) as signals:
+    with noted as signals:
         try:
             run.march(progress, signals)
         except ConvergenceError as error:
@@ -170,7 +169,7 @@ class _Run:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
-        self._signals: _Signals | None = None
+        self._signals: Signals | None = None
         self._progress: _Progress | None = None
         self._block_begun = self._looked = time.monotonic()
         self._block_over = False
@@ -185,7 +184,7 @@ class _Run:
         writer = self.writer
         on_root(self.comm, lambda: None if writer is None else act(writer))
 
-    def march(self, progress: Progress, signals: _Signals) -> None:
+    def march(self, progress: Progress, signals: Signals) -> None:
         """Compute all half-cycles; collective.
 
         Raises:
@@ -223,7 +222,7 @@ class _Run:
         self._looked = now = time.monotonic()
         root, signals = self.comm.rank == 0, self._signals
         wishes = [
-            signals is not None and signals.received > 0,
+            signals is not None and signals.received,
             root and now > self._checkpoint_due,
             root and now > self._block_begun + BLOCK_SECONDS,
         ]
@@ -232,6 +231,8 @@ class _Run:
             self._save()
         if self._progress is not None:
             self._progress.working(self.state.half_cycle)
+        if interrupted and signals is not None:
+            signals.ending = True
         return bool(interrupted)
 
     def _blocks(self) -> Iterator[Block]:
@@ -351,29 +352,6 @@ class _Run:
         else:
             self.log(f"no growth rate of disturbances: {reason}")
         return reason
-
-
-class _Signals:
-    """Notes SIGINT and SIGTERM instead of dying at once."""
-
-    def __init__(self, comm: MPI.Comm) -> None:
-        self.comm, self.received = comm, 0
-
-    def __enter__(self) -> _Signals:
-        self._before = {s: signal.signal(s, self._note) for s in (signal.SIGINT, signal.SIGTERM)}
-        return self
-
-    def _note(self, number: int, _frame: FrameType | None) -> None:
-        if self.received:  # asked twice: at once, wherever in a solver this is, and with all ranks
-            os.write(2, b"fenwear: interrupted at once; what came after the last checkpoint is lost\n")
-            if self.comm.size > 1:
-                self.comm.Abort(1)
-            os._exit(1)
-        self.received = number
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
 
 
 def position_warnings(system: Tribosystem) -> list[str]:

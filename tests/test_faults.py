@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -501,12 +500,42 @@ def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str,
     check_history(folder)
 
 
-def test_second_signal_ends_all_ranks(tmp_path: Path) -> None:
-    """Asked twice, a rank leaves at once and takes the other with it."""
+TWICE = """
+import os, signal
+from mpi4py import MPI
+from fenwear.signals import Signals
+
+with Signals(MPI.COMM_WORLD):
+    if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
+        os.kill(os.getpid(), signal.SIGTERM)
+        print("noted", flush=True)
+        os.kill(os.getpid(), signal.SIGINT)
+        print("too late", flush=True)
+    MPI.COMM_WORLD.Barrier()
+    MPI.COMM_WORLD.recv()  # for ever
+"""
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_second_signal_ends_all_ranks(run_python: Run, ranks: int) -> None:
+    """Asked twice, a rank leaves at once and takes the other with it, which waits for it."""
+    done = run_python("-c", TWICE, ranks=ranks)
+    assert done.returncode == 1
+    assert done.stdout == "noted\n"
+    assert "interrupted at once" in done.stderr
+
+
+def test_signals_until_the_end(tmp_path: Path) -> None:
+    """Those that come while an interrupted run ends do not kill it, to the last moment: the exit status stays."""
     folder = tmp_path / "run"
     with running(folder, "contact.solver='full'", ranks=2, case="example1") as process:
-        pid = ranks_of(process)[1]
-        os.kill(pid, signal.SIGTERM)
-        threading.Timer(0.2, lambda: Path(f"/proc/{pid}").exists() and os.kill(pid, signal.SIGTERM)).start()
-        process.communicate(timeout=PATIENCE)
-    assert process.returncode == 1
+        ranks = ranks_of(process)
+        os.kill(ranks[1], signal.SIGTERM)
+        wait_until((folder / "summary.json").exists)
+        while process.poll() is None:
+            with suppress(ProcessLookupError):
+                os.kill(ranks[1], signal.SIGTERM)
+            time.sleep(0.002)
+        messages = process.communicate()[1]
+    assert process.returncode == 1, messages
+    check_gone(ranks)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -12,7 +13,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Heat, Kind, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, InputError
 from fenwear.interface import (
     ContactPair,
@@ -23,11 +24,12 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import in_model, in_space
-from fenwear.optimum import Optimum, check_equilibrium, optimum
+from fenwear.optimum import Optimum, check_equilibrium, optimum, optimum_on_track
 from fenwear.remedies import Remedies
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion, make_motion
+from fenwear.sliding.track import on_closed_track
 from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
@@ -43,7 +45,7 @@ class Sliding:
         field: The velocity of the counter-body over the contact.
         friction: The law of friction.
         wear: The wear laws of punch and strip; None where a body does not wear.
-        track: Length of the closed track that the strip runs on, mm; None for its own nodes.
+        track: What closes the track that a strip which wears runs on: its length, mm, or 2 pi rad; None for none.
         to_and_fro: Whether the strip's worn track passes to and fro under the punch.
     """
 
@@ -65,7 +67,7 @@ def make_sliding(case: Case, parts: int = 1) -> Sliding:
         sliding_field,
         Friction(case.contact, sliding_field),
         (case.wear.punch, case.wear.strip),
-        case.motion.track if isinstance(case.motion, OneWay) else None,
+        _closed_track(case),
         case.passes and not one_way,
     )
 
@@ -77,6 +79,13 @@ def _sliding_field(case: Case) -> SlidingField:
     if motion.along is not None:
         return SlidingField(shift=_unit(motion.along))
     return ALONG_X if motion.axis == "x" else ALONG_Y
+
+
+def _closed_track(case: Case) -> float | None:
+    if isinstance(case.motion, OneWay):
+        return case.motion.track
+    turns = isinstance(case.motion, Rotation) and case.passes  # rings have their whole track under the punch
+    return 2 * math.pi if turns and case.wear.strip is not None else None
 
 
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -168,14 +177,16 @@ class Placed:
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
             slid.append(self.motion.sliding(exponent)[:, None] * self.slid**exponent)
-        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.sliding.track)
+        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction)
 
     @property
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
-        offsets = np.unique([phase.offset for phase in self.motion.phases])
+        offsets, pair = np.unique([phase.offset for phase in self.motion.phases]), self.pair
         moved = np.diff(offsets).max(initial=0.0) * self.slid.max()
-        return float(moved / np.median(np.diff(self.pair.x)))
+        # Among the nodes of a solid there is no order along the sliding.
+        spacing = np.median(np.diff(pair.x)) if pair.punch.dim == 2 else np.sqrt(np.median(pair.weights))
+        return float(moved / spacing)
 
     @property
     def track_deepens(self) -> bool:
@@ -279,7 +290,7 @@ class Placed:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
 
         K is the sum over both bodies of the mean of beta~ v^a (the punch's alone where their pressure
-        exponents differ), at the mean pressure. On a closed track the strip recedes evenly instead.
+        exponents differ), at the mean pressure. On a closed track the strip recedes by what is spread along it.
 
         Args:
             direction: Sliding direction d.
@@ -296,15 +307,20 @@ class Placed:
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
         bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.exponent == exponent]
-        on_track = wear.track is not None and wear.punch is not None
+        on_track = self.sliding.track is not None and wear.strip is not None
         rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
-        rate = rates[0] if on_track else np.sum([np.zeros(len(self.pair.weights)), *rates], axis=0)
-        found = optimum(self.rigid, self.friction_ratio(direction), rate, exponent, zone)
-        if on_track and wear.strip is not None and "lambda_F" in found.velocity:
-            depth = wear.worn(np.tile(found.pressure, (len(self.motion.phases), 1))).strip.mean()
-            velocity = {**found.velocity, "lambda_F": found.velocity["lambda_F"] + depth / self.motion.period}
-            return replace(found, velocity=velocity)
-        return found
+        ratio, phases = self.friction_ratio(direction), len(self.motion.phases)
+
+        def recession(pressure: Array) -> Array:
+            worn = wear.worn(np.tile(pressure, (phases, 1)))
+            return np.asarray(self.pair.material @ worn.strip / self.motion.period)
+
+        if on_track and wear.punch is not None:
+            return optimum_on_track(self.rigid, ratio, rates[0], exponent, recession, zone)
+        if on_track:  # the strip alone: of all pressures that wear it evenly, one that is even along it
+            rates = [recession(np.ones(len(self.pair.weights)))]
+        rate = np.sum([np.zeros(len(self.pair.weights)), *rates], axis=0)
+        return optimum(self.rigid, ratio, rate, exponent, zone)
 
 
 def place(
@@ -330,7 +346,8 @@ def place(
     if bodies.followed is None:
         check_distance(middle)
     _check_axis(middle, sliding)
-    sliding = _around(middle, sliding, bodies.punch.law.kind)
+    if sliding.track is not None:
+        middle = on_closed_track(middle, sliding.field, sliding.track)
     whole = heat is None
     pairs = {
         offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -360,7 +377,7 @@ def place(
         rigid=rigid,
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        check_equilibrium(one, phase.direction, ratio)
+        check_equilibrium(one, sliding.field.words[phase.direction], ratio)
     return placed
 
 
@@ -376,14 +393,6 @@ def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
                 "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
             )
         )
-
-
-def _around(middle: ContactPair, sliding: Sliding, kind: Kind) -> Sliding:
-    """Return the sliding with its closed track where the strip of a plane model turns about an axis: 2 pi R."""
-    if kind not in ("stress", "strain") or not any(sliding.field.turn) or sliding.to_and_fro:
-        return sliding
-    radius = np.linalg.norm(in_space(middle.strip.x) - sliding.field.centre, axis=1)
-    return replace(sliding, track=float(2 * np.pi * radius.mean()))
 
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:

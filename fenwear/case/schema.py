@@ -747,8 +747,6 @@ class Case(_Part):
             problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
-        if kind == "axisymmetric" and self.heat is not None:
-            problems.append("heat: expected a plane model or a solid: heat is not followed in rings yet")
         if kind != "plane" and self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' but in plane models")
         return problems
@@ -756,7 +754,7 @@ class Case(_Part):
     @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
-        return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis == "x")
+        return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
 
     def _sliding_problems(self) -> list[str]:
         problems = []
@@ -766,7 +764,7 @@ class Case(_Part):
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
         if self.wear.strip is not None and self.passes:
             problems += self._track_problems()
-        if not self.passes and self.heat is not None:
+        if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
@@ -790,11 +788,6 @@ class Case(_Part):
     def _track_problems(self) -> list[str]:
         """Return what does not go with wear of a strip that passes under the punch."""
         motion = self.motion
-        if self.model.kind == "solid" and isinstance(motion, OneWay | Rotation):
-            return [
-                "wear.strip: not followed in solids around a closed track yet; expected the wear of the punch alone, "
-                "an axisymmetric model, or sliding to and fro"
-            ]
         if isinstance(motion, OneWay) and motion.track is None:
             return ["motion.track: missing, but required where the strip wears in one-way sliding"]
         if not isinstance(motion, OneWay | Rotation) and motion.positions == 1:

@@ -177,6 +177,23 @@ def node_areas(surface: ChartedSurface) -> NodeAreas:
     return NodeAreas(polygons, node, sizes)
 
 
+def node_triangles(surface: ChartedSurface) -> tuple[Array, Indices]:
+    """Divide a surface, whose trace may have all coordinates, among its pressure nodes as `node_areas` does.
+
+    Returns:
+        Triangles on the curved facets (m, 3, d), mm, and the pressure node that each belongs to (m,).
+    """
+    reference = _reference_parts(surface.cell, surface.pressure_degree)
+    _, count, flat = reference.shape
+    shape = surface.shape_functions(reference.reshape(-1, flat))
+    polygons = (shape @ surface.s[surface.facets]).reshape(-1, count, surface.s.shape[1])
+    node = surface.pressure_facets.ravel()
+    fan = np.arange(1, count - 1)
+    corners = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1)
+    triangles = polygons[node >= 0][:, corners].reshape(-1, 3, polygons.shape[2])
+    return triangles, np.repeat(node[node >= 0], len(fan))
+
+
 def shared_areas(first: ChartedSurface, second: ChartedSurface) -> csr_array:
     """Return the area that each pressure node of the first surface shares with each of the second (n1, n2)."""
     areas1, areas2 = node_areas(first), node_areas(second)

@@ -22,7 +22,7 @@ from fenwear.case import Case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 from fenwear.life.model import Model, Snapshot, WornSurface
-from fenwear.sliding.scar import scar_edges
+from fenwear.results.scar import extents
 
 LIMIT = 10_000_000  # cycles after which a level counts as never reached
 
@@ -241,8 +241,8 @@ def _volume(quantity: Quantity, snapshot: Snapshot) -> float:
 
 def _scar_width(quantity: Quantity, snapshot: Snapshot) -> float:
     surface, depth = _worn(quantity, snapshot)
-    left, right = scar_edges(surface.x, depth)
-    return right - left
+    nodes = np.arange(len(depth) - 1)
+    return float(extents(depth[None], surface.x[:, None], np.stack([nodes, nodes + 1], axis=1))[0, 0])
 
 
 def _contact_width(_: Quantity, snapshot: Snapshot) -> float:

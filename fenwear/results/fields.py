@@ -11,28 +11,30 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import basix
 import basix.ufl
 import dolfinx
 import numpy as np
-import scipy.spatial
 import ufl
 import xarray
 from dolfinx import fem
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.bodies.antiplane import shear_out_of_plane
+from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.compat import interpolation_points
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
+from fenwear.results.subcells import linear_cells
 from fenwear.sliding.wear import Worn
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
-AXES = ("x", "z")
+AXES = {2: ("x", "z"), 3: ("x", "y", "z")}
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class BodyFields:
 
     Attributes:
         displacement: mm.
-        out_of_plane: Displacement along y, mm; None where no traction acts along it.
+        out_of_plane: Displacement along y, around the axis of rings, mm; None where no traction acts along it.
         von_mises: Equivalent stress, MPa.
         temperature: K; None without heat.
         heat_flux: -k grad theta, mW/mm²; None without heat.
@@ -141,14 +143,17 @@ def _von_mises(elastic: ElasticBody, displacement: Any, out_of_plane: Any, chang
     sigma = elastic.law.stress(displacement)
     if change is not None:
         sigma = sigma - elastic.law.thermal_stress(change)
+    slope = None
+    if out_of_plane is not None:
+        slope = elastic.law.shear_modulus * shear_strain(out_of_plane, elastic.law.kind)
     if sigma.ufl_shape[0] == 3:
         deviator = ufl.dev(sigma)
-        return ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
+        around = 0.0 if slope is None else 3 * ufl.inner(slope, slope)
+        return ufl.sqrt(1.5 * ufl.inner(deviator, deviator) + around)
     out = elastic.law.stress_out_of_plane(displacement, change)
     xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
     shear = xz**2
-    if out_of_plane is not None:
-        slope = elastic.law.shear_modulus * ufl.grad(out_of_plane)
+    if slope is not None:
         shear = shear + ufl.inner(slope, slope)
     return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * shear)
 
@@ -158,11 +163,17 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
     mesh, degree = elastic.body.mesh, elastic.space.ufl_element().degree
     broken = fem.functionspace(mesh, basix.ufl.element("DG", mesh.basix_cell(), degree, shape=shape))
     values = fem.Function(broken)
-    values.interpolate(fem.Expression(expression, interpolation_points(broken)))
+    if elastic.law.kind == "axisymmetric":  # on the axis u / r has no value: taken at points inside the elements
+        inner = fem.functionspace(mesh, _inside_cells(mesh.basix_cell(), degree, shape))
+        within = fem.Function(inner)
+        within.interpolate(fem.Expression(expression, interpolation_points(inner)))
+        values.interpolate(within)
+    else:
+        values.interpolate(fem.Expression(expression, interpolation_points(broken)))
     smooth = fem.functionspace(mesh, basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=shape))
     sums, counts = fem.Function(smooth, name=name), fem.Function(smooth)
     size = smooth.dofmap.bs
-    cells = mesh.topology.index_map(2).size_local
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
     to = smooth.dofmap.list[:cells].ravel()
     from_ = broken.dofmap.list[:cells].ravel()
     for component in range(size):
@@ -173,6 +184,12 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
     sums.x.array[:] /= np.maximum(counts.x.array, 1.0)
     sums.x.scatter_forward()
     return sums
+
+
+def _inside_cells(cell: Any, degree: int, shape: tuple[int, ...]) -> Any:
+    """Return the element whose nodes are Gauss-Legendre points, none on an element's edge."""
+    variant = basix.LagrangeVariant.gl_warped
+    return basix.ufl.element("DG", cell, degree, lagrange_variant=variant, shape=shape)
 
 
 def write_fields(
@@ -221,7 +238,7 @@ def _contact_surfaces(system: Tribosystem, worn: Worn) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for name, nodes, depth in (("punch", pair.punch, rest.punch), ("strip", pair.strip, rest.strip)):
         at = f"{name}_contact"
-        data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES)}
+        data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES[nodes.dim])}
         data[f"{at}_wear"] = (at, depth, {"units": "mm"})
     return data
 
@@ -263,22 +280,24 @@ def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) ->
     """Return a body's nodes, cells and nodal values as variables of a dataset, on rank 0; collective."""
     units = {"von_mises": "MPa", "temperature": "K", "heat_flux": "mW/mm2"}
     comm, space = elastic.body.mesh.comm, elastic.space
-    index_map, degree = space.dofmap.index_map, space.ufl_element().degree
-    cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(2).size_local]
-    corners = _subcells(space)
-    linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, 4)
-    x = space.tabulate_dof_coordinates()[: index_map.size_local, :2]
+    index_map, degree, dim = space.dofmap.index_map, space.ufl_element().degree, elastic.dim
+    cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(dim).size_local]
+    corners = _corners(elastic.body.mesh.basix_cell().name, degree)
+    linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, corners.shape[1])
+    x = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
     parts = comm.gather((x, linear))
     gathered = [(f.name, comm.gather(_on_nodes(f, elastic).reshape(index_map.size_local, -1))) for f in functions]
     if comm.rank != 0:
         return {}
     point, cell = f"{name}_point", f"{name}_cell"
     points = np.concatenate([p[0] for p in parts])
-    data: dict[str, Any] = {f"{name}_{a}": (point, points[:, k], {"units": "mm"}) for k, a in enumerate(AXES)}
-    data[f"{name}_cells"] = ((cell, "corner"), np.concatenate([p[1] for p in parts]), {"degree": degree})
+    data: dict[str, Any] = {f"{name}_{a}": (point, points[:, k], {"units": "mm"}) for k, a in enumerate(AXES[dim])}
+    # Bodies of different elements have corners of their own.
+    corner = "corner" if dim == 2 else f"{name}_corner"
+    data[f"{name}_cells"] = ((cell, corner), np.concatenate([p[1] for p in parts]), {"degree": degree})
     for field, values in gathered:
         joined = np.concatenate(values)
-        names = [field] if joined.shape[1] == 1 else [f"{field}_{a}" for a in AXES]
+        names = [field] if joined.shape[1] == 1 else [f"{field}_{a}" for a in AXES[dim]]
         for k, component in enumerate(names):
             data[f"{name}_{component}"] = (point, joined[:, k], {"units": units.get(field, "mm")})
     return data
@@ -298,12 +317,8 @@ def _on_nodes(function: fem.Function, elastic: ElasticBody) -> Array:
     return values[: index_map.size_local]
 
 
-def _subcells(space: fem.FunctionSpace) -> Array:
-    """Return the corners (count, 4) of the linear cells between the nodes of one element, around each."""
-    points = space.element.basix_element.points
-    degree = space.ufl_element().degree
-    if len(points) != (degree + 1) ** 2:  # triangles: the last corner twice
-        triangles = scipy.spatial.Delaunay(points).simplices
-        return np.hstack([triangles, triangles[:, 2:]])
-    grid = np.lexsort((points[:, 0], points[:, 1])).reshape(degree + 1, degree + 1)
-    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+def _corners(cell: str, degree: int) -> NDArray[np.int64]:
+    """Return the corners of the linear cells between the nodes of one element, around each."""
+    corners = linear_cells(cell, degree)
+    # In the plane all have four: of triangles the last one twice.
+    return np.hstack([corners, corners[:, 2:]]) if cell == "triangle" else corners

@@ -18,14 +18,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
-from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.assembly import Placed
 from fenwear.cycle import Block
-from fenwear.sliding.scar import EDGES, scar_widths, scars
+from fenwear.results.scar import scar_geometry
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
-BODIES = ("punch", "strip")
+BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
+SHARES = {"": 0.01, "_5": 0.05}  # of the largest depth, where widths are read, and how their names end
 WEAR_RATE = "mm3/(N m)"
+PLACES = 9  # of a place in mm: the middle is 0, not what rounding of a mesh leaves of it
 
 SLIDING: dict[str, Variable] = {
     "cycles": (("half_cycle",), "1", "cycles done"),
@@ -41,48 +42,50 @@ OF_A_BODY: dict[str, Variable] = {
     "total_mass": (("half_cycle",), "mg", "mass worn off the {body} from the start"),
     "wear_rate": (("half_cycle",), WEAR_RATE, "specific wear rate of the {body} in the half-cycle"),
     "mean_wear_rate": (("half_cycle",), WEAR_RATE, "specific wear rate of the {body} from the start"),
-    "max_depth": (("half_cycle",), "mm", "largest worn depth of the {body}"),
-    "max_depth_{axis}": (("half_cycle",), "mm", "where the worn depth of the {body} is largest, {axis}"),
-    "scar_width_{share}{along}": (
-        ("half_cycle",),
-        "mm",
-        "width of the {body}'s scar along {axis} at {share} % of its largest depth",
-    ),
+    "max_wear": (("half_cycle",), "mm", "largest worn depth of the {body} at the end of the half-cycle"),
 }
-SHARES = {f"{100 * share:g}": share for share in EDGES}
 
 
-def quantities(axes: tuple[str, ...] = ("x",), bodies: Mapping[str, bool] | None = None) -> dict[str, Variable]:
-    """Return the variables of the sheet by name.
-
-    Args:
-        axes: Of the contact surface.
-        bodies: Those that wear, and whether their density is known; by default both.
-    """
-    found = dict(SLIDING)
-    plane = len(axes) == 1
-    for body, weighs in (bodies or dict.fromkeys(BODIES, True)).items():
-        for name, (dimensions, units, text) in OF_A_BODY.items():
-            if (name == "total_area" and not plane) or (name == "total_mass" and not weighs):
-                continue
-            for axis in axes if "{axis}" in text else ("",):
-                for share in SHARES if "{share}" in text else ("",):
-                    words = {"axis": axis, "share": share, "along": "" if plane else f"_{axis}", "body": body}
-                    found[f"{name.format(**words)}_{body}"] = (dimensions, units, text.format(**words))
+def variables(placed: Placed) -> dict[str, Variable]:
+    """Return the variables of the sheet: of the bodies that wear, masses where a density is known."""
+    found, plane = dict(SLIDING), _is_plane(placed)
+    surfaces = (placed.pair.punch, placed.pair.strip)
+    for (body, end), surface, law, density in zip(
+        BODIES.items(), surfaces, placed.sliding.wear, placed.bodies.densities, strict=True
+    ):
+        if law is None:
+            continue
+        missing = {"total_area": not plane, "total_mass": density is None}
+        own = {name: variable for name, variable in OF_A_BODY.items() if not missing.get(name)}
+        own |= of_the_scar(axes(placed), scar_geometry(placed, surface).names)
+        found |= {f"{name}{end}": (over, unit, text.format(body=body)) for name, (over, unit, text) in own.items()}
     return found
 
 
-def quantities_of(system: Tribosystem) -> dict[str, Variable]:
-    """Return the variables of the sheet of a system: of the bodies that wear, masses where a density is known."""
-    wears = dict(zip(BODIES, system.sliding.wear, strict=True))
-    weighs = dict(zip(BODIES, system.bodies.densities, strict=True))
-    of = {body: weighs[body] is not None for body, law in wears.items() if law is not None}
-    return quantities(contact_axes(system), of)
+def of_the_scar(along: tuple[str, ...], extents: tuple[str, ...]) -> dict[str, Variable]:
+    """Return the variables of a scar: where it is deepest, and its extents by their names."""
+    found: dict[str, Variable] = {
+        f"max_wear_{axis}": (("half_cycle",), "mm", f"where the worn depth of the {{body}} is largest, {axis}")
+        for axis in along
+    }
+    way = "along the contact" if along == ("x",) else "across the sliding"
+    texts = {"length": "along the sliding", "width": way}
+    for name in extents:
+        for end, share in SHARES.items():
+            text = f"{name} of the {{body}}'s scar {texts[name]} at {100 * share:g} % of its largest depth"
+            found[f"scar_{name}{end}"] = (("half_cycle",), "mm", text)
+    return found
 
 
-def contact_axes(system: Tribosystem) -> tuple[str, ...]:
-    """Return the axes along a contact surface."""
-    return ("x", "y")[: system.pair.punch.dim - 1]
+def axes(placed: Placed) -> tuple[str, ...]:
+    """Return the names of coordinates on the contact surface: x in the plane, r of rings, x, y and z of solids."""
+    if placed.pair.punch.dim == 3:
+        return ("x", "y", "z")
+    return ("x",) if _is_plane(placed) else ("r",)
+
+
+def _is_plane(placed: Placed) -> bool:
+    return placed.bodies.punch.law.kind in ("stress", "strain")
 
 
 def values(block: Block) -> dict[str, Array]:
@@ -97,38 +100,36 @@ def values(block: Block) -> dict[str, Array]:
         "friction_work": totals.of("work"),
         "dissipated_energy": totals.energy,
     }
-    depths = zip(BODIES, (system.pair.punch, system.pair.strip), (block.wear, block.wear_strip), strict=True)
-    for body, surface, depth in depths:
+    depths = ((system.pair.punch, block.wear), (system.pair.strip, block.wear_strip))
+    for (body, end), law, (surface, depth) in zip(BODIES.items(), system.sliding.wear, depths, strict=True):
+        if law is None:
+            continue
         volume = totals.of(f"volume_{body}")
-        found |= {
-            f"total_area_{body}": volume / thickness,
-            f"total_volume_{body}": volume,
-            f"total_mass_{body}": totals.of(f"mass_{body}"),
-            f"wear_rate_{body}": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
-            f"mean_wear_rate_{body}": 1e3 * _over(volume, totals.of("load_path")),
-            **_scar(body, surface, depth),
+        deepest = np.round(surface.x[depth.argmax(axis=1)], PLACES) + 0.0
+        geometry = scar_geometry(system, surface)
+        own = {
+            "total_area": volume / thickness,
+            "total_volume": volume,
+            "total_mass": totals.of(f"mass_{body}"),
+            "wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
+            "mean_wear_rate": 1e3 * _over(volume, totals.of("load_path")),
+            "max_wear": depth.max(axis=1),
+            **{f"max_wear_{axis}": deepest[:, k] for k, axis in enumerate(axes(system))},
+            **{
+                f"scar_{name}{at}": extent
+                for at, share in SHARES.items()
+                for name, extent in geometry.extents(depth, share).items()
+            },
         }
+        found |= {f"{name}{end}": value for name, value in own.items()}
     return found
 
 
-def _level(system: Tribosystem) -> Array:
+def _level(system: Placed) -> Array:
     """Return the cosine of the slope of the contact surface against the sliding (n,); 1 where nothing slides."""
     pair, field = system.pair, system.sliding.field
     speed = np.linalg.norm(field.velocity(pair.punch.x), axis=1)
     return _over(field.rate(pair.punch.x, pair.normal), speed, 1.0)
-
-
-def _scar(body: str, surface: ContactSurface, depth: Array) -> dict[str, Array]:
-    axes = ("x", "y")[: surface.dim - 1]
-    found = scars(surface.x[:, :-1], depth)
-    rows = {f"max_depth_{body}": found.depth}
-    rows |= {f"max_depth_{axis}_{body}": found.place[:, k] for k, axis in enumerate(axes)}
-    for share, level in SHARES.items():
-        width = scar_widths(surface, depth, level)
-        for k, axis in enumerate(axes):
-            along = "" if len(axes) == 1 else f"_{axis}"
-            rows[f"scar_width_{share}{along}_{body}"] = width[:, k]
-    return rows
 
 
 def _over(above: Array, below: Array, otherwise: float = np.nan) -> Array:
@@ -160,20 +161,32 @@ LINES = {
     "mean_wear_rate_mm3_per_N_m": Line("specific wear rate, mean", "mm³/(N m)"),
     "wear_rate_mm3_per_N_m": Line("specific wear rate, last", "mm³/(N m)"),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
-    "at_x_mm": Line("at x", "mm"),
-    "at_y_mm": Line("at y", "mm"),
+    **{f"at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
     **{
-        f"scar_width_{share}_percent_{along}mm": Line(f"scar width{where} at {share} % of the depth", "mm")
-        for share in SHARES
-        for along, where in (("", ""), ("x_", " along x"), ("y_", " along y"))
+        f"scar_{name}_{100 * share:g}_percent_mm": Line(f"scar {name} at {100 * share:g} % of the depth", "mm")
+        for name in ("length", "width")
+        for share in SHARES.values()
+    },
+}
+OF_SUMMARY = {
+    "worn_area_mm2": "total_area",
+    "worn_volume_mm3": "total_volume",
+    "worn_mass_mg": "total_mass",
+    "mean_wear_rate_mm3_per_N_m": "mean_wear_rate",
+    "wear_rate_mm3_per_N_m": "wear_rate",
+    "largest_depth_mm": "max_wear",
+    **{f"at_{axis}_mm": f"max_wear_{axis}" for axis in "rxyz"},
+    **{
+        f"scar_{name}_{100 * share:g}_percent_mm": f"scar_{name}{end}"
+        for name in ("length", "width")
+        for end, share in SHARES.items()
     },
 }
 
 
 def sheet(last: Block) -> dict[str, Any]:
     """Return the sheet at the end of a run, for summary.json: of the sliding, and of each body that wears."""
-    system = last.system
-    known, row = quantities_of(system), {name: value[-1] for name, value in values(last).items()}
+    known, row = variables(last.system), {name: value[-1] for name, value in values(last).items()}
     path = float(last.totals.of("load_path")[-1]) or np.nan
     found: dict[str, Any] = {
         "sliding": {
@@ -188,22 +201,8 @@ def sheet(last: Block) -> dict[str, Any]:
             "largest_energy_mJ_per_mm2": float(row["dissipated_energy"].max()),
         }
     }
-    names = {
-        "worn_area_mm2": "total_area",
-        "worn_volume_mm3": "total_volume",
-        "worn_mass_mg": "total_mass",
-        "mean_wear_rate_mm3_per_N_m": "mean_wear_rate",
-        "wear_rate_mm3_per_N_m": "wear_rate",
-        "largest_depth_mm": "max_depth",
-        **{f"at_{axis}_mm": f"max_depth_{axis}" for axis in "xy"},
-        **{
-            f"scar_width_{share}_percent_{along[1:]}{'_' if along else ''}mm": f"scar_width_{share}{along}"
-            for share in SHARES
-            for along in ("", "_x", "_y")
-        },
-    }
-    for body in BODIES:
-        own = {key: float(row[f"{name}_{body}"]) for key, name in names.items() if f"{name}_{body}" in known}
+    for body, end in BODIES.items():
+        own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
         if own:
             found[body] = own
     return found
@@ -220,11 +219,12 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
     for key, line in LINES.items():
         found = [summary.get("sliding", {})] if key in summary.get("sliding", {}) else bodies
         if any(key in one for one in found):
-            rows.append((line.label, line.unit, [_in_unit(one.get(key), line) for one in found]))
+            rows.append((line.label, line.unit, [shown(one.get(key), line) for one in found]))
     return rows
 
 
-def _in_unit(value: Any, line: Line) -> Any:
+def shown(value: Any, line: Line) -> Any:
+    """Return a value of the summary in the unit in which it is read."""
     return value if value is None or line.factor == 1 else line.factor * value
 
 

@@ -3,7 +3,7 @@
 The punch's worn depth belongs to its contact nodes, the strip's to the strip's nodes, whose material
 moves under the punch: what is worn in a phase is put on the strip at its offset, so that its
 cross-section is what the pressure wore, and what is felt is read there. On a closed track the
-strip's wear spreads over the whole of it.
+strip's wear spreads along the whole of it, see `fenwear.sliding.track`.
 """
 
 from __future__ import annotations
@@ -71,13 +71,11 @@ class PhasesWear:
     Attributes:
         punch, strip: beta~ S p^b at the interface nodes; None where the body does not wear.
         pairs: The surfaces opposite each other in each phase.
-        track: Length of the closed track that the strip runs on, mm; None for its own nodes.
     """
 
     punch: _BodyWear | None
     strip: _BodyWear | None
     pairs: Sequence[ContactPair]
-    track: float | None
 
     def some(self, phases: Sequence[int]) -> PhasesWear:
         """Return the wear of some of the phases."""
@@ -85,7 +83,7 @@ class PhasesWear:
         punch, strip = (
             None if body is None else replace(body, rate=body.rate[chosen]) for body in (self.punch, self.strip)
         )
-        return PhasesWear(punch, strip, [self.pairs[k] for k in chosen], self.track)
+        return PhasesWear(punch, strip, [self.pairs[k] for k in chosen])
 
     def depth(self, pressure: Array) -> Array:
         """Return the depth worn off the punch in each phase (m, n), mm."""
@@ -97,7 +95,7 @@ class PhasesWear:
         strip = np.zeros(len(first.strip.weights))
         if self.strip is not None:
             for pair, depth in zip(self.pairs, self.strip.depth(pressure), strict=True):
-                strip += self._on_strip(pair) @ depth
+                strip += pair.deposit @ depth
         return Worn(self.depth(pressure).sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
@@ -120,7 +118,7 @@ class PhasesWear:
             right[:, nodes, nodes] = self.punch.slope(pressure)
         if self.strip is not None:
             for k, slope in enumerate(self.strip.slope(pressure)):
-                right[k, strip:] = self._on_strip(self.pairs[k]) * slope
+                right[k, strip:] = self.pairs[k].deposit.toarray() * slope
         return self._left, right
 
     @cached_property
@@ -132,12 +130,6 @@ class PhasesWear:
         if self.strip is not None:
             parts.append(np.array([pair.material.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
-
-    def _on_strip(self, pair: ContactPair) -> Array:
-        """Return what puts depths of the contact nodes on the strip's nodes (n_strip, n), areas kept."""
-        if self.track is not None:
-            return np.broadcast_to(pair.weights / self.track, (len(pair.strip.weights), len(pair.weights)))
-        return pair.deposit.toarray()
 
 
 @dataclass(frozen=True)
@@ -170,7 +162,6 @@ class Wear:
         sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
         pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
-        track: Length of the closed track, mm.
     """
 
     punch: WearLaw | None
@@ -178,7 +169,6 @@ class Wear:
     sliding: tuple[Array, Array]
     pairs: Sequence[ContactPair]
     friction: Friction
-    track: float | None
 
     @property
     def constant(self) -> bool:
@@ -209,7 +199,7 @@ class Wear:
                 for k, state in zip(chosen, conditions, strict=True)
             ]
             bodies.append(_BodyWear(np.array(rates), law.pressure_exponent))
-        return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen], self.track)
+        return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 
 def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:

@@ -1,6 +1,19 @@
 """Problems whose answer is known, solved by fenwear and compared: exact solutions and published results."""
 
-from fenwear.verify import elastic, contact, curved, solid, optimum, wear, jumps, conduction, thermal, solid_heat, ranks  # noqa: I001  (the order of the table)
+from fenwear.verify import (
+    conduction,
+    contact,
+    curved,
+    elastic,
+    jumps,
+    optimum,
+    ranks,
+    solid,
+    solid_heat,
+    stick,
+    thermal,
+    wear,
+)
 from fenwear.verify.suite import Outcome, Plot, Result, Row, VerificationCase, registered, run_cases
 
 __all__ = [
@@ -20,6 +33,7 @@ __all__ = [
     "run_cases",
     "solid",
     "solid_heat",
+    "stick",
     "thermal",
     "wear",
 ]

@@ -7,12 +7,19 @@ from functools import cache
 from typing import Any
 
 from fenwear.assembly import Tribosystem, assemble
-from fenwear.case import load_case, make_case
+from fenwear.case import Case, load_case, make_case
 
 STEEL = {"young": 2e5, "poisson": 0.3}
 
 
 def two_blocks(
+    punch_material: Mapping[str, float], strip_material: Mapping[str, float], sizes: Mapping[str, float], **tables: Any
+) -> Tribosystem:
+    """Return two rectangles of the same width on each other, see `two_block_case`; collective."""
+    return assemble(two_block_case(punch_material, strip_material, sizes, **tables))
+
+
+def two_block_case(
     punch_material: Mapping[str, float],
     strip_material: Mapping[str, float],
     sizes: Mapping[str, float],
@@ -22,8 +29,8 @@ def two_blocks(
     punch: Mapping[str, Any] | None = None,
     strip: Mapping[str, Any] | None = None,
     **tables: Any,
-) -> Tribosystem:
-    """Return two rectangles of the same width on each other; collective.
+) -> Case:
+    """Return the case of two rectangles of the same width on each other.
 
     The punch is pressed down with 1 MPa, its sides held in x; the strip stands on its held far side.
 
@@ -55,7 +62,7 @@ def two_blocks(
         "run": {"half_cycles": 1},
         **tables,
     }
-    return assemble(make_case(case))
+    return make_case(case)
 
 
 def clamped(body: str, groups: Sequence[str] = ("sides", "far", "contact")) -> dict[str, Any]:

@@ -378,13 +378,36 @@ def rotation() -> Result:
                 number("pad: torque (N mm)", 140_000, torque, 1e-5),
                 number("pad: rate of approach (mm/s)", 1.1936621e-5, optimum.velocity["lambda_F"], 1e-5),
             ]
-    return Result(rows)
+    return Result([*rows, *worn_disc()])
 
 
-def pad(b: float = 1.0, **tables: Any) -> Tribosystem:
+def worn_disc() -> list[Row]:
+    """Compare a pad on a disc that both wear: a sixth of what the disc loses is lost at each place, p r = constant."""
+    rates, rows, errors = (1e-8, 3e-8), list[Row](), []
+    for across in (2, 4):
+        both = pad(
+            wear={"punch": {"coefficient": rates[0]}, "strip": {"coefficient": rates[1]}},
+            sizes={"across": across},
+        )
+        x = both.pair.punch.x
+        optimum, state, (block,) = both.optimum(1), steady(both), march(both, 1, implicit=True)
+        exact = 375 / np.pi / np.hypot(x[:, 0], x[:, 1])
+        errors.append(float(np.abs(optimum.pressure / exact - 1).max()))
+        torque = block.pressure[-1] @ (both.pair.weights * np.hypot(x[:, 0], x[:, 1]))
+        what = f"pad and disc, {across} elements across"
+        rows += [
+            profile(f"{what}: steady pressure (MPa)", exact, state.pressure[0], 0.02, scale=exact),
+            profile(f"{what}: optimum (MPa)", state.pressure[0], optimum.pressure, 1e-9),
+            number(f"{what}: approach (mm/s)", 1.790493e-5, optimum.velocity["lambda_F"], 2e-3),
+            number(f"{what}: volume of the disc (mm³)", rates[1] * 10 * torque, block.worn_area_strip[-1], 1e-12),
+        ]
+    return [*rows, order("pad and disc: order of the pressure's largest error", 1, errors, 0.7)]
+
+
+def pad(b: float = 1.0, sizes: Mapping[str, float] | None = None, **tables: Any) -> Tribosystem:
     """Return the annular sector r 60..100 mm, 60 degrees, F = 5,000 N, on a disc that turns; collective."""
     return solve(
-        {"file": "pad_on_disc.geo", "degree": 2, "order": 2},
+        {"file": "pad_on_disc.geo", "degree": 2, "order": 2, "parameters": dict(sizes or {})},
         {
             "supports": [{"on": "punch_sides", "fix": ["x", "y"]}],
             "loads": [{"on": "punch_far", "force": [0, 0, -5000]}],

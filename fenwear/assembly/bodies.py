@@ -16,6 +16,7 @@ from fenwear.bodies.shape import follow_wear
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import isotropic_conduction
+from fenwear.parallel import release
 from fenwear.sliding.wear import Worn
 
 
@@ -69,6 +70,7 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
         CaseError: what only the geometry can tell is wrong, such as a missing group.
         MeshQualityError: an element does not survive the motion.
     """
+    release(comm)  # what earlier systems have left
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))

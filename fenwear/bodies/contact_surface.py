@@ -15,16 +15,15 @@ from functools import cached_property
 from typing import Any
 
 import basix
-import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
+from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.mesh import BodyMesh
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
@@ -229,9 +228,8 @@ def _integrals(
     own = np.flatnonzero((blocks >= start) & (blocks < stop))
     found = np.zeros((2, len(blocks), dim))
     for k, traction in enumerate((ufl.as_vector((1.0,) * dim), ufl.FacetNormal(body.mesh))):
-        vector = fem.petsc.assemble_vector(fem.form(measure * ufl.inner(traction, v) * ds))
-        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        found[k, own] = vector.array_r.reshape(-1, dim)[blocks[own] - start]
+        vector = assembled_vector(measure * ufl.inner(traction, v) * ds)
+        found[k, own] = vector.reshape(-1, dim)[blocks[own] - start]
     body.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
     weights, normals = found[0, :, 0], found[1]
     size = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -194,6 +194,10 @@ class Load(_Part):
                 raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
         return self
 
+    def times(self, factor: float) -> Load:
+        """Return the load times a factor at every time."""
+        return self._scaled(factor).model_copy(update={"over_cycle": self.over_cycle})
+
     def at(self, fraction: float) -> Load:
         """Return the load at this fraction of the cycle."""
         if self.over_cycle is None:
@@ -638,6 +642,76 @@ class Run(_Part):
     )
 
 
+@dataclass(frozen=True)
+class OneOrTwo:
+    """One value, or two that are the ends of a ramp; in the JSON schema a value alone may stand for the list."""
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a value or a list."""
+        several = handler(core)
+        return {"anyOf": [several, several.get("items", {})]}
+
+
+def _ramp(quantity: Any) -> Any:
+    """Return the type of what is held, or goes from one value to another, in a step of a program."""
+    listed = BeforeValidator(lambda value: value if isinstance(value, list | tuple) else (value,))
+    return Annotated[tuple[quantity, ...], Field(min_length=1, max_length=2), OneOrTwo(), listed] | None
+
+
+class ProgramStep(_Part):
+    """A step of a test program: how long it takes, and what acts in it; [from, to] is a ramp."""
+
+    cycles: Annotated[int, Field(ge=1, strict=True)] | None = Field(default=None, description="how long it takes")
+    distance: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="or: of sliding")
+    time: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or: how long")
+    load: _ramp(Annotated[Force, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="normal force: all loads of the case change in its proportion"
+    )
+    load_factor: _ramp(Annotated[Number, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="or: all loads of the case times this"
+    )
+    speed: _ramp(Annotated[Speed, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of one-way sliding"
+    )
+    angular_speed: _ramp(Annotated[AngularFrequency, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of a rotation"
+    )
+    amplitude: _ramp(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of reciprocating sliding"
+    )
+    angular_frequency: _ramp(Annotated[AngularFrequency, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of reciprocating sliding or an oscillation"
+    )
+    period: _ramp(Annotated[Time, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="or: of a whole cycle"
+    )
+    ambient: _ramp(Temperature) = Field(  # type: ignore[valid-type]
+        default=None, description="heat.ambient"
+    )
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if sum(length is not None for length in (self.cycles, self.distance, self.time)) != 1:
+            raise ValueError("give one of cycles, distance and time: how long the step takes")
+        for one, other in (("load", "load_factor"), ("angular_frequency", "period")):
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise ValueError(f"{one}: give either {one} or {other}")
+        for key in ("speed", "angular_speed"):
+            if getattr(self, key) is not None and not any(getattr(self, key)):
+                raise ValueError(f"{key}: expected more than zero: nothing slides in this step")
+        return self
+
+
+class Program(_Part):
+    """A test program: steps one after the other. What a step does not name stays as it was."""
+
+    steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="in their order")
+    levels: Annotated[int, Field(ge=1, le=10000, strict=True)] = Field(
+        default=20,
+        description="that a ramp of motion or ambient temperature is cut into; loads change continuously",
+    )
+
+
 class Output(_Part):
     """What a run keeps."""
 
@@ -680,6 +754,7 @@ class Case(_Part):
     wear: Wear = Field(description="of punch, strip or both")
     motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
     heat: Heat | None = Field(default=None, description="without this table there is no temperature")
+    program: Program | None = Field(default=None, description="loads, motion and ambient temperature that change")
     run: Run = Field(description="how far, and how")
     output: Output = Field(default=Output(), description="what is kept")
 
@@ -705,7 +780,7 @@ class Case(_Part):
             problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
-        problems += [*self._kind_problems(), *self._sliding_problems()]
+        problems += [*self._kind_problems(), *self._sliding_problems(), *self._program_problems()]
         problems += [
             f"{body}.regions: missing, but required"
             for body, part in (("punch", self.punch), ("strip", self.strip))
@@ -783,6 +858,28 @@ class Case(_Part):
         for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
             if law is not None and law.coefficient is None and law.archard is None and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
+        return problems
+
+    def _program_problems(self) -> list[str]:
+        """Return what of a program does not go with the motion and the heat."""
+        if self.program is None:
+            return []
+        motion, problems = self.motion, []
+        turns = isinstance(motion, Oscillation | Rotation)
+        for number, step in enumerate(self.program.steps):
+            at = f"program.steps.{number}"
+            for key in ("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
+                known = key in type(motion).model_fields and not (key == "amplitude" and turns)
+                if getattr(step, key) is not None and not known:
+                    problems.append(f"{at}.{key}: does not change with motion.kind = '{motion.kind}'")
+            if step.distance is not None and turns:
+                problems.append(f"{at}.distance: expected cycles or time where the strip turns")
+            if step.ambient is not None and self.heat is None:
+                problems.append(f"{at}.ambient: expected a case with the table heat")
+        if self.contact.solver == "full":
+            problems.append("contact.solver: expected 'condensed' with a program")
+        if self.run.periodic_within is not None:
+            problems.append("run.periodic_within: a program ends with its last step; expected none")
         return problems
 
     def _track_problems(self) -> list[str]:

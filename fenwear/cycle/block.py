@@ -85,6 +85,7 @@ class Block:
         retries: What had to be solved in another way in it, a count (k,).
         heat: Temperatures and heat balance; None without heat.
         remedies: How it was solved then, and how often.
+        load_factor: Of all loads in it (k,).
         end: From where the run goes on.
     """
 
@@ -104,6 +105,7 @@ class Block:
     retries: NDArray[np.int64]
     heat: BlockHeat | None = field(default=None, kw_only=True)
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
+    load_factor: Array = field(kw_only=True)
     end: RunState = field(kw_only=True)
 
     def __len__(self) -> int:
@@ -112,7 +114,23 @@ class Block:
     @property
     def time(self) -> Array:
         """Time at the end of each half-cycle (k,), s."""
-        return self.system.motion.time(self.half_cycle)
+        return self.system.time(self.half_cycle)
+
+    @property
+    def load(self) -> Array:
+        """Mean normal force of each half-cycle (k,), N; 0 where supports and not the contact carry the loads."""
+        return self.system.normal_force * self.load_factor
+
+    @property
+    def speed(self) -> Array:
+        """Mean speed of the motion (k,), mm/s or rad/s."""
+        return np.full(len(self), self.system.motion.mean_speed)
+
+    @property
+    def ambient(self) -> Array:
+        """Temperature of the surroundings (k,), K; 0 without heat."""
+        heat = self.system.heat
+        return np.full(len(self), 0.0 if heat is None else heat.ambient)
 
     @property
     def max_pressure(self) -> Array:
@@ -163,6 +181,7 @@ class _Row(NamedTuple):
     worn: Worn
     totals: Totals
     retries: int
+    load: float
 
 
 @dataclass
@@ -183,6 +202,7 @@ class Recorder:
         worn: Worn,
         totals: Totals,
         heat: HalfCycleHeat | None,
+        load: float = 1.0,
     ) -> None:
         """Record one half-cycle.
 
@@ -192,11 +212,12 @@ class Recorder:
             worn: Depths at its end.
             totals: Of all half-cycles up to its end.
             heat: Of all its phases.
+            load: Factor of all loads.
         """
         taken = self.system.remedies.take()
         if taken:
             self._remedies += taken
-        self._rows.append(_Row(half_cycle, phases, worn, totals, taken.total()))
+        self._rows.append(_Row(half_cycle, phases, worn, totals, taken.total(), load))
         if heat is not None:
             self._heat.append(heat)
 
@@ -225,7 +246,9 @@ class Recorder:
         directions = [system.motion.phases[middle.phase].direction for middle in middles]
         pressure = np.concatenate([middle.contact.pressure for middle in middles])
         adds = [reduce(Totals.__add__, [p.adds for p in row.phases]) for row in rows]
-        optima = np.array([self._optimum(d, p) for d, p in zip(directions, pressure, strict=True)])
+        loads = np.array([row.load for row in rows])
+        # Pressures that balance the loads grow with them.
+        optima = np.array([f * self._optimum(d, p) for d, p, f in zip(directions, pressure, loads, strict=True)])
         heat = None
         if self._heat:
             names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
@@ -247,6 +270,7 @@ class Recorder:
             np.array([row.retries for row in rows]),
             heat=heat,
             remedies=self._remedies,
+            load_factor=loads,
             end=end,
         )
         self._rows, self._heat, self._remedies = [], [], Counter()
@@ -269,7 +293,8 @@ class Recorder:
             force = (pressure * equilibrium.pair.weights).sum(axis=1)
             force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
             rows = equilibrium.equilibrium(records[0].friction_ratio)
-            balance = np.einsum("kn,mn->km", pressure, rows) + equilibrium.resultant
+            loads = np.array([self._rows[number].load for number in numbers])
+            balance = np.einsum("kn,mn->km", pressure, rows) + loads[:, None] * equilibrium.resultant
             error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
             np.maximum.at(errors, list(numbers), error)
         return errors

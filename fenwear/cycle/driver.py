@@ -19,6 +19,15 @@ BLOCK = 200  # half-cycles
 Watch = Callable[[], bool]
 
 
+# The factor of all loads after a number of half-cycles, which need not be whole.
+Loading = Callable[[float], float]
+
+
+def as_given(_half_cycles: float) -> float:
+    """Leave the loads as the case has them."""
+    return 1.0
+
+
 def unwatched() -> bool:
     """Watch nothing."""
     return False
@@ -32,6 +41,7 @@ class HalfCycle(NamedTuple):
     worn: Worn
     totals: Totals
     heat: HalfCycleHeat | None
+    load: float = 1.0
 
 
 class Step(Protocol):
@@ -86,7 +96,7 @@ def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> I
             raise type(error)(f"half-cycle {state.half_cycle + 1}: {error}") from error
         periodic = state.periodic_phases
         for one in recorded:
-            recorder.add(one.number, one.phases, one.worn, one.totals, one.heat)
+            recorder.add(one.number, one.phases, one.worn, one.totals, one.heat, one.load)
             repeats = course.periodic_within is not None and recorder.change() < course.periodic_within
             periodic = periodic + 1 if repeats else 0
         state = replace(after, periodic_phases=periodic)

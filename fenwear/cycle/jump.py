@@ -41,7 +41,7 @@ from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled
-from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Watch, drive, unwatched
+from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, as_given, drive, unwatched
 from fenwear.cycle.state import RunState, beginning, joined, parted
 from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import CaseError, ConvergenceError, InputError
@@ -66,6 +66,7 @@ def jump(
     stops: frozenset[int] = frozenset(),
     leave: Callable[[RunState], bool] = lambda _: False,
     watch: Watch = unwatched,
+    loading: Loading = as_given,
 ) -> Iterator[Block]:
     """Yield the last cycle of every jump, in blocks; collective.
 
@@ -76,6 +77,8 @@ def jump(
         periodic_within, block, leave, watch: As of `fenwear.cycle.driver.Course`; the change per cycle counts.
         start: Where to go on from, such as the end of a block; by default the beginning.
         stops: Half-cycles at which a jump and a block end in any case, or the cycle they are in.
+        loading: Factor of all loads, continuous: a stage takes that of its own time, so that the error estimate
+            sees how it changes.
 
     Raises:
         CaseError: `start` lies within a cycle.
@@ -86,7 +89,7 @@ def jump(
     if start is not None and start.half_cycle % strokes:
         message = f"jumps go on from a whole cycle only, got half-cycle {start.half_cycle}"
         raise CaseError(InputError("run.integration", message))
-    stepper = _Stepper(system, watch)
+    stepper = _Stepper(system, watch, loading)
     whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
     course = Course(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watch)
     yield from drive(system, _Jumps(stepper, tolerance), start or stepper.beginning(), course)
@@ -161,8 +164,8 @@ class _Stage:
 class _Stepper:
     """Implicit steps of any number of cycles."""
 
-    def __init__(self, system: Tribosystem, watch: Watch = unwatched) -> None:
-        self.system, self.watch = system, watch
+    def __init__(self, system: Tribosystem, watch: Watch = unwatched, loading: Loading = as_given) -> None:
+        self.system, self.watch, self.loading = system, watch, loading
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
@@ -186,7 +189,7 @@ class _Stepper:
             whole = known[2] if known and known[0] is state and known[1] == cycles else self.step(state, cycles)
             half = self.step(state, cycles / 2)
             self._half = (state, cycles / 2, half)
-            return (halves := self.step(half, cycles / 2)), _estimate(self.system, state, whole, halves)
+            return (halves := self.step(half, cycles / 2, cycles / 2)), _estimate(self.system, state, whole, halves)
         except ConvergenceError as error:
             if cycles > 1:
                 raise
@@ -199,20 +202,28 @@ class _Stepper:
 
     def steps(self, state: RunState, cycles: float, count: int) -> RunState:
         """Return the state `cycles` cycles later, by that many equal steps."""
-        for _ in range(count):
-            state = self.step(state, cycles / count)
+        for number in range(count):
+            state = self.step(state, cycles / count, number * cycles / count)
         return state
 
-    def step(self, state: RunState, cycles: float) -> RunState:
-        """Return the state `cycles` cycles later, by the two stages of one step."""
+    def step(self, state: RunState, cycles: float, since: float = 0.0) -> RunState:
+        """Return the state `cycles` cycles later, by the two stages of one step.
+
+        Args:
+            state: Where it begins; its number of half-cycles is that of the jump's begin.
+            cycles: Its length.
+            since: Cycles from there to the begin of the step.
+        """
         share = GAMMA * cycles
         rest = cycles - share
         heat, temperature = self.coupled.heat, None
         if heat is not None and state.temperature is not None:
             temperature = heat.exchange.own(state.temperature).values
+        self._press(state.half_cycle, since + share)
         first = self._stage(state.worn, temperature, joined(state.contacts), share)
         between = None if temperature is None else temperature + rest * first.heated
         worn, totals = state.worn + first.worn.times(rest), state.totals + first.adds.times(rest)
+        self._press(state.half_cycle, since + cycles)
         second = self._stage(worn, between, first.contact, share)
         end = None
         if heat is not None and between is not None:
@@ -220,6 +231,11 @@ class _Stepper:
             self._heated = second.heated
         worn, totals = worn + second.worn.times(share), totals + second.adds.times(share)
         return RunState(state.half_cycle, worn, parted(second.contact), end, totals)
+
+    def _press(self, half_cycle: int, cycles: float) -> None:
+        """Take the loads so many cycles after a half-cycle."""
+        if self.loading is not as_given and isinstance(self.contact, CondensedContact):
+            self.contact.press(self.loading(half_cycle + cycles * self.system.motion.half_cycles))
 
     def _stage(self, worn: Worn, temperature: Array | None, start: ContactState | None, cycles: float) -> _Stage:
         """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0."""
@@ -283,7 +299,8 @@ class _Stepper:
             number = after.half_cycle - (motion.half_cycles - 1 - stroke)
             own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
             heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
-            found.append(HalfCycle(number, records, depth, totals[stroke], heat))
+            load = self.loading(after.half_cycle)
+            found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
         return found
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState]) -> Worn:

@@ -47,7 +47,7 @@ class PhaseStep:
 
     def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
         self.system, self.phase, self.implicit = system, phase, implicit
-        self._constant = system.constant_coefficients
+        self._constant, self._load = system.constant_coefficients, 1.0
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
         self._contact = system.phase_contact((phase,))
@@ -58,18 +58,24 @@ class PhaseStep:
         self._wear = system.wear.phases([conditions], [phase])
         self._meter = PhaseMeter(system, phase, self._mu, self._wear)
 
-    def solve(self, temperature: HeatState | None, worn: Worn, before: ContactState | None) -> PhaseEnd:
+    def solve(
+        self, temperature: HeatState | None, worn: Worn, before: ContactState | None, load: float = 1.0
+    ) -> PhaseEnd:
         """Return the end of the phase.
 
         Args:
             temperature: At its start; None without heat, or for the initial one.
             worn: Depths at its start.
             before: The same phase one cycle ago.
+            load: Factor of all loads.
 
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
         """
         temperature = temperature or self._initial
+        if load != self._load and isinstance(self._contact, CondensedContact):
+            self._contact.press(load)
+            self._load = load
         if self._thermal is not None and temperature is not None:
             temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn)

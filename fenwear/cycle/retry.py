@@ -34,34 +34,35 @@ class SmallerSteps:
         self.system, self.implicit = system, implicit
         self._steps: dict[int, list[PhaseStep]] = {}
 
-    def half_cycle(self, state: RunState, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
+    def half_cycle(self, state: RunState, phases: range, error: ConvergenceError, load: float = 1.0) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle.
 
         Args:
             state: At its start.
             phases: Their numbers in the cycle.
             error: Why it is not solved as a whole.
+            load: Factor of all loads.
 
         Raises:
             ConvergenceError: it does not converge in the smallest parts either; `error` as it was.
         """
         for parts in PARTS:
             try:
-                ends = self._in_parts(state, phases, parts)
+                ends = self._in_parts(state, phases, parts, load)
             except ConvergenceError:
                 continue
             self.system.remedies.note(SMALLER_STEPS.format(parts * len(phases)))
             return ends
         raise error
 
-    def _in_parts(self, state: RunState, phases: range, parts: int) -> list[PhaseEnd]:
+    def _in_parts(self, state: RunState, phases: range, parts: int, load: float) -> list[PhaseEnd]:
         steps = self._prepared(parts)
         temperature, worn, ends = state.temperature, state.worn, []
         for phase in phases:
             before = state.contacts[phase]
             contact, own = before, []
             for step in steps[phase * parts : (phase + 1) * parts]:
-                end = step.solve(temperature, worn, contact)
+                end = step.solve(temperature, worn, contact, load)
                 contact, temperature, worn = end.record.contact, end.temperature, worn + end.worn
                 own.append(end)
             ends.append(_joined(own, phase, before, temperature))

@@ -22,6 +22,7 @@ from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
 SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
+            "program": "Test program: what acted",
             "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
             "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
@@ -32,6 +33,7 @@ ALT = {
     "a line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
     "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "

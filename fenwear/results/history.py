@@ -83,9 +83,20 @@ STRIP_VARIABLES = {
 }
 
 
+# the same with a program: what acted
+PROGRAM_VARIABLES = {
+    "load": (("half_cycle",), "N", "normal force on the contact, the mean of the cycle"),
+    "load_factor": (("half_cycle",), "1", "all loads over those of the case"),
+    "speed": (("half_cycle",), "mm s-1", "mean sliding speed; of a turning strip in rad s-1"),
+}
+AMBIENT = {"ambient": (("half_cycle",), "K", "temperature of the surroundings")}
+
+
 def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
     case = system.case
     variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
+    if case.program is not None:
+        variables = {**variables, **PROGRAM_VARIABLES, **({} if case.heat is None else AMBIENT)}
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms}
@@ -121,7 +132,7 @@ def _values(block: Block, name: str) -> NDArray[Any]:
         pair = block.system.pair
         weights = pair.weights if name == "weight" else pair.strip.weights
         return np.broadcast_to(weights, (len(block), len(weights)))
-    if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
+    if name in (*VARIABLES, *STRIP_VARIABLES, *PROGRAM_VARIABLES, *AMBIENT) or block.heat is None:
         return getattr(block, name)
     if name == "heat_balance_error":
         return block.heat.balance_error

@@ -139,11 +139,11 @@ def test_retried_half_cycles(tmp_path: Path, name: str, monkeypatch: pytest.Monk
     usual, _ = run(tmp_path / "usual", name, *how)
     solve, failed = PhaseStep.solve, []
 
-    def fail_once(self: PhaseStep, temperature: Any, worn: Any, before: Any) -> PhaseEnd:
+    def fail_once(self: PhaseStep, temperature: Any, worn: Any, before: Any, *acting: Any) -> PhaseEnd:
         if before is not None and not failed:
             failed.append(self.phase)
             raise ConvergenceError("on purpose")
-        return solve(self, temperature, worn, before)
+        return solve(self, temperature, worn, before, *acting)
 
     monkeypatch.setattr(PhaseStep, "solve", fail_once)
     data, summary = run(tmp_path / "retried", name, *how)

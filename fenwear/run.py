@@ -19,6 +19,7 @@ from fenwear.case import Case, doubts
 from fenwear.cycle import Block, Span, follow_program, jump, march, stability_number, stationary_growth
 from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
 from fenwear.report.page import try_report
@@ -163,7 +164,7 @@ class _Run:
         self.writer: HistoryWriter | None = None  # of rank 0
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
-        self.state = start or RunState(0, system.unworn(), (), None)
+        self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []

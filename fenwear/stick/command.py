@@ -31,7 +31,8 @@ def check_text(case: Case) -> str:
     if stuck == closed:
         regime = "full stick"
     return (
-        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; first cycle: {regime}, "
+        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
+        f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
     )
@@ -45,7 +46,9 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
         ConvergenceError: nothing sticks.
     """
     if case.model.kind != "plane":
-        raise CaseError(InputError("model.kind", "`steady` of contact with stick is for plane models; Python takes solids"))
+        raise CaseError(
+            InputError("model.kind", "`steady` of contact with stick is for plane models; Python takes solids")
+        )
     rig = make_rig(case)
     check_touching(rig)
     found = final_shape(rig, stick_zone(rig))
@@ -74,6 +77,6 @@ def final_text(numbers: dict[str, Any]) -> str:
         f"  the stick zone, {numbers['stick_width_mm']:.4g} mm wide, carries all of the load in the end\n"
         f"  {scar}, {1e3 * numbers['largest_depth_mm']:.4g} µm deep in both bodies together, "
         f"{numbers['worn_area_mm2']:.4g} mm²\n"
-        f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone as high as the nodes "
+        f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone: as high as nodes "
         "are near to them"
     )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh, build_meshes
+from fenwear.bodies.regions import contact_regions
 from fenwear.bodies.shape import follow_wear
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
@@ -27,6 +30,7 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
+        regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
     """
 
     punch: ElasticBody
@@ -34,6 +38,7 @@ class Bodies:
     heat: tuple[HeatBody, HeatBody] | None = None
     followed: Worn | None = None
     moved: Worn | None = None
+    regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
 
     @property
     def comm(self) -> MPI.Comm:
@@ -70,7 +75,8 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
-    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
+    regions = contact_regions(punch), contact_regions(strip)
+    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved, regions)
 
 
 def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
+from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh, build_meshes
@@ -30,7 +31,11 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
+    <<<<<<< HEAD
         regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
+    =======
+        densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
+    >>>>>>> main
     """
 
     punch: ElasticBody
@@ -39,6 +44,7 @@ class Bodies:
     followed: Worn | None = None
     moved: Worn | None = None
     regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
+    densities: tuple[Array | None, Array | None] = (None, None)
 
     @property
     def comm(self) -> MPI.Comm:
@@ -76,7 +82,12 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
     regions = contact_regions(punch), contact_regions(strip)
-    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved, regions)
+    of_punch, of_strip = (
+        contact_density(shares, {region: case.materials[name].density for region, name in description.regions.items()})
+        for shares, description in zip(regions, (case.punch, case.strip), strict=True)
+    )
+    heat = build_conduction(case, punch, strip)
+    return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip))
 
 
 def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -42,6 +42,13 @@ class ContactConditions:
     depths: tuple[Array, Array]
     slid: Array
     regions: tuple[Mapping[str, Array], Mapping[str, Array]]
+
+    @classmethod
+    def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
+        """Return conditions of which no more is known: at the origin, unworn, before any sliding."""
+        none, places = np.zeros_like(pressure), np.zeros((len(pressure), 3))
+        surfaces = (none, none) if temperatures is None else temperatures
+        return cls(pressure, speed, surfaces, (places, places), (none, none), none, ({}, {}))
 
     @property
     def shape(self) -> tuple[int, ...]:

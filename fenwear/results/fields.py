@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import basix
 import basix.ufl
 import dolfinx
 import numpy as np
 import ufl
-import xarray
 from dolfinx import fem
 from numpy.typing import NDArray
 
@@ -32,6 +31,9 @@ from fenwear.parallel import on_root
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.results.subcells import linear_cells
 from fenwear.sliding.wear import Worn
+
+if TYPE_CHECKING:
+    import xarray
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
@@ -229,6 +231,8 @@ def write_fields(
     time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
     data.update(_contact_surfaces(system, worn))
+    import xarray  # with pandas, half a second that runs without fields spare themselves
+
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
 
 

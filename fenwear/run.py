@@ -19,6 +19,7 @@ from fenwear.case import Case, doubts
 from fenwear.cycle import Block, Span, follow_program, jump, march, stability_number, stationary_growth
 from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
 from fenwear.results import checkpoint
@@ -33,6 +34,7 @@ from fenwear.results.history import (
     write_summary,
 )
 from fenwear.signals import Signals
+from fenwear.stick.run import run_stick
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -76,6 +78,12 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
+    if case.contact.law == "coulomb":
+        if resume:
+            raise CaseError(
+                InputError("--resume", "runs with contact.law = 'coulomb' start anew: they keep no checkpoint")
+            )
+        return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case))
     if not resume:
@@ -155,7 +163,7 @@ class _Run:
         self.writer: HistoryWriter | None = None  # of rank 0
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
-        self.state = start or RunState(0, system.unworn(), (), None)
+        self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []

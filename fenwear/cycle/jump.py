@@ -42,6 +42,7 @@ from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled
 from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, as_given, drive, unwatched
 from fenwear.cycle.state import RunState, beginning, joined, parted
+from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.remedies import SHORTER_JUMPS, SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
@@ -144,17 +145,19 @@ class _Jumps:
             length = max(1, int(tried * min(MOST, max(LEAST, factor))))
             if factor > 1 and tried < 4:
                 length = max(length, tried + 1)
-        after = RunState(state.half_cycle + tried * strokes, end.worn, end.contacts, end.temperature, length)
+        number = state.half_cycle + tried * strokes
+        after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
         return after, stepper.last_cycle(state, after, tried)
 
 
 @dataclass(frozen=True)
 class _Stage:
-    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,) and depths."""
+    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals."""
 
     contact: ContactState
     heated: Array
     worn: Worn
+    adds: Totals
 
 
 class _Stepper:
@@ -165,6 +168,7 @@ class _Stepper:
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
+        self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
         self.coupled = Coupled(system, self.take)
         self._heated: Array = np.zeros(0)  # by the last cycle
         self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
@@ -217,14 +221,15 @@ class _Stepper:
         self._press(state.half_cycle, since + share)
         first = self._stage(state.worn, temperature, joined(state.contacts), share)
         between = None if temperature is None else temperature + rest * first.heated
-        worn = state.worn + first.worn.times(rest)
+        worn, totals = state.worn + first.worn.times(rest), state.totals + first.adds.times(rest)
         self._press(state.half_cycle, since + cycles)
         second = self._stage(worn, between, first.contact, share)
         end = None
         if heat is not None and between is not None:
             end = heat.exchange.at(between + share * second.heated)
             self._heated = second.heated
-        return RunState(state.half_cycle, worn + second.worn.times(share), parted(second.contact), end)
+        worn, totals = worn + second.worn.times(share), totals + second.adds.times(share)
+        return RunState(state.half_cycle, worn, parted(second.contact), end, totals)
 
     def _press(self, half_cycle: int, cycles: float) -> None:
         """Take the loads so many cycles after a half-cycle."""
@@ -247,7 +252,8 @@ class _Stepper:
         heated: Array = np.zeros(0)
         if begin is not None:
             heated = self.coupled.through(begin, contact.pressure)[-1] - begin
-        return _Stage(contact, heated, self.wear.worn(contact.pressure))
+        adds = reduce(Totals.__add__, self._adds(contact.pressure))
+        return _Stage(contact, heated, self.wear.worn(contact.pressure), adds)
 
     def _solve(
         self, gap: Array, start: ContactState | None, cycles: float, coupling: Array | None = None
@@ -259,11 +265,19 @@ class _Stepper:
         """Take friction and wear at the conditions of the phases."""
         system = self.system
         self.wear = system.wear.phases(conditions)
+        self._measure([system.friction.values(state) for state in conditions])
         if system.friction.constant:
             return
         self.ratios = system.friction_ratios(conditions)
         if isinstance(self.contact, CondensedContact):
             self.contact.slide(self.ratios)
+
+    def _measure(self, friction: Sequence[Array]) -> None:
+        self.meters = [PhaseMeter(self.system, k, mu, self.wear.some([k])) for k, mu in enumerate(friction)]
+
+    def _adds(self, pressure: Array) -> list[Totals]:
+        """Return what each phase of a cycle adds at its pressure (m, n)."""
+        return [meter(pressure[k, :]) for k, meter in enumerate(self.meters)]
 
     def last_cycle(self, before: RunState, after: RunState, cycles: int) -> list[HalfCycle]:
         """Return the half-cycles of the last cycle of a jump."""
@@ -271,30 +285,34 @@ class _Stepper:
         contacts = [_present(contact) for contact in after.contacts]
         heats = self._last_cycle_heat(after)
         # Half-cycles after one have worn what is missing at its end.
-        depths = [after.worn]
+        depths, totals = [after.worn], [after.totals]
+        adds = self._adds(np.concatenate([contact.pressure for contact in contacts]))
         phases = list(range(len(contacts)))
         for stroke in reversed(range(1, motion.half_cycles)):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
             depths.insert(0, depths[0] - self._worn(own, contacts))
+            totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
         for stroke, depth in enumerate(depths):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
-            records = [self._phase_record(k, contacts[k], before.contacts[k], cycles) for k in own]
+            records = [self._phase_record(k, contacts[k], before.contacts[k], cycles, adds[k]) for k in own]
             number = after.half_cycle - (motion.half_cycles - 1 - stroke)
             own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
             heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
-            found.append(HalfCycle(number, records, depth, heat, self.loading(after.half_cycle)))
+            load = self.loading(after.half_cycle)
+            found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
         return found
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState]) -> Worn:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
         return self.wear.some(phases).worn(pressures)
 
-    def _phase_record(self, phase: int, contact: ContactState, old: ContactState | None, cycles: int) -> PhaseRecord:
+    def _phase_record(
+        self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals
+    ) -> PhaseRecord:
         previous = None
         if old is not None:
             previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
-        areas = self.wear.some([phase]).worn_area(contact.pressure)
-        return PhaseRecord(phase, contact, previous, areas, self.ratios[phase])
+        return PhaseRecord(phase, contact, previous, adds, self.ratios[phase])
 
     def _last_cycle_heat(self, state: RunState) -> list[HalfCycleHeat | None]:
         """Return the heat of the cycle that ends with the state."""

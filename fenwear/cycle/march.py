@@ -69,14 +69,14 @@ class _HalfCycles:
             ends = self._whole(state, phases, load)
         except ConvergenceError as error:
             ends = self.smaller.half_cycle(state, phases, error, load)
-        worn, contacts = state.worn, list(state.contacts)
+        worn, totals, contacts = state.worn, state.totals, list(state.contacts)
         for phase, end in zip(phases, ends, strict=True):
-            worn, contacts[phase] = worn + end.worn, end.record.contact
+            worn, totals, contacts[phase] = worn + end.worn, totals + end.record.adds, end.record.contact
         heats = [end.heat for end in ends if end.heat is not None]
         heat = reduce(HalfCycleHeat.then, heats) if heats else None
         number = state.half_cycle + 1
-        after = RunState(number, worn, tuple(contacts), ends[-1].temperature)
-        return after, [HalfCycle(number, [end.record for end in ends], worn, heat, load)]
+        after = RunState(number, worn, tuple(contacts), ends[-1].temperature, totals)
+        return after, [HalfCycle(number, [end.record for end in ends], worn, totals, heat, load)]
 
     def _whole(self, state: RunState, phases: range, load: float) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""

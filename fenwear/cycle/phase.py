@@ -13,6 +13,7 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
+from fenwear.cycle.totals import PhaseMeter
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
@@ -52,8 +53,10 @@ class PhaseStep:
         self._contact = system.phase_contact((phase,))
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
         conditions = system.conditions(phase)
-        self._friction_ratio = system.phase_friction(phase, system.friction.values(conditions))
+        self._mu = system.friction.values(conditions)
+        self._friction_ratio = system.phase_friction(phase, self._mu)
         self._wear = system.wear.phases([conditions], [phase])
+        self._meter = PhaseMeter(system, phase, self._mu, self._wear)
 
     def solve(
         self, temperature: HeatState | None, worn: Worn, before: ContactState | None, load: float = 1.0
@@ -108,7 +111,7 @@ class PhaseStep:
             surfaces = self._thermal.exchange.contact_temperatures(temperature)
         conditions = system.conditions(self.phase, pressure, surfaces)
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
-            mu = system.friction.values(conditions)
+            mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = system.phase_friction(self.phase, mu)
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
@@ -132,6 +135,6 @@ class PhaseStep:
         wear: PhasesWear,
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
-        areas = wear.worn_area(contact.pressure)
-        record = PhaseRecord(self.phase, contact, previous, areas, self._friction_ratio)
+        meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, wear)
+        record = PhaseRecord(self.phase, contact, previous, meter(contact.pressure[0]), self._friction_ratio)
         return PhaseEnd(record, temperature, heat, wear.worn(contact.pressure))

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from functools import reduce
 
-import numpy as np
-
 from fenwear.assembly import Tribosystem, in_parts
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.state import RunState
+from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.remedies import SMALLER_STEPS
@@ -80,11 +79,11 @@ class SmallerSteps:
 def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: HeatState | None) -> PhaseEnd:
     """Return the parts of a phase as one: the contact in its middle, and all that it wears and heats."""
     middle = ends[len(ends) // 2].record
-    punch, strip = np.sum([end.record.areas for end in ends], axis=0).tolist()
+    adds = reduce(Totals.__add__, [end.record.adds for end in ends])
     previous = None if before is None else before.pressure[0]
     heats = [end.heat for end in ends if end.heat is not None]
     return PhaseEnd(
-        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.friction_ratio),
+        PhaseRecord(phase, middle.contact, previous, adds, middle.friction_ratio),
         temperature,
         reduce(HalfCycleHeat.then, heats) if heats else None,
         reduce(Worn.__add__, [end.worn for end in ends]),

@@ -20,8 +20,9 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
+from fenwear.results import sheet
 from fenwear.results.disk import check_room, claim, write_text, writing
-from fenwear.results.scar import conforming, scar_summary, scars
+from fenwear.results.scar import conforming
 from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, surface_columns
 from fenwear.versions import versions
 
@@ -99,9 +100,10 @@ def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms}
+    variables = {**variables, **sheet.variables(system)}
     if case.model.kind == "plane":
         return variables
-    return on_surfaces(variables, solid=case.model.kind == "solid", track=system.sliding.track is not None)
+    return on_surfaces(variables)
 
 
 def _columns(system: Tribosystem) -> dict[str, Column]:
@@ -119,8 +121,8 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
 
 def _rows(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    of_scars = {} if block.system.case.model.kind == "plane" else scars(block)
-    return {name: of_scars[name] if name in of_scars else _values(block, name) for name in names}
+    own = sheet.values(block)
+    return {name: own[name] if name in own else _values(block, name) for name in names}
 
 
 def _values(block: Block, name: str) -> NDArray[Any]:
@@ -369,6 +371,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "title": system.case.title,
         "half_cycles": int(last.half_cycle[-1]),
         **run,
+        **sheet.sheet(last),
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
         **({} if last.heat is None else _heat_summary(system, last)),
         "periodicity": float(last.periodicity[-1]),
@@ -392,7 +395,6 @@ def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
         "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
-        **_strip_summary(system, last),
         **{
             {1: "rightward", -1: "leftward"}[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
@@ -419,7 +421,6 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     )
     return {
         **mean,
-        **scar_summary(last),
         **{
             {1: "forward", -1: "backward"}[int(d)]: {
                 "half_cycle": int(number),
@@ -429,18 +430,6 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
             }
             for d, number, pressure, area in rows
         },
-    }
-
-
-def _strip_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
-    """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
-    if not system.strip_wears:
-        return {}
-    depth, nodes = last.wear_strip[-1], system.pair.strip
-    return {
-        "wear_strip_max_mm": float(depth.max()),
-        "worn_area_strip_mm2": float(nodes.weights @ depth),
-        "worn_area_punch_mm2": float(system.pair.weights @ last.wear[-1]),
     }
 
 

@@ -35,6 +35,7 @@ from fenwear.results.history import (
     write_summary,
 )
 from fenwear.signals import Signals
+from fenwear.stick.run import run_stick
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -78,6 +79,12 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
+    if case.contact.law == "coulomb":
+        if resume:
+            raise CaseError(
+                InputError("--resume", "runs with contact.law = 'coulomb' start anew: they keep no checkpoint")
+            )
+        return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case))
     if not resume:

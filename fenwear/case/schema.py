@@ -298,8 +298,13 @@ def _constant_or_dependence(constant: Any) -> Any:
 
 
 class Contact(_Part):
-    """Unilateral contact with Coulomb friction in gross sliding."""
+    """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
 
+    law: Literal["gross-sliding", "coulomb"] = Field(
+        default="gross-sliding",
+        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
+        "as in fretting",
+    )
     friction: _constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
         default=0.0, description="mu"
     )
@@ -314,6 +319,43 @@ class Contact(_Part):
     def _pure_number(self) -> Self:
         if isinstance(self.friction, Dependence) and self.friction.unit:
             raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
+        return self
+
+
+class Stick(_Part):
+    """How the rig drives a contact with stick, and its time steps; with contact.law = "coulomb"."""
+
+    force: Annotated[Force, Field(gt=0)] | None = Field(
+        default=None,
+        description="largest tangential force on the strip, which then follows the course of the motion in place of "
+        "its displacement",
+    )
+    bulk_stress: Stress = Field(
+        default=0.0, description="largest bulk stress along x in the strip, as in fretting fatigue, with the motion"
+    )
+    bulk_over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None,
+        description="[fraction of the cycle, factor] pairs from 0 to 1 of the bulk stress; by default it follows the "
+        "motion",
+    )
+    steps: Annotated[int, Field(ge=2, le=1000, strict=True)] = Field(
+        default=20, description="time steps of a half-cycle, at least"
+    )
+    step_tolerance: Annotated[Number, Field(gt=0)] = Field(
+        default=0.02,
+        description="change of force and friction's work of the first cycle by which the steps are fine enough; they "
+        "are doubled until then",
+    )
+    load_steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(
+        default=5, description="in which the loads rise at the start"
+    )
+
+    @model_validator(mode="after")
+    def _bulk_table(self) -> Self:
+        if self.bulk_over_cycle is not None:
+            fractions = [fraction for fraction, _ in self.bulk_over_cycle]
+            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
+                raise ValueError("bulk_over_cycle: expected pairs [fraction, factor] with fractions rising from 0 to 1")
         return self
 
 
@@ -751,6 +793,7 @@ class Case(_Part):
     punch: Body = Field(description="the body above, body 1")
     strip: Body = Field(description="the body below, which slides, body 2")
     contact: Contact = Field(default=Contact(), description="between the two")
+    stick: Stick = Field(default=Stick(), description="of contact with stick: what the rig imposes, time steps")
     wear: Wear = Field(description="of punch, strip or both")
     motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
     heat: Heat | None = Field(default=None, description="without this table there is no temperature")
@@ -780,7 +823,8 @@ class Case(_Part):
             problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
-        problems += [*self._kind_problems(), *self._sliding_problems(), *self._program_problems()]
+        problems += [*self._kind_problems(), *self._sliding_problems()]
+        problems += [*self._program_problems(), *self._stick_problems()]
         problems += [
             f"{body}.regions: missing, but required"
             for body, part in (("punch", self.punch), ("strip", self.strip))
@@ -837,7 +881,7 @@ class Case(_Part):
         least = 1 if one_way else 2
         if self.run.integration == "jump" and self.run.half_cycles < least:
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
-        if self.wear.strip is not None and self.passes:
+        if self.wear.strip is not None and self.passes and self.contact.law == "gross-sliding":
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
@@ -890,6 +934,23 @@ class Case(_Part):
         if not isinstance(motion, OneWay | Rotation) and motion.positions == 1:
             return ["motion.positions: expected 2 or more, since the strip's wear spreads over the stroke"]
         return []
+
+    def _stick_problems(self) -> list[str]:
+        """Return what does not go with contact with stick."""
+        if self.contact.law == "gross-sliding":
+            return [] if self.stick == Stick() else ["stick: expected with contact.law = 'coulomb' only"]
+        wrong = {
+            "contact.friction: expected a constant": isinstance(self.contact.friction, Dependence),
+            "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
+            "contact.solver: expected 'condensed'": self.contact.solver == "full",
+            "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
+            "heat: expected none": self.heat is not None,
+            "program: expected none": self.program is not None,
+            "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
+            "motion.axis: expected 'x'": not self.passes,
+            "run.integration: expected 'explicit' or 'jump'": self.run.integration == "implicit",
+        }
+        return [f"{problem} with contact.law = 'coulomb'" for problem, so in wrong.items() if so]
 
     @property
     def varies(self) -> bool:

@@ -16,6 +16,7 @@ from fenwear.report.figures import FOLDER, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
+from fenwear.report.stick import write_stick_report
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.sheet import BODIES, LINES, shown
@@ -64,6 +65,8 @@ def write_report(
 
 def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
     case = read_case(directory)
+    if case.get("contact", {}).get("law") == "coulomb":
+        return write_stick_report(directory)
     if case.get("model", {}).get("kind", "plane") != "plane":
         raise CaseError(InputError("model.kind", "figures are drawn of plane models so far"))
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))

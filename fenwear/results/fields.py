@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
+from fenwear.bodies.assembly import times
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.compat import interpolation_points
 from fenwear.heat.conduction import HeatBody
@@ -112,18 +113,18 @@ def _solve(
 ) -> BodyFields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
     force, dim = elastic.load.copy(), elastic.dim
-    force.array[:] += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
-    force.array[elastic.supported] = 0.0
+    force += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
+    force[elastic.supported] = 0.0
     theta = change = None
     if heat is not None and temperature is not None:
         theta = heat.function(temperature)
         change = heat.function(temperature - heat.heat.initial)
-        elastic.thermal_coupling(heat.space).multAdd(change.x.petsc_vec, force, force)
-    solution = force.duplicate()
-    elastic.factor.solve(force, solution)
+        coupling = elastic.thermal_coupling(heat.space)
+        force += times(coupling, change.x.array[: heat.owned])
+        coupling.destroy()
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
-    displacement.x.array[:owned] = solution.array_r
+    displacement.x.array[:owned] = elastic.factor.solve(force)
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
@@ -225,7 +226,7 @@ def write_fields(
         functions = [f for f in given if f is not None]
         _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
         data.update(_gathered(name, elastic, functions))
-    time = float(system.motion.time(np.array(half_cycle)))
+    time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
     data.update(_contact_surfaces(system, worn))
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))

@@ -13,7 +13,7 @@ PIN = 1.0  # mm, its radius; its axis stands 1.25 of it from the disc's
 
 
 def pin(around: int) -> Tribosystem:
-    """Return a rigid pin, which cannot tilt, on a turning disc of steel, 4 `around` elements on its edge; collective."""
+    """Return a rigid pin, which cannot tilt, on a turning disc of steel, with 4 `around` elements on its edge."""
     sizes = {
         "pin_radius": PIN,
         "pin_height": 2,

@@ -75,6 +75,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.results.sheet import sheet_text
     from fenwear.run import Progress, run_case
 
     loaded = _load(case, settings)
@@ -88,6 +89,8 @@ def run(
     if as_json:
         _print_json(summary)
     else:
+        if not quiet:
+            print(sheet_text(summary))
         say(f"results in {directory}")
 
 

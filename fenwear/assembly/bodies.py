@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.arrays import Array
+from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh, build_meshes
@@ -27,6 +29,7 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
+        densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
     """
 
     punch: ElasticBody
@@ -34,6 +37,7 @@ class Bodies:
     heat: tuple[HeatBody, HeatBody] | None = None
     followed: Worn | None = None
     moved: Worn | None = None
+    densities: tuple[Array | None, Array | None] = (None, None)
 
     @property
     def comm(self) -> MPI.Comm:
@@ -70,7 +74,11 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
-    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
+    of_punch, of_strip = (
+        contact_density(body, {region: case.materials[name].density for region, name in description.regions.items()})
+        for body, description in ((punch, case.punch), (strip, case.strip))
+    )
+    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved, (of_punch, of_strip))
 
 
 def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:

@@ -131,7 +131,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     degree, dim = space.ufl_element().degree, mesh.geometry.dim
     cell = basix.cell.subentity_types(space.element.basix_element.cell_type)[fdim][0].name
     points = space.tabulate_dof_coordinates()[:, :dim]
-    local, cells = _facet_dofs(body, space)
+    local, cells = facet_dofs(body, space)
     local = np.take_along_axis(local, _in_reference_order(local, points, cell, degree), axis=1)
     own = space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64).reshape(local.shape)
     inner = points[space.dofmap.list[cells]].mean(axis=1)
@@ -174,7 +174,7 @@ def trace_of(surface: Trace, vector: fem.FunctionSpace, space: fem.FunctionSpace
     return Trace(surface.surface, space, blocks)
 
 
-def _facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return the local blocks of this rank's own contact facets (f, k), corners first, and their cells (f,)."""
     topology, fdim = body.mesh.topology, body.mesh.topology.dim - 1
     topology.create_connectivity(fdim, fdim + 1)

@@ -16,11 +16,14 @@ from fenwear.report.figures import FOLDER, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
+from fenwear.report.stick import write_stick_report
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
 SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
+            "program": "Test program: what acted",
             "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
             "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
@@ -31,6 +34,7 @@ ALT = {
     "a line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
     "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
@@ -61,6 +65,8 @@ def write_report(
 
 def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
     case = read_case(directory)
+    if case.get("contact", {}).get("law") == "coulomb":
+        return write_stick_report(directory)
     if case.get("model", {}).get("kind", "plane") != "plane":
         raise CaseError(InputError("model.kind", "figures are drawn of plane models so far"))
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
@@ -161,6 +167,17 @@ def _table(caption: str, values: dict[str, int | float], *, cut: int = 0) -> Tab
     return Table(caption, [_number(path, value, cut=cut) for path, value in values.items()])
 
 
+def _sheet_table(name: str, sheet: dict[str, int | float]) -> Table:
+    """Return what a tribometer measures of the sliding or of a body, in the units in which it is read."""
+    numbers = []
+    for path, value in sheet.items():
+        of, _, key = path.partition(".")
+        if of == name:
+            line = LINES[key]
+            numbers.append(Number(path, line.label, value, number_text(shown(value, line)), line.unit))
+    return Table(name.capitalize() if name in BODIES else "What a tribometer measures", numbers)
+
+
 def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
     """Return every number of a summary by its path."""
     values = flat({key: value for key, value in summary.items() if key not in ("versions", "warnings", "retries")})
@@ -174,7 +191,9 @@ def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
         return [_table("At the last recorded half-cycle", {n + units.get(n, ""): v for n, v in last.items()})]
     numbers = numbers_of(summary)
     single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}
-    tables = [_table("The run", single)]
+    sheet = {p: v for p, v in numbers.items() if p.partition(".")[0] in ("sliding", *BODIES) and "[" not in p}
+    tables = [_sheet_table(name, sheet) for name in ("sliding", *BODIES) if name in summary]
+    tables.append(_table("The run", single))
     for d in ("rightward", "leftward"):
         if d in summary:
             inside = {p: v for p, v in numbers.items() if p.startswith(f"{d}.") and "[" not in p}

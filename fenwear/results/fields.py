@@ -226,7 +226,7 @@ def write_fields(
         functions = [f for f in given if f is not None]
         _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
         data.update(_gathered(name, elastic, functions))
-    time = float(system.motion.time(np.array(half_cycle)))
+    time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
     data.update(_contact_surfaces(system, worn))
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))

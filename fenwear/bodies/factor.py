@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import scipy.linalg
@@ -114,7 +114,7 @@ class Factor:
             return right
         columns = right.shape[1]
         whole: Array = np.empty((self._sizes[1] if self.is_here else 0, columns))
-        counts = [int(rows) * columns for rows in np.diff(self._rows)]
+        counts: Any = np.diff(self._rows) * columns
         self.comm.Gatherv(np.ascontiguousarray(right), (whole, counts), root=self.owner)
         return whole
 
@@ -123,7 +123,7 @@ class Factor:
         if self.is_spread or self.comm.size == 1:
             return found
         own: Array = np.empty((self._sizes[0], columns))
-        counts = [int(rows) * columns for rows in np.diff(self._rows)]
+        counts: Any = np.diff(self._rows) * columns
         self.comm.Scatterv((np.ascontiguousarray(found), counts), own, root=self.owner)
         return own
 

@@ -306,7 +306,8 @@ class _Run:
         phase = stroke * motion.positions + motion.positions // 2
         pressed = at_loads(self.system, float(block.load_factor[-1]))
         fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures)
-        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]), block.end.worn)
+        direction, worn = int(block.direction[-1]), block.end.worn
+        write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""

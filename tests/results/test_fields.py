@@ -27,7 +27,7 @@ def write(system: Tribosystem, folder: Path, half_cycles: int) -> xarray.Dataset
     direction = int(block.direction[-1])
     phase = (half_cycles - 1) % system.motion.half_cycles
     fields = body_fields(system, block.pressure[-1], block.rigid[-1], phase, temperatures)
-    write_fields(folder, system, half_cycles, fields, direction, block.end.worn)
+    write_fields(folder, system, half_cycles, fields, direction, block.end.worn, block.pressure[-1])
     with xarray.open_dataset(folder / "fields" / f"half_cycle_{half_cycles:06d}.nc", engine="h5netcdf") as opened:
         return opened.load()
 

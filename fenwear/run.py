@@ -22,7 +22,6 @@ from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
-from fenwear.report.page import try_report
 from fenwear.results import checkpoint
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -306,7 +305,8 @@ class _Run:
         phase = stroke * motion.positions + motion.positions // 2
         pressed = at_loads(self.system, float(block.load_factor[-1]))
         fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures)
-        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]), block.end.worn)
+        direction, worn = int(block.direction[-1]), block.end.worn
+        write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
@@ -345,6 +345,8 @@ class _Run:
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
+            from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
+
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 

@@ -12,7 +12,16 @@ from typing import Any
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 
-UNITS = {"_per_s": "1/s", "_MPa": "MPa", "_mm2": "mm²", "_mm": "mm", "_K": "K", "_mJ": "mJ", "_seconds": "s"}
+UNITS = {
+    "_per_s": "1/s",
+    "_MPa": "MPa",
+    "_mm2": "mm²",
+    "_mm3": "mm³",
+    "_mm": "mm",
+    "_K": "K",
+    "_mJ": "mJ",
+    "_seconds": "s",
+}
 LABELS = {
     "half_cycles": "half-cycles done",
     "half_cycle": "half-cycle",
@@ -27,6 +36,17 @@ LABELS = {
     "worn_area_strip_mm2": "cross-section worn off the strip",
     "worn_area_punch_mm2": "cross-section worn off the punch",
     "pressure_MPa": "contact pressure",
+    "mean_pressure_MPa": "mean pressure",
+    "contact_area_mm2": "area in contact",
+    "wear_punch_max_mm": "largest worn depth of the punch",
+    "deepest_punch_mm": "where the punch is worn deepest",
+    "deepest_strip_mm": "where the strip is worn deepest",
+    "worn_volume_punch_mm3": "volume worn off the punch",
+    "worn_volume_strip_mm3": "volume worn off the strip",
+    "scar_length_punch_mm": "length of the punch's scar, along the sliding",
+    "scar_length_strip_mm": "length of the strip's scar, along the sliding",
+    "scar_width_punch_mm": "width of the punch's scar",
+    "scar_width_strip_mm": "width of the strip's scar",
     "temperature_punch_K": "temperature of the punch",
     "temperature_strip_K": "temperature of the strip",
     "heat_mJ": "heat of the last half-cycle",

@@ -18,7 +18,7 @@ from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface import ContactPair
-from fenwear.results.surfaces import surface_cells
+from fenwear.results.surfaces import coordinate_names, surface_cells
 from fenwear.sliding.chart import sliding_chart
 
 EDGE = 0.01  # of the largest depth: where a scar ends
@@ -118,10 +118,17 @@ def scar_summary(block: Block) -> dict[str, Any]:
         worn.append(("strip", "_strip", pair.strip, pair.strip.weights, block.wear_strip[-1]))
     for name, end, surface, weights, depth in worn:
         found[f"wear_{name}_max_mm"] = last[f"max_wear{end}"]
-        found[f"deepest_{name}_mm"] = surface.x[int(depth.argmax())].tolist()
+        found[f"deepest_{name}_mm"] = _place(surface, int(depth.argmax()))
         if name == "punch" or system.sliding.track is None:  # of a closed track a part alone is meshed
             found[f"worn_volume_{name}_mm3"] = float(weights @ depth)
         for extent in ("length", "width"):
             if f"scar_{extent}{end}" in last:
                 found[f"scar_{extent}_{name}_mm"] = last[f"scar_{extent}{end}"]
     return found
+
+
+def _place(surface: ContactSurface, node: int) -> dict[str, float]:
+    """Return the coordinates of a node, mm, without the rounding of the mesh."""
+    grain = 1e-9 * surface.extent()
+    x = np.round(surface.x[node] / grain) * grain + 0.0
+    return dict(zip(coordinate_names("", surface.dim), x.tolist(), strict=True))

@@ -25,6 +25,7 @@ __all__ = [
     "make_case",
     "march",
     "steady",
+    "sweep",
     "vary",
 ]
 
@@ -41,6 +42,7 @@ _HOMES = {
     "jump": "cycle",
     "march": "cycle",
     "steady": "cycle",
+    "sweep": "sweeps",
 }
 
 

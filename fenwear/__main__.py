@@ -21,9 +21,9 @@ def main() -> int:
     arguments, petsc_options = _split(sys.argv[1:])
     import numpy as np
     import petsc4py
+    from mpi4py import MPI  # before PETSc, which asks for no threads: a sweep on several ranks has one for its messages
 
     petsc4py.init([sys.argv[0], "-no_signal_handler", *petsc_options])  # signals are ours, or the system's
-    from mpi4py import MPI
     from petsc4py import PETSc
 
     comm = MPI.COMM_WORLD

@@ -75,6 +75,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.results.sheet import sheet_text
     from fenwear.run import Progress, run_case
 
     loaded = _load(case, settings)
@@ -88,6 +89,8 @@ def run(
     if as_json:
         _print_json(summary)
     else:
+        if not quiet:
+            print(sheet_text(summary))
         say(f"results in {directory}")
 
 
@@ -425,6 +428,39 @@ def life_command(
     else:
         print(found.text())
     log(f"results in {folder}")
+
+
+@app.command("sweep")
+def sweep_command(
+    case: CaseArgument,
+    over: Annotated[
+        list[str],
+        typer.Option(metavar="KEY=VALUES", help="0.1:0.3:9 is nine values; or a list: 10 mm,12 mm; may be repeated."),
+    ] = [],  # noqa: B006
+    of: Annotated[str, typer.Option(metavar="WHAT", help="steady, optimum or run.")] = "steady",
+    zipped: Annotated[bool, typer.Option("--zip", help="First values together, second ones, and so on.")] = False,
+    table: Annotated[Path | None, typer.Option(help="CSV of variants: a heading of keys, then rows.")] = None,
+    processes: Annotated[int | None, typer.Option(help="Local processes; by default cores, where that pays.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Compute what the folder lacks.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")] = False,
+    settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Compute many variants of a case side by side: keys over their values, in one dataset."""
+    from fenwear.sweeps import command
+
+    dataset, folder = command.run_sweep(
+        _load(case, settings), Path(case).stem, over, table, of, output, log,
+        zipped=zipped, resume=resume, processes=processes, quiet=quiet,
+    )  # fmt: skip
+    if as_json:
+        _print_json(command.as_json(dataset))
+    else:
+        print(command.text(dataset))
+    log(f"results in {folder}")
+    if (dataset["trouble"].values != "").any():
+        raise typer.Exit(3)
 
 
 @app.command("info")

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.arrays import Array
+from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh, build_meshes
@@ -14,6 +16,7 @@ from fenwear.bodies.shape import follow_wear
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import isotropic_conduction
+from fenwear.parallel import release
 from fenwear.sliding.wear import Worn
 
 
@@ -26,6 +29,7 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
+        densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
     """
 
     punch: ElasticBody
@@ -33,6 +37,7 @@ class Bodies:
     heat: tuple[HeatBody, HeatBody] | None = None
     followed: Worn | None = None
     moved: Worn | None = None
+    densities: tuple[Array | None, Array | None] = (None, None)
 
     @property
     def comm(self) -> MPI.Comm:
@@ -65,10 +70,15 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
         CaseError: what only the geometry can tell is wrong, such as a missing group.
         MeshQualityError: an element does not survive the motion.
     """
+    release(comm)  # what earlier systems have left
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
-    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved)
+    of_punch, of_strip = (
+        contact_density(body, {region: case.materials[name].density for region, name in description.regions.items()})
+        for body, description in ((punch, case.punch), (strip, case.strip))
+    )
+    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved, (of_punch, of_strip))
 
 
 def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:

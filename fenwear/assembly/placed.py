@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
@@ -93,6 +94,14 @@ def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     return x, y, z
 
 
+@dataclass(frozen=True)
+class Clock:
+    """When a motion began that is one of several: after how many half-cycles, and at what time, s."""
+
+    half_cycles: int = 0
+    time: float = 0.0
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Placed:
     """Both bodies opposite each other in every phase, in equilibrium; nothing elastic in it.
@@ -107,6 +116,7 @@ class Placed:
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
         rigid: The same in the middle position under the mean loads.
         remedies: What had to be solved in another way.
+        clock: When its motion began.
     """
 
     bodies: Bodies
@@ -118,6 +128,17 @@ class Placed:
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
     remedies: Remedies = field(default_factory=Remedies)
+    clock: Clock = Clock()
+
+    def time(self, half_cycle: NDArray[np.int64]) -> Array:
+        """Return the time at the end of half-cycles of its motion, given by their numbers from 1, s."""
+        return self.clock.time + self.motion.time(np.asarray(half_cycle) - self.clock.half_cycles)
+
+    @property
+    def normal_force(self) -> float:
+        """The mean force of the loads on the contact, N; 0 where supports and not the contact carry it."""
+        force = self.rigid.mean_pressure * self.pair.weights.sum() * self.bodies.punch.thickness
+        return float(force) if "lambda_F" in self.rigid.mode_names else 0.0
 
     def __repr__(self) -> str:
         """Say in a line what it is."""

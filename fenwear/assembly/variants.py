@@ -90,7 +90,7 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
         CaseError: the punch would tip over.
     """
     before = system.case
-    if not _same_bodies(before, case):
+    if set_up_by(before) != set_up_by(case):
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
     bodies, condensed, sliding = system.bodies, system.condensed, system.sliding
     if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
@@ -121,20 +121,10 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     return cut if system.exchange is None else with_exchange(cut, reduced=system.exchange.reduced)
 
 
-def _same_bodies(one: Case, other: Case) -> bool:
-    """Return whether two cases have the same meshes, stiffnesses and thermal expansion."""
-    first, second = (
-        (
-            case.geometry,
-            case.folder,
-            case.model,
-            case.materials,
-            case.heat is None,
-            *((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip)),
-        )
-        for case in (one, other)
-    )
-    return first == second
+def set_up_by(case: Case) -> tuple[object, ...]:
+    """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
+    bodies = ((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip))
+    return (case.geometry, case.folder, case.model, case.materials, case.heat is None, *bodies)
 
 
 def _same_conduction(one: Case, other: Case) -> bool:

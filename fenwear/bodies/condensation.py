@@ -125,29 +125,15 @@ def _symmetric(response: Array, along: Array) -> Array:
 
 def respond_to_load(elastic: ElasticBody, patterns: csr_array) -> Array:
     """Return the displacement at each pattern under the body's loads (q, d), mm; collective."""
-    solution = elastic.load.duplicate()
-    elastic.factor.solve(elastic.load, solution)
-    return patterns.T @ elastic.trace.pick(solution.array_r[:, None])[:, :, 0]
+    return patterns.T @ elastic.trace.pick(elastic.factor.solve(elastic.load)[:, None])[:, :, 0]
 
 
 def _solve(elastic: ElasticBody, forces: Array, thermal_coupling: PETSc.Mat | None) -> tuple[Array, Array | None]:
     """Return the trace's displacements (N, d, k) from forces on it (N, d, k), and G^T of the whole; collective."""
-    sizes = (elastic.stiffness.getSizes()[0], (PETSc.DECIDE, forces.shape[2]))
-    right = PETSc.Mat().createDense(sizes, comm=elastic.body.mesh.comm)
-    right.setUp()
-    array = right.getDenseArray()
-    array[:] = elastic.trace.place(forces)
-    array[elastic.supported] = 0.0
-    right.assemble()
-    displacement = right.duplicate()
-    displacement.setUp()
-    elastic.factor.matSolve(right, displacement)
-    found = displacement.getDenseArray()
-    result = elastic.trace.pick(found)
-    by_temperature = None if thermal_coupling is None else _transposed_times(thermal_coupling, found)
-    right.destroy()
-    displacement.destroy()
-    return result, by_temperature
+    right = elastic.trace.place(forces)
+    right[elastic.supported] = 0.0
+    found = elastic.factor.solve(right)
+    return elastic.trace.pick(found), None if thermal_coupling is None else _transposed_times(thermal_coupling, found)
 
 
 def _transposed_times(matrix: PETSc.Mat, fields: Array) -> Array:

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import basix.ufl
-import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import scipy.linalg
 import ufl
@@ -19,7 +18,7 @@ from ufl.algorithms.check_arities import ArityMismatch
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled
+from fenwear.bodies.assembly import assembled, assembled_vector
 from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
@@ -59,7 +58,7 @@ class ElasticBody:
         space: Vector Lagrange space on Gauss-Lobatto nodes, mm.
         stiffness: K with all supports eliminated, per thickness, MPa.
         supported: The owned degrees of freedom that are held at zero.
-        load: f, per thickness, N/mm, zero where supported.
+        load: f of this rank's own degrees of freedom (owned,), per thickness, N/mm, zero where supported.
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
@@ -105,9 +104,9 @@ class ElasticBody:
 
     def _set_loads(self, loads: Sequence[Load]) -> None:
         load = self._assemble_load(loads)
-        resultant = np.array([mode @ load.array_r for mode in self.rigid_modes])
+        resultant = np.array([mode @ load for mode in self.rigid_modes])
         self.rigid_resultant = total(self.body.mesh.comm, resultant)
-        load.array[self.supported] = 0.0
+        load[self.supported] = 0.0
         self.load = load
 
     def with_loads(self, loads: Sequence[Load]) -> ElasticBody:
@@ -263,18 +262,15 @@ class ElasticBody:
         coupling.zeroRows((self.supported + start).astype(np.int32), diag=0.0)
         return coupling
 
-    def surface_integral(self, traction: Any, tag: int) -> PETSc.Vec:
-        """Return the vector of the integral of traction . v over the facets tagged `tag`; collective."""
+    def surface_integral(self, traction: Any, tag: int) -> Array:
+        """Return the integral of traction . v over the facets tagged `tag` (owned,); collective."""
         ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.body.facet_tags)
         work = ufl.inner(traction, ufl.TestFunction(self.space)) * measure(self.body.mesh, self.law.kind)
-        vector = fem.petsc.assemble_vector(fem.form(work * ds(tag)))
-        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        return vector
+        return assembled_vector(work * ds(tag))
 
-    def _assemble_load(self, loads: Sequence[Load]) -> PETSc.Vec:
+    def _assemble_load(self, loads: Sequence[Load]) -> Array:
         mesh = self.body.mesh
-        zero = fem.Function(self.space)  # owns the memory of its petsc_vec
-        total = zero.x.petsc_vec.copy()
+        total = np.zeros(self.dim * self.space.dofmap.index_map.size_local)
         for number, load in enumerate(loads):
             tag = self.body.curve(load.on, f"{self.body.name}.loads.{number}.on")
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
@@ -282,7 +278,7 @@ class ElasticBody:
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
             resultant = load.force if load.traction is None else [area * component for component in load.traction]
             traction = np.array(resultant) / area
-            total.axpy(1.0, self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag))
+            total += self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag)
         return total
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.bodies.assembly import dense, destroy
 from fenwear.errors import ConvergenceError
 from fenwear.parallel import on_root
 
@@ -36,7 +37,7 @@ class Factor:
         Raises:
             ConvergenceError: it has no factor.
         """
-        self._comm = matrix.comm.tompi4py()
+        self._comm, self._sizes = matrix.comm.tompi4py(), matrix.getSizes()[0]
         self._gathered = self._comm.size > 1 and matrix.getSize()[0] <= GATHERED
         self._rows = matrix.getOwnershipRanges()
         if not self._gathered:
@@ -47,35 +48,45 @@ class Factor:
         on_root(self._comm, lambda: made.append(_factored(_joined(parts or [], kind), prefix, kind, repeated=repeated)))
         self._ksp = made[0] if made else None  # of rank 0
 
-    def solve(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
-        """Solve for one right-hand side; collective."""
-        if not self._gathered and self._ksp is not None:
-            self._ksp.pc.getFactorMatrix().solve(right, solution)
-            return
-        solution.array[:] = self._solve_on_root(right.array_r[:, None])[:, 0]
+    def solve(self, right: Array) -> Array:
+        """Return the solutions for right-hand sides on this rank's own rows, (owned,) or (owned, k); collective."""
+        columns = right.reshape(len(right), -1)
+        if self._gathered or self._ksp is None:
+            return self._on_root(columns).reshape(right.shape)
+        return _solve(self._ksp, columns, self._sizes).reshape(right.shape)
 
-    def matSolve(self, right: PETSc.Mat, solution: PETSc.Mat) -> None:  # noqa: N802  (as PETSc's own factors)
-        """Solve for the columns of a dense matrix; collective."""
-        if not self._gathered and self._ksp is not None:
-            self._ksp.pc.getFactorMatrix().matSolve(right, solution)
-            return
-        solution.getDenseArray()[:] = self._solve_on_root(right.getDenseArray())
-        solution.assemble()
+    def free(self) -> None:
+        """Free its memory: it solves no more; collective."""
+        if self._ksp is not None:
+            self._ksp.destroy()
 
-    def _solve_on_root(self, right: Array) -> Array:
-        """Return the solutions (owned, k) of right-hand sides (owned, k)."""
+    def _on_root(self, right: Array) -> Array:
         columns = right.shape[1]
         counts = np.diff(self._rows) * columns
-        whole = np.empty((int(self._rows[-1]) if self._comm.rank == 0 else 0, columns))
+        whole: Array = np.empty((int(self._rows[-1]) if self._comm.rank == 0 else 0, columns))
         own = np.empty(right.shape)
         self._comm.Gatherv(np.ascontiguousarray(right), (whole, counts))
         if self._ksp is not None:
-            dense = PETSc.Mat().createDense(whole.shape, array=np.asfortranarray(whole), comm=PETSc.COMM_SELF)
-            found = dense.duplicate()
-            self._ksp.pc.getFactorMatrix().matSolve(dense, found)
-            whole = np.ascontiguousarray(found.getDenseArray())
+            whole = np.ascontiguousarray(_solve(self._ksp, whole, (len(whole), len(whole))))
         self._comm.Scatterv((whole, counts), own)
         return own
+
+
+def _solve(ksp: PETSc.KSP, right: Array, sizes: tuple[int, int]) -> Array:
+    """Return the solutions of right-hand sides (owned, k); collective."""
+    factor = ksp.pc.getFactorMatrix()
+    if right.shape[1] == 1:
+        before = PETSc.Vec().createWithArray(np.ascontiguousarray(right[:, 0]), size=sizes, comm=ksp.comm)
+        after = before.duplicate()
+        factor.solve(before, after)
+        solution = np.array(after.array_r)[:, None]
+    else:
+        before = dense(sizes, right, ksp.comm)
+        after = before.duplicate()
+        factor.matSolve(before, after)
+        solution = np.array(after.getDenseArray())
+    destroy(before, after)
+    return solution
 
 
 def _joined(parts: list[tuple[Array, Array, Array]], kind: str) -> PETSc.Mat:

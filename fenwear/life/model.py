@@ -18,6 +18,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import RunState, beginning, joined
+from fenwear.errors import CaseError, InputError
 from fenwear.life.keys import with_values
 
 BODIES = ("punch", "strip")
@@ -98,6 +99,16 @@ class Model:
     evaluations: int = 0
     _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse a test program.
+
+        Raises:
+            CaseError: the case has one.
+        """
+        if self.case.program is not None:
+            message = "not followed here; expected a case of constant loads and motion, or `run`"
+            raise CaseError(InputError("program", message))
 
     def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:
         """Return the assembled problem with keys at these values; what does not change is shared.

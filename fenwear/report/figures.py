@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
+from fenwear.report.program import program_figure
 from fenwear.report.style import (
     DIRECTIONS,
     GREY,
@@ -267,6 +268,8 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str
     if cycle_means(history, chosen) and len(directions_present(history)) == 2:
         drawn["mean_pressure"] = mean_pressure_figure(history, chosen)
     drawn["peaks"] = peak_figure(history)
+    if "load_factor" in history:
+        drawn["program"] = program_figure(history)
     drawn["convergence"] = convergence_figure(history)
     if "max_temperature" in history:
         drawn["temperature"] = temperature_figure(history, chosen)

@@ -17,13 +17,16 @@ from fenwear.report.figures import FOLDER, chosen_half_cycles, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
+from fenwear.report.stick import write_stick_report
 from fenwear.report.surface import model_of
 from fenwear.report.turned import Turned, turned_map
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
 SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
+            "program": "Test program: what acted",
             "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
             "boundary_temperature": "Temperature along the boundaries",
             "pressure_map": "Pressure on the contact surface", "wear_map": "Worn depth of the punch",
@@ -38,6 +41,7 @@ ALT = {
     "a line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
     "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
@@ -76,6 +80,8 @@ def write_report(
 
 def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
     case = read_case(directory)
+    if case.get("contact", {}).get("law") == "coulomb":
+        return write_stick_report(directory)
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
     if complete:
         from fenwear.report.animation import draw_animation
@@ -187,6 +193,17 @@ def _table(caption: str, values: dict[str, int | float], *, cut: int = 0) -> Tab
     return Table(caption, [_number(path, value, cut=cut) for path, value in values.items()])
 
 
+def _sheet_table(name: str, sheet: dict[str, int | float]) -> Table:
+    """Return what a tribometer measures of the sliding or of a body, in the units in which it is read."""
+    numbers = []
+    for path, value in sheet.items():
+        of, _, key = path.partition(".")
+        if of == name:
+            line = LINES[key]
+            numbers.append(Number(path, line.label, value, number_text(shown(value, line)), line.unit))
+    return Table(name.capitalize() if name in BODIES else "What a tribometer measures", numbers)
+
+
 def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
     """Return every number of a summary by its path."""
     values = flat({key: value for key, value in summary.items() if key not in ("versions", "warnings", "retries")})
@@ -199,12 +216,10 @@ def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
         last = {name + unit: float(history[name][-1]) for name, unit in units.items() if name in history}
         return [_table("At the last recorded half-cycle", last)]
     numbers = numbers_of(summary)
-    single = {
-        path: value
-        for path, value in numbers.items()
-        if path.startswith("deepest_") or ("." not in path and "[" not in path)
-    }
-    tables = [_table("The run", single)]
+    single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}
+    sheet = {p: v for p, v in numbers.items() if p.partition(".")[0] in ("sliding", *BODIES) and "[" not in p}
+    tables = [_sheet_table(name, sheet) for name in ("sliding", *BODIES) if name in summary]
+    tables.append(_table("The run", single))
     for d in ("rightward", "leftward", "forward", "backward"):
         if d in summary:
             inside = {p: v for p, v in numbers.items() if p.startswith(f"{d}.") and "[" not in p}
@@ -275,7 +290,7 @@ def _figure(images: dict[str, Path], name: str, caption: str, alt: str = "") -> 
     return picture(path.read_bytes(), path.suffix[1:], caption, alt or ALT[name])
 
 
-BODIES = {
+KINDS = {
     "solid": "Deformed punch and strip, cut through the middle of the contact",
     "turned": "Deformed rings, turned about their axis with a quarter left open",
     "bodies": "Deformed punch and strip near the contact",
@@ -286,7 +301,7 @@ def _bodies(images: dict[str, Path]) -> list[Picture | None]:
     """Return pictures of the bodies at the last half-cycle that has them."""
     pictures = []
     for field, text in FIELDS.items():
-        for kind, what in BODIES.items():
+        for kind, what in KINDS.items():
             names = [n for n in images if n.startswith(f"{kind}_{field}_")]
             if names:
                 number = int(names[-1].rpartition("_")[2])

@@ -22,6 +22,7 @@ from fenwear.report.figures import (
     pressure_top,
 )
 from fenwear.report.maps import cuts_figure, map_figure, quantities
+from fenwear.report.program import program_figure
 from fenwear.report.style import direction_style, legend_beside, panels, reference_line, run_style, shades
 from fenwear.report.surface import model_of, radial
 
@@ -45,6 +46,8 @@ def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict
         if "max_temperature" in history:
             drawn["temperature"] = ring_temperature_figure(history, chosen)
     drawn["peaks"] = series_figure(history)
+    if "load_factor" in history:
+        drawn["program"] = program_figure(history)
     drawn["convergence"] = convergence_figure(history)
     if "max_temperature" in history:
         drawn["heat_balance"] = heat_balance_figure(history)
@@ -58,7 +61,7 @@ def conforms(history: xarray.Dataset) -> bool:
 
 def series_figure(history: xarray.Dataset) -> Figure:
     """Draw over the half-cycles: largest pressure, area in contact, depth and size of the scars, and temperature."""
-    sizes = [name for name in ("scar_length", "scar_width") if name in history]
+    sizes = [n for n in ("scar_length", "scar_width") if n in history or f"{n}_strip" in history]
     hot = "max_temperature" in history
     figure, axes = panels(4 + hot, 2.3)
     pressure, area, depth, size, *rest = axes

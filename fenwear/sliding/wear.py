@@ -131,18 +131,6 @@ class PhasesWear:
             parts.append(np.array([pair.material.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
 
-    def worn_area(self, pressure: Array) -> tuple[float, float]:
-        """Return the cross-sections worn off punch and strip, mm²."""
-        areas = [
-            0.0 if body is None else float(np.vdot(body.depth(pressure), self._weights))
-            for body in (self.punch, self.strip)
-        ]
-        return areas[0], areas[1]
-
-    @cached_property
-    def _weights(self) -> Array:
-        return np.array([pair.weights for pair in self.pairs])
-
 
 @dataclass(frozen=True)
 class WornLayer:

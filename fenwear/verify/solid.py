@@ -11,7 +11,7 @@ import numpy as np
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
-from fenwear.case import make_case
+from fenwear.case import Case, make_case
 from fenwear.cycle import growth_rate, march, steady
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -21,7 +21,7 @@ MODULUS = YOUNG / (1 - POISSON**2)  # E* of a rigid body on steel, MPa
 ROTATION = {"kind": "rotation", "angular_speed": 1.0, "duration": 1.0}
 
 
-def solve(
+def describe(
     geometry: Mapping[str, Any],
     punch: Mapping[str, Any],
     strip: Mapping[str, Any],
@@ -29,8 +29,8 @@ def solve(
     kind: str = "solid",
     materials: tuple[Mapping[str, float], Mapping[str, float]] = (STEEL, STEEL),
     **tables: Any,
-) -> Tribosystem:
-    """Return the system of one material for each body; collective.
+) -> Case:
+    """Return the case of one material for each body.
 
     Args:
         geometry: Table of the case file.
@@ -50,7 +50,14 @@ def solve(
         "run": {"half_cycles": 1},
         **tables,
     }
-    return assemble(make_case(case))
+    return make_case(case)
+
+
+def solve(
+    geometry: Mapping[str, Any], punch: Mapping[str, Any], strip: Mapping[str, Any], **tables: Any
+) -> Tribosystem:
+    """Return the system of `describe`; collective."""
+    return assemble(describe(geometry, punch, strip, **tables))
 
 
 def middles(body: str) -> list[dict[str, Any]]:

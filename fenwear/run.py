@@ -22,7 +22,6 @@ from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
-from fenwear.report.page import try_report
 from fenwear.results import checkpoint
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -346,6 +345,8 @@ class _Run:
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
+            from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
+
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 

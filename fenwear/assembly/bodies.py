@@ -47,7 +47,7 @@ class Bodies:
     @property
     def unknowns(self) -> int:
         """Number of degrees of freedom of both displacements."""
-        return self.punch.stiffness.size[0] + self.strip.stiffness.size[0]
+        return self.punch.size + self.strip.size
 
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""

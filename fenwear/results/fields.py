@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import basix
 import basix.ufl
 import dolfinx
 import numpy as np
 import ufl
-import xarray
 from dolfinx import fem
 from numpy.typing import NDArray
 
@@ -34,6 +33,9 @@ from fenwear.results.series import step_of
 from fenwear.results.subcells import linear_cells
 from fenwear.results.vtkhdf import append
 from fenwear.sliding.wear import Worn
+
+if TYPE_CHECKING:
+    import xarray
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
@@ -248,6 +250,8 @@ def write_fields(
     time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
     data.update(_contact_surfaces(system, worn, pressure))
+    import xarray  # with pandas, half a second that runs without fields spare themselves
+
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder, stem))
 
 

@@ -8,9 +8,8 @@ from collections.abc import Callable
 import pytest
 
 from fenwear import CaseError, load_case
-from fenwear.assembly import elastic, needs_of, place_case
+from fenwear.assembly import elastic, needs_of, place_case, tribosystem
 from fenwear.assembly import needs as module
-from fenwear.assembly import tribosystem
 from fenwear.assembly.needs import GIB, BodyNeeds, Needs, free_memory, needs
 
 COARSE = ("geometry.degree=1", "geometry.order=1")

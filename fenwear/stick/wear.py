@@ -64,7 +64,7 @@ def local_wear(
     """Return the wear by local slip of a case's laws.
 
     Raises:
-        CaseError: a coefficient depends on anything, or the pressure has a threshold or a cap.
+        CaseError: a coefficient depends on anything.
     """
     n = len(pair.weights)
     state = ContactConditions.at(np.full(n, mean_pressure))
@@ -72,9 +72,6 @@ def local_wear(
     for law, key in zip(laws, ("wear.punch", "wear.strip"), strict=True):
         if law is not None and isinstance(law.coefficient, Dependence):
             raise CaseError(InputError(f"{key}.coefficient", "expected a constant with contact.law = 'coulomb'"))
-        if law is not None and (law.pressure_threshold > 0 or law.pressure_cap is not None):
-            message = "expected neither pressure_threshold nor pressure_cap with contact.law = 'coulomb'"
-            raise CaseError(InputError(key, message))
         found.append(
             None
             if law is None

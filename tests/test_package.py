@@ -63,7 +63,18 @@ def test_source_distribution_makes_the_same_wheel(wheel: Path, run_python: Run, 
 
 def test_dependencies_are_declared() -> None:
     """Every library that a module imports, but for what comes with the compiled stack or with a declared one."""
-    comes_along = {"basix", "dolfinx", "ffcx", "gmsh", "petsc4py", "ufl", "h5py", "markupsafe", "click", "pydantic_core"}
+    comes_along = {
+        "basix",
+        "dolfinx",
+        "ffcx",
+        "gmsh",
+        "petsc4py",
+        "ufl",
+        "h5py",
+        "markupsafe",
+        "click",
+        "pydantic_core",
+    }
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     given = [*project["dependencies"], *project["optional-dependencies"]["life"]]
     names = {re.split(r"[<>=]", name)[0].replace("-", "_").replace("pillow", "PIL") for name in given}

@@ -108,13 +108,20 @@ class Tribosystem(Placed):
         )
 
 
-def elastic(placed: Placed) -> Tribosystem:
-    """Condense both bodies and join them in every phase: factors both stiffnesses; collective."""
-    condensed = condense_bodies(placed)
+def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
+    """Condense both bodies and join them in every phase; collective.
+
+    Factors both stiffnesses, unless the bodies are kept on disk.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
+    """
+    condensed = condense_bodies(placed, fresh=fresh)
     return joined(placed, condensed)
 
 
-def condense_bodies(placed: Placed) -> Condensed:
+def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
     """Condense both bodies onto what the phases of the motion ask for; collective."""
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
@@ -132,7 +139,7 @@ def condense_bodies(placed: Placed) -> Condensed:
         onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1])
     else:
         onto_strip = Request(bodies.strip, csr_array(middle.transfer.T), middle.normal_on_strip, couplings[1])
-    punch, strip = condense_together([onto_punch, onto_strip])
+    punch, strip = condense_together([onto_punch, onto_strip], keep=True, fresh=fresh)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()

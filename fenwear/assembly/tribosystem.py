@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.needs import Needs, check_memory, needs
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
 from fenwear.bodies.response import Request
@@ -108,6 +109,11 @@ class Tribosystem(Placed):
         )
 
 
+def needs_of(placed: Placed) -> Needs:
+    """Return what the set-up of placed bodies will take; collective."""
+    return needs(placed, _frame(placed))
+
+
 def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
     """Condense both bodies and join them in every phase; collective.
 
@@ -116,7 +122,11 @@ def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
     Args:
         placed: The bodies.
         fresh: Factor whatever is kept.
+
+    Raises:
+        CaseError: there is not memory enough.
     """
+    check_memory(placed, needs_of(placed))
     condensed = condense_bodies(placed, fresh=fresh)
     return joined(placed, condensed)
 

@@ -27,7 +27,12 @@ from fenwear.sliding.wear import Worn
 
 
 def assemble(
-    case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None, *, heat: Preparation = "as set"
+    case: Case,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    followed: Worn | None = None,
+    *,
+    heat: Preparation = "as set",
+    fresh: bool = False,
 ) -> Tribosystem:
     """Return the system of a case: all steps; collective.
 
@@ -37,6 +42,7 @@ def assemble(
         followed: Worn depths that the meshes follow; by default they are as they were made.
         heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
@@ -45,7 +51,7 @@ def assemble(
     if case.contact.law == "coulomb":
         reason = "expected 'gross-sliding' here: with 'coulomb', `run`, `check`, `steady` and fenwear.stick go on"
         raise CaseError(InputError("contact.law", reason))
-    system = elastic(place_case(case, comm, followed))
+    system = elastic(place_case(case, comm, followed), fresh=fresh)
     if heat == "none":
         return system
     return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)

@@ -92,7 +92,11 @@ class FullContact:
         self._bounds = (lower, upper)
         self.snes = PETSc.SNES().create(self.comm)
         own = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
-        self.snes.setFunction(lambda snes, x, f: own._residual(snes, x, f), self._x.duplicate())
+
+        def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+            own._residual(snes, x, f)
+
+        self.snes.setFunction(residual, self._x.duplicate())
         self.snes.setJacobian(lambda snes, x, J, P: None, self._operator)
         configure(self.snes, "fenwear_full_contact_")
         self.snes.setTolerances(atol=1e-9)  # the rounding of a system with all displacements in it

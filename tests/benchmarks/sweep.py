@@ -3,8 +3,8 @@
 python3 tests/benchmarks/sweep.py
 
 Whole commands, from their start to their end. The first 200 variants have meshes of their own (another height of the
-pin each); the second share ten meshes, and each is set up once. CPU times tell what several processes cost on top; times by
-the clock mean something on idle cores only.
+pin each); the second share ten meshes, and each is set up once. CPU times tell what several processes cost on top;
+times by the clock mean something on idle cores only.
 """
 
 from __future__ import annotations

@@ -75,6 +75,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.results.sheet import sheet_text
     from fenwear.run import Progress, run_case
 
     loaded = _load(case, settings)
@@ -88,6 +89,8 @@ def run(
     if as_json:
         _print_json(summary)
     else:
+        if not quiet:
+            print(sheet_text(summary))
         say(f"results in {directory}")
 
 
@@ -103,7 +106,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     system = assemble(loaded, heat="reduced")
     setup = time.perf_counter() - begin
     state = steady(system)
-    warnings = [*doubts(loaded), *steady_warnings(system, state)]
+    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
@@ -202,16 +205,19 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import assemble
+    from fenwear.assembly import elastic, needs_of, place_case
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="none")
+    placed = place_case(loaded)
+    log(needs_of(placed).text())
+    system = elastic(placed)
     number = stability_number(system)
     system.check_touching()
-    for warning in [*position_warnings(system), *doubts(loaded), *initial_warnings(system)]:
+    warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
+    for warning in warnings:
         log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "

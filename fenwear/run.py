@@ -16,11 +16,12 @@ from tqdm import tqdm
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
-from fenwear.cycle import Block, follow, jump, march, stability_number, stationary_growth
+from fenwear.cycle import Block, Span, follow_program, jump, march, stability_number, stationary_growth
+from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
-from fenwear.report.page import try_report
 from fenwear.results import checkpoint
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -33,6 +34,7 @@ from fenwear.results.history import (
     write_summary,
 )
 from fenwear.signals import Signals
+from fenwear.stick.run import run_stick
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -76,6 +78,12 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
+    if case.contact.law == "coulomb":
+        if resume:
+            raise CaseError(
+                InputError("--resume", "runs with contact.law = 'coulomb' start anew: they keep no checkpoint")
+            )
+        return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case))
     if not resume:
@@ -155,7 +163,7 @@ class _Run:
         self.writer: HistoryWriter | None = None  # of rank 0
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
-        self.state = start or RunState(0, system.unworn(), (), None)
+        self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []
@@ -163,7 +171,7 @@ class _Run:
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
-        self.warnings += [*position_warnings(system), *doubts(self.case)]
+        self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
@@ -235,7 +243,7 @@ class _Run:
         return bool(interrupted)
 
     def _blocks(self) -> Iterator[Block]:
-        for block in follow(self.system, self._integrate, self.start):
+        for block in follow_program(self.system, self._integrate, self._last, self.start):
             yield block
             if block.end.half_cycle >= self._last:  # meshes that nothing more is computed on need not follow
                 return
@@ -247,7 +255,7 @@ class _Run:
         return self.case.run.half_cycles // strokes * strokes
 
     def _integrate(
-        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]
+        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
         shared: dict[str, Any] = {
@@ -256,15 +264,16 @@ class _Run:
             "stops": self._fields_at,
             "leave": leave,
             "watch": self._watch,
+            "loading": span.loading,
         }
         if run.integration == "jump":
-            return jump(system, run.half_cycles, tolerance=run.jump_tolerance, **shared)
-        return march(system, run.half_cycles, implicit=run.integration == "implicit", **shared)
+            return jump(system, span.until, tolerance=run.jump_tolerance, **shared)
+        return march(system, span.until, implicit=run.integration == "implicit", **shared)
 
     def _take(self, block: Block) -> None:
-        if block.system is not self.system:
+        if block.system.bodies.followed is not self.system.bodies.followed:
             self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
-            self.system = block.system
+        self.system = block.system
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
@@ -294,8 +303,10 @@ class _Run:
         half_cycle, motion = int(block.half_cycle[-1]), self.system.motion
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
-        fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], phase, temperatures)
-        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]), block.end.worn)
+        pressed = at_loads(self.system, float(block.load_factor[-1]))
+        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures)
+        direction, worn = int(block.direction[-1]), block.end.worn
+        write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
@@ -334,6 +345,8 @@ class _Run:
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
+            from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
+
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 

@@ -15,7 +15,7 @@ from fenwear.bodies.mesh import meshes_folder
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history, surfaces
+from fenwear.results import history, sheet, surfaces
 from fenwear.verify.suite import registered
 
 
@@ -103,7 +103,7 @@ class Commands(Written):
 def _of_surfaces() -> dict[str, Any]:
     """Return the variables that are others in solids and rings."""
     plane = {**history.VARIABLES, **history.STRIP_VARIABLES}
-    found = surfaces.on_surfaces(plane, solid=True)
+    found = surfaces.on_surfaces(plane)
     return {name: variable for name, variable in found.items() if plane.get(name, ("", "", ""))[1:] != variable[1:]}
 
 
@@ -115,7 +115,18 @@ class Results(Written):
         heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in history.HEAT_TERMS.items()}
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
+            "What a tribometer measures; with _strip of the strip": {
+                **sheet.SLIDING,
+                **{
+                    name: (over, unit, text.format(body="punch"))
+                    for name, (over, unit, text) in {
+                        **sheet.OF_A_BODY,
+                        **sheet.of_the_scar(("x",), ("length", "width")),
+                    }.items()
+                },
+            },
             "Where the strip wears": history.STRIP_VARIABLES,
+            "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
             "With heat": {**history.HEAT_VARIABLES, **heat},
             "Of solids and rings instead, or as well": _of_surfaces(),
         }

@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
 from fenwear.bodies.elasticity import PREFIX, ElasticBody
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import factored
 from fenwear.bodies.material import measure
 from fenwear.case import Kind
 
@@ -64,14 +64,15 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
     bc = fem.dirichletbc(PETSc.ScalarType(0), supports, space)
     matrix = assembled(a, [bc])
     matrix.setOption(PETSc.Mat.Option.SPD, True)
-    load, solution = matrix.createVecLeft(), fem.Function(space, name="displacement_out_of_plane")
+    solution = fem.Function(space, name="displacement_out_of_plane")
     owned = space.dofmap.index_map.size_local
-    load.array[:] = given.x.array[2 * to_node[:owned]]
-    load.array[supports[supports < owned]] = 0.0
+    load = given.x.array[2 * to_node[:owned]]
+    load[supports[supports < owned]] = 0.0
 
-    found = load.duplicate()
-    Factor(matrix, PREFIX, "cholesky").solve(load, found)
-    solution.x.array[:owned] = found.array_r
+    factor = factored(matrix, PREFIX, "cholesky", comm=mesh.comm, dim=elastic.dim)
+    solution.x.array[:owned] = factor.solve(load)
+    factor.free()
+    matrix.destroy()
     solution.x.scatter_forward()
     return solution
 
@@ -83,4 +84,4 @@ def _held(elastic: ElasticBody) -> NDArray[np.int64]:
     owned = elastic.space.dofmap.index_map.size_local
     radius = elastic.space.tabulate_dof_coordinates()[:owned, 0]
     on_axis = 2 * np.flatnonzero(radius < ON_AXIS * elastic.surface.trace[:, 0].max())
-    return np.concatenate([np.flatnonzero(elastic.load.array_r), on_axis])
+    return np.concatenate([np.flatnonzero(elastic.load), on_axis])

@@ -1,5 +1,6 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
+from fenwear.case.dependence import register_law
 from fenwear.case.plausible import doubts
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
 from fenwear.case.schema import (
@@ -21,6 +22,7 @@ from fenwear.case.schema import (
     Reciprocating,
     Rotation,
     Run,
+    Stick,
     Support,
     Tabulated,
     Wear,
@@ -46,6 +48,7 @@ __all__ = [
     "Reciprocating",
     "Rotation",
     "Run",
+    "Stick",
     "Support",
     "Tabulated",
     "Wear",
@@ -55,4 +58,5 @@ __all__ = [
     "doubts",
     "load_case",
     "make_case",
+    "register_law",
 ]

@@ -21,6 +21,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.contact.condensed import ContactState, Layer
 from fenwear.contact.inequality import check, configure
 from fenwear.interface import Interface
+from fenwear.parallel import lasting
 
 # Where a step is cut off at p = 0 the gap, a function of u alone, is still zero up to rounding of either sign: this
 # much, over the scale of gaps, makes the node open.
@@ -36,7 +37,7 @@ class FullContact:
 
     def __init__(self, punch: ElasticBody, strip: ElasticBody, interface: Interface, friction_ratio: Array) -> None:
         self.interface = interface
-        self.comm = punch.body.mesh.comm
+        self.comm = lasting(punch.body.mesh.comm)
         rigid, pair = interface.rigid, interface.pair
         self._pressure_scale = rigid.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
@@ -63,8 +64,8 @@ class FullContact:
         self._free = sum(sizes)
         self._scale_system()
         self._constant = self._offset.array.copy()
-        self._constant[: sizes[0]] = -punch.load.array_r / self._force_scale
-        self._constant[sizes[0] : self._free] = -strip.load.array_r / self._force_scale
+        self._constant[: sizes[0]] = -punch.load / self._force_scale
+        self._constant[sizes[0] : self._free] = -strip.load / self._force_scale
         if self.comm.rank == 0:
             self._constant[self._free + n :] = rigid.resultant / self._force_scale
         self._build_snes()
@@ -173,7 +174,7 @@ def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc
     free = np.ones(shape[0])
     free[elastic.supported] = 0.0
     local = csr_array(local.multiply(free[:, None]))
-    comm = elastic.body.mesh.comm
+    comm = lasting(elastic.body.mesh.comm)
     sizes = (elastic.stiffness.getSizes()[0], (shape[1] if comm.rank == 0 else 0, shape[1]))
     csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
     matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=comm)
@@ -183,7 +184,7 @@ def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc
 
 def _normals(elastic: ElasticBody, patterns: csr_array, normal: Array) -> PETSc.Mat:
     """Return N (n, dofs): the displacement along e_n that each contact node sees of this body; collective."""
-    comm, count = elastic.body.mesh.comm, len(normal)
+    comm, count = lasting(elastic.body.mesh.comm), len(normal)
     part = csr_array(patterns.T).tocoo()
     rows, nodes = part.coords
     dim = elastic.dim

@@ -77,6 +77,9 @@ def prepare_exchange(
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # collective: each is asked
         sides.append(_side(field, steps, around, pair, rows, cooled=cooled))
+        if reduced:  # what is left of them is in the small field
+            for step in steps:
+                step.free()
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 
 

@@ -64,6 +64,7 @@ def reduced_basis(
                 lift = step.advance(np.zeros(body.owned))
             else:
                 relaxed.append(step.advance(body.initial() - lift, sources=False)[:, None])
+            step.free()
     uniform = np.ones((body.owned, 1))  # carries the balance of energy
     start = (body.initial() - lift)[:, None]
     hottest = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0)), MPI.MAX)

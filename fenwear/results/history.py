@@ -20,8 +20,9 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
+from fenwear.results import sheet
 from fenwear.results.disk import check_room, claim, write_text, writing
-from fenwear.results.scar import conforming, scar_summary, scars
+from fenwear.results.scar import conforming
 from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, surface_columns
 from fenwear.versions import versions
 
@@ -82,15 +83,27 @@ STRIP_VARIABLES = {
 }
 
 
+# the same with a program: what acted
+PROGRAM_VARIABLES = {
+    "load": (("half_cycle",), "N", "normal force on the contact, the mean of the cycle"),
+    "load_factor": (("half_cycle",), "1", "all loads over those of the case"),
+    "speed": (("half_cycle",), "mm s-1", "mean sliding speed; of a turning strip in rad s-1"),
+}
+AMBIENT = {"ambient": (("half_cycle",), "K", "temperature of the surroundings")}
+
+
 def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
     case = system.case
     variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
+    if case.program is not None:
+        variables = {**variables, **PROGRAM_VARIABLES, **({} if case.heat is None else AMBIENT)}
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms}
+    variables = {**variables, **sheet.variables(system)}
     if case.model.kind == "plane":
         return variables
-    return on_surfaces(variables, solid=case.model.kind == "solid", track=system.sliding.track is not None)
+    return on_surfaces(variables)
 
 
 def _columns(system: Tribosystem) -> dict[str, Column]:
@@ -108,8 +121,8 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
 
 def _rows(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    of_scars = {} if block.system.case.model.kind == "plane" else scars(block)
-    return {name: of_scars[name] if name in of_scars else _values(block, name) for name in names}
+    own = sheet.values(block)
+    return {name: own[name] if name in own else _values(block, name) for name in names}
 
 
 def _values(block: Block, name: str) -> NDArray[Any]:
@@ -119,7 +132,7 @@ def _values(block: Block, name: str) -> NDArray[Any]:
         pair = block.system.pair
         weights = pair.weights if name == "weight" else pair.strip.weights
         return np.broadcast_to(weights, (len(block), len(weights)))
-    if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
+    if name in (*VARIABLES, *STRIP_VARIABLES, *PROGRAM_VARIABLES, *AMBIENT) or block.heat is None:
         return getattr(block, name)
     if name == "heat_balance_error":
         return block.heat.balance_error
@@ -358,12 +371,13 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "title": system.case.title,
         "half_cycles": int(last.half_cycle[-1]),
         **run,
+        **sheet.sheet(last),
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
         **({} if last.heat is None else _heat_summary(system, last)),
         "periodicity": float(last.periodicity[-1]),
         **extremes,
         "contact_nodes": len(system.pair.x),
-        "degrees_of_freedom": system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0],
+        "degrees_of_freedom": system.bodies.unknowns,
         "ranks": system.comm.size,
         "versions": versions(),
     }
@@ -381,7 +395,6 @@ def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
         "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
-        **_strip_summary(system, last),
         **{
             {1: "rightward", -1: "leftward"}[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
@@ -408,7 +421,6 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     )
     return {
         **mean,
-        **scar_summary(last),
         **{
             {1: "forward", -1: "backward"}[int(d)]: {
                 "half_cycle": int(number),
@@ -418,18 +430,6 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
             }
             for d, number, pressure, area in rows
         },
-    }
-
-
-def _strip_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
-    """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
-    if not system.strip_wears:
-        return {}
-    depth, nodes = last.wear_strip[-1], system.pair.strip
-    return {
-        "wear_strip_max_mm": float(depth.max()),
-        "worn_area_strip_mm2": float(nodes.weights @ depth),
-        "worn_area_punch_mm2": float(system.pair.weights @ last.wear[-1]),
     }
 
 

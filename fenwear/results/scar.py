@@ -1,14 +1,13 @@
 """The geometry of scars: how deep, how long and how wide what is worn off a contact surface is.
 
-A scar is where the depth is more than a hundredth of the largest one. Its edge is put between two nodes by linear
-interpolation, and so is right to an element, of which it takes rather too much. Length is along the sliding and width
-across it; on rings and on closed tracks the scar goes all the way round, and has a width alone.
+A scar is where the depth is more than a share of the largest one, by default a hundredth. Its edge is put between two
+nodes by linear interpolation, and so is right to an element, of which it takes rather too much. Length is along the
+sliding and width across it; on rings and on closed tracks the scar goes all the way round, and has a width alone.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.cycle import Block
 from fenwear.interface import ContactPair
 from fenwear.results.surfaces import surface_cells
 from fenwear.sliding.chart import sliding_chart
@@ -39,24 +37,26 @@ class ScarGeometry:
     edges: NDArray[np.int64]
     names: tuple[str, ...]
 
-    def extents(self, depth: Array) -> dict[str, Array]:
+    def extents(self, depth: Array, share: float = EDGE) -> dict[str, Array]:
         """Return the extents of scars (k,), mm, by their names; 0 where nothing is worn.
 
         Args:
             depth: Worn depths of k half-cycles (k, n), mm.
+            share: Of the largest depth, where a scar ends.
         """
-        return dict(zip(self.names, extents(depth, self.coordinates, self.edges).T, strict=True))
+        return dict(zip(self.names, extents(depth, self.coordinates, self.edges, share).T, strict=True))
 
 
-def extents(depth: Array, coordinates: Array, edges: NDArray[np.int64]) -> Array:
+def extents(depth: Array, coordinates: Array, edges: NDArray[np.int64], share: float = EDGE) -> Array:
     """Return how far scars reach along each coordinate (k, c), mm.
 
     Args:
         depth: Worn depths of k half-cycles (k, n), mm.
         coordinates: Of the nodes (n, c), mm.
         edges: Pairs of neighbouring nodes (m, 2).
+        share: Of the largest depth, where a scar ends.
     """
-    level = EDGE * depth.max(axis=1, initial=0.0)[:, None]
+    level = share * depth.max(axis=1, initial=0.0)[:, None]
     inside = depth > level
     first, second = edges.T
     a, b = depth[:, first] - level, depth[:, second] - level
@@ -89,39 +89,3 @@ def scar_geometry(placed: Placed, surface: ContactSurface) -> ScarGeometry:
 def conforming(pair: ContactPair) -> bool:
     """Return whether the unworn surfaces lie on each other, so that the load over their area is a pressure."""
     return bool(np.ptp(pair.initial_gap) < CONFORMING * pair.punch.extent())
-
-
-def scars(block: Block) -> dict[str, Array]:
-    """Return largest depths, lengths and widths of both bodies' scars over a block (k,), mm, by their names.
-
-    The names are max_wear, scar_length and scar_width, with _strip for a strip that wears.
-    """
-    system, pair = block.system, block.system.pair
-    found: dict[str, Array] = {}
-    worn = [("", pair.punch, block.wear)]
-    if system.strip_wears:
-        worn.append(("_strip", pair.strip, block.wear_strip))
-    for end, surface, depth in worn:
-        found[f"max_wear{end}"] = depth.max(axis=1)
-        for name, values in scar_geometry(system, surface).extents(depth).items():
-            found[f"scar_{name}{end}"] = values
-    return found
-
-
-def scar_summary(block: Block) -> dict[str, Any]:
-    """Return what is worn off both bodies at the end of a block: depths, volumes and extents."""
-    system, pair = block.system, block.system.pair
-    last = {name: float(values[-1]) for name, values in scars(block).items()}
-    found: dict[str, Any] = {}
-    worn = [("punch", "", pair.punch, pair.weights, block.wear[-1])]
-    if system.strip_wears:
-        worn.append(("strip", "_strip", pair.strip, pair.strip.weights, block.wear_strip[-1]))
-    for name, end, surface, weights, depth in worn:
-        found[f"wear_{name}_max_mm"] = last[f"max_wear{end}"]
-        found[f"deepest_{name}_mm"] = surface.x[int(depth.argmax())].tolist()
-        if name == "punch" or system.sliding.track is None:  # of a closed track a part alone is meshed
-            found[f"worn_volume_{name}_mm3"] = float(weights @ depth)
-        for extent in ("length", "width"):
-            if f"scar_{extent}{end}" in last:
-                found[f"scar_{extent}_{name}_mm"] = last[f"scar_{extent}{end}"]
-    return found

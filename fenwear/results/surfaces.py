@@ -43,31 +43,15 @@ RENAMED = {
     "direction": ("direction", "1", "sliding direction of the strip: 1 forward, along or around; -1 backward"),
 }
 DIMENSIONS = {"x": "node", "x_strip": "node_strip"}
-SCARS: dict[str, Variable] = {
-    "max_wear": (("half_cycle",), "mm", "largest worn depth of the punch at the end of the half-cycle"),
-    "scar_length": (("half_cycle",), "mm", "length of the punch's scar along the sliding (solids)"),
-    "scar_width": (("half_cycle",), "mm", "width of the punch's scar across the sliding"),
-}
 
 
-def on_surfaces(variables: dict[str, Variable], *, solid: bool, track: bool = False) -> dict[str, Variable]:
-    """Return the variables of plane models as those of solids and rings have them, with those of the scars.
-
-    Args:
-        variables: Of plane models.
-        solid: Whether scars have a length.
-        track: Whether that of the strip goes all along a closed track.
-    """
+def on_surfaces(variables: dict[str, Variable]) -> dict[str, Variable]:
+    """Return the variables of plane models as those of solids and rings have them."""
     found: dict[str, Variable] = {}
     for name, (dimensions, units, text) in variables.items():
         over = tuple(DIMENSIONS.get(d, d) for d in dimensions)
         new, unit, meaning = RENAMED.get(name, (name, units, text))
         found[new] = (over, unit, meaning)
-    found |= {name: scar for name, scar in SCARS.items() if solid or name != "scar_length"}
-    if "wear_strip" in variables:
-        for name, (dimensions, units, text) in SCARS.items():
-            if name != "scar_length" or (solid and not track):
-                found[f"{name}_strip"] = (dimensions, units, text.replace("punch", "strip"))
     return found
 
 

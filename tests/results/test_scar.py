@@ -34,6 +34,18 @@ def test_extents_of_an_elliptic_scar(count: int) -> None:
     np.testing.assert_array_equal(found[2], 0)
 
 
+def test_extents_at_another_share() -> None:
+    """At 5 % of the depth of a parabola; a middle that is not worn counts into the width."""
+    x = np.linspace(-1, 1, 401)
+    pairs = np.stack([np.arange(400), np.arange(1, 401)], axis=1)
+    depth = np.maximum(1 - (x / 0.7) ** 2, 0)
+    for share in (0.01, 0.05):
+        (width,) = extents(depth[None], x[:, None], pairs, share)[0]
+        assert width == pytest.approx(1.4 * np.sqrt(1 - share), abs=1e-5)
+    gap = np.array([0, 1, 1, 0, 0, 0, 1, 1, 0.0])
+    assert extents(gap[None], np.arange(9.0)[:, None], pairs[:8], 0.05)[0, 0] == pytest.approx(7.9)
+
+
 def test_a_scar_to_the_edge_of_the_surface() -> None:
     """Worn everywhere, the scar is as large as the surface."""
     x, edges = grid(10)

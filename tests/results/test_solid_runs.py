@@ -70,9 +70,9 @@ def test_history(tmp_path: Path, name: str) -> None:
         if name == "ring-on-ring" else 0,
     }[name]  # fmt: skip
     np.testing.assert_allclose(data.worn_volume, slid, rtol=1e-9)
-    assert summary["worn_volume_punch_mm3"] == pytest.approx(float(data.worn_volume.sum()), rel=1e-9)
+    assert summary["punch"]["worn_volume_mm3"] == pytest.approx(float(data.worn_volume.sum()), rel=1e-9)
     np.testing.assert_array_equal(data.max_wear, data.wear.max("node"))
-    assert summary["wear_punch_max_mm"] == data.max_wear[-1]
+    assert summary["punch"]["largest_depth_mm"] == data.max_wear[-1]
     worn = data.wear[-1] > EDGE * data.wear[-1].max()
     across = data.r if "r" in data else data.across
     reach = np.ptp(across.values[worn.values])
@@ -88,7 +88,7 @@ def test_worn_strip(tmp_path: Path) -> None:
     assert data.wear_strip.dims == ("half_cycle", "node_strip")
     volume = (data.wear_strip * data.weight_strip).sum("node_strip")
     np.testing.assert_allclose(volume, 2e-8 * 20 * 0.2 * np.arange(1, 7), rtol=1e-9)
-    assert summary["worn_volume_strip_mm3"] == pytest.approx(float(volume[-1]), rel=1e-12)
+    assert summary["strip"]["worn_volume_mm3"] == pytest.approx(float(volume[-1]), rel=1e-12)
     assert data.scar_length_strip[-1] > data.scar_length[-1] + 0.1
     assert data.x_strip.size == data.wear_strip.sizes["node_strip"]
 
@@ -139,11 +139,11 @@ def test_retried_half_cycles(tmp_path: Path, name: str, monkeypatch: pytest.Monk
     usual, _ = run(tmp_path / "usual", name, *how)
     solve, failed = PhaseStep.solve, []
 
-    def fail_once(self: PhaseStep, temperature: Any, worn: Any, before: Any) -> PhaseEnd:
+    def fail_once(self: PhaseStep, temperature: Any, worn: Any, before: Any, *acting: Any) -> PhaseEnd:
         if before is not None and not failed:
             failed.append(self.phase)
             raise ConvergenceError("on purpose")
-        return solve(self, temperature, worn, before)
+        return solve(self, temperature, worn, before, *acting)
 
     monkeypatch.setattr(PhaseStep, "solve", fail_once)
     data, summary = run(tmp_path / "retried", name, *how)

@@ -106,7 +106,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     system = assemble(loaded, heat="reduced")
     setup = time.perf_counter() - begin
     state = steady(system)
-    warnings = [*doubts(loaded), *steady_warnings(system, state)]
+    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
@@ -214,16 +214,19 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import assemble
+    from fenwear.assembly import elastic, needs_of, place_case
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="none")
+    placed = place_case(loaded)
+    log(needs_of(placed).text())
+    system = elastic(placed)
     number = stability_number(system)
     system.check_touching()
-    for warning in [*position_warnings(system), *doubts(loaded), *initial_warnings(system)]:
+    warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
+    for warning in warnings:
         log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "

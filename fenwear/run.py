@@ -171,7 +171,7 @@ class _Run:
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
-        self.warnings += [*position_warnings(system), *doubts(self.case)]
+        self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())

@@ -56,6 +56,16 @@ class Bodies:
         """Number of degrees of freedom of both displacements."""
         return self.punch.size + self.strip.size
 
+    @property
+    def last_resorts(self) -> list[str]:
+        """What is to be said of elements that had better be others."""
+        return [
+            f"geometry.degree: the {body.body.name} is of tetrahedra of degree 1, a last resort: they are too stiff, "
+            "and pressures of a small contact are wrong by a sixth; expected degree 2, or hexahedra"
+            for body in (self.punch, self.strip)
+            if body.surface.cell == "triangle" and body.surface.degree == 1
+        ]
+
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""
         punch, strip = (

@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.needs import Needs, check_memory, needs
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
 from fenwear.bodies.response import Request
@@ -108,8 +109,18 @@ class Tribosystem(Placed):
         )
 
 
+def needs_of(placed: Placed) -> Needs:
+    """Return what the set-up of placed bodies will take; collective."""
+    return needs(placed, _frame(placed))
+
+
 def elastic(placed: Placed) -> Tribosystem:
-    """Condense both bodies and join them in every phase: factors both stiffnesses; collective."""
+    """Condense both bodies and join them in every phase: factors both stiffnesses; collective.
+
+    Raises:
+        CaseError: there is not memory enough.
+    """
+    check_memory(placed, needs_of(placed))
     condensed = condense_bodies(placed)
     return joined(placed, condensed)
 

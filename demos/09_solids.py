@@ -23,7 +23,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray
-from IPython.display import display
+from IPython import display as screen
 
 from fenwear import assemble, load_case, steady
 from fenwear.report.maps import cuts_figure, map_figure, quantities
@@ -74,8 +74,8 @@ print(f"volume worn in the last turn {float(history.worn_volume[-1]):.6g} mm³, 
 
 # %%
 history, summary = run("pin-on-disc", f"run.half_cycles={100 if COARSE else 2000}", *LINEAR)
-display(map_figure(history, quantities(history)["pressure_map"], [int(n) for n in history.half_cycle[::2]]))
-display(cuts_figure(history, [int(n) for n in history.half_cycle[::2]], along=True))
+screen.display(map_figure(history, quantities(history)["pressure_map"], [int(n) for n in history.half_cycle[::2]]))
+screen.display(cuts_figure(history, [int(n) for n in history.half_cycle[::2]], along=True))
 worn = summary["punch"]
 print(f"worn: {worn['worn_volume_mm3']:.4g} mm³, at most {1e3 * worn['largest_depth_mm']:.3g} µm deep")
 
@@ -90,7 +90,7 @@ history, summary = run("ball-on-flat", f"run.half_cycles={10 if COARSE else 40}"
                        "geometry.parameters.across=6", "geometry.degree=1", "geometry.order=1")  # fmt: skip
 chosen = [int(history.half_cycle[-1])]
 for name in ("wear_map", "wear_strip_map"):
-    display(map_figure(history, quantities(history)[name], chosen))
+    screen.display(map_figure(history, quantities(history)[name], chosen))
 for body, coefficient in (("punch", 1e-8), ("strip", 2e-8)):
     by_hand = coefficient * 20 * 0.2 * chosen[0]
     print(f"{body}: {summary[body]['worn_volume_mm3']:.6g} mm³, by hand {by_hand:.6g} mm³")

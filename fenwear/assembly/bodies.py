@@ -31,11 +31,8 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
-    <<<<<<< HEAD
         regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
-    =======
         densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
-    >>>>>>> main
     """
 
     punch: ElasticBody
@@ -54,7 +51,17 @@ class Bodies:
     @property
     def unknowns(self) -> int:
         """Number of degrees of freedom of both displacements."""
-        return self.punch.stiffness.size[0] + self.strip.stiffness.size[0]
+        return self.punch.size + self.strip.size
+
+    @property
+    def last_resorts(self) -> list[str]:
+        """What is to be said of elements that had better be others."""
+        return [
+            f"geometry.degree: the {body.body.name} is of tetrahedra of degree 1, a last resort: they are too stiff, "
+            "and pressures of a small contact are wrong by a sixth; expected degree 2, or hexahedra"
+            for body in (self.punch, self.strip)
+            if body.surface.cell == "triangle" and body.surface.degree == 1
+        ]
 
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""

@@ -34,7 +34,6 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
-from scipy.stats import wasserstein_distance
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, with_reduced_heat
@@ -404,6 +403,8 @@ def _force_difference(system: Tribosystem, first: Array, second: Array) -> float
     difference: a node at the edge closes as soon as the shape changes by what a node gives way, and a norm would be
     that of this node alone.
     """
+    from scipy.stats import wasserstein_distance  # half a second of imports, for jumps alone
+
     x, weights = system.pair.punch.x, system.pair.weights
     forces = [weights * first, weights * second]
     one, other = (float(force.sum()) for force in forces)

@@ -27,7 +27,7 @@ def write(system: Tribosystem, folder: Path, half_cycles: int) -> xarray.Dataset
     direction = int(block.direction[-1])
     phase = (half_cycles - 1) % system.motion.half_cycles
     fields = body_fields(system, block.pressure[-1], block.rigid[-1], phase, temperatures)
-    write_fields(folder, system, half_cycles, fields, direction, block.end.worn)
+    write_fields(folder, system, half_cycles, fields, direction, block.end.worn, block.pressure[-1])
     with xarray.open_dataset(folder / "fields" / f"half_cycle_{half_cycles:06d}.nc", engine="h5netcdf") as opened:
         return opened.load()
 
@@ -80,7 +80,7 @@ def test_torsion_of_rings(assembled: Callable[..., Tribosystem]) -> None:
     elastic = system.bodies.strip
     radius = ufl.SpatialCoordinate(elastic.body.mesh)[0]
     load = elastic.surface_integral(ufl.as_vector((2.5 * radius, 0.0)), contact_tag(elastic.body))
-    force = elastic.trace.pick(load.array_r[:, None])[:, 0, 0]
+    force = elastic.trace.pick(load[:, None])[:, 0, 0]
     assert force @ elastic.surface.trace[:, 0] == pytest.approx(2.5 * np.pi / 2 * (30**4 - 20**4), rel=1e-12)
     u = shear_out_of_plane(elastic, elastic.trace.blocks, force)
     r, z = u.function_space.tabulate_dof_coordinates()[:, :2].T

@@ -35,6 +35,7 @@ CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (
 SetOption = Annotated[
     list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
 ]
+FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -72,6 +73,7 @@ def run(
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    fresh: FreshOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
@@ -85,7 +87,9 @@ def run(
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True)
+    summary, directory = run_case(
+        loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True, fresh=fresh
+    )
     if as_json:
         _print_json(summary)
     else:
@@ -95,7 +99,12 @@ def run(
 
 
 @app.command("steady")
-def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+def steady_command(
+    case: CaseArgument,
+    settings: SetOption = [],  # noqa: B006
+    fresh: FreshOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
@@ -103,7 +112,7 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
 
     begin = time.perf_counter()
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="reduced")
+    system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
     warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
@@ -474,6 +483,7 @@ def info_command(
     as_json: JsonOption = False,
 ) -> None:
     """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
+    from fenwear.bodies import kept
     from fenwear.case.keys import find_keys
     from fenwear.versions import versions
 
@@ -485,10 +495,14 @@ def info_command(
             print("\n".join(k.text() for k in found))
         return
     if as_json:
-        _print_json({"versions": versions(), "cases": builtin_cases()})
+        _print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})
         return
     for name, version in versions().items():
         print(f"{name:14} {version}")
+    state = kept.summary()
+    print(
+        f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}"
+    )
     print("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
         print(f"  {name:26} {title}")

@@ -55,6 +55,7 @@ def run_case(
     progress: Progress = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
     last: bool = False,
+    fresh: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
 
@@ -67,6 +68,7 @@ def run_case(
         progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
         last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Returns:
         The summary and the folder.
@@ -85,7 +87,7 @@ def run_case(
             )
         return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
     begin = time.perf_counter()
-    system = assemble(case, comm, heat=preparation_of(case))
+    system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
     if not resume:
         system.check_touching()
     setup = time.perf_counter() - begin

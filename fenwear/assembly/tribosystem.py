@@ -114,18 +114,24 @@ def needs_of(placed: Placed) -> Needs:
     return needs(placed, _frame(placed))
 
 
-def elastic(placed: Placed) -> Tribosystem:
-    """Condense both bodies and join them in every phase: factors both stiffnesses; collective.
+def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
+    """Condense both bodies and join them in every phase; collective.
+
+    Factors both stiffnesses, unless the bodies are kept on disk.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
 
     Raises:
         CaseError: there is not memory enough.
     """
     check_memory(placed, needs_of(placed))
-    condensed = condense_bodies(placed)
+    condensed = condense_bodies(placed, fresh=fresh)
     return joined(placed, condensed)
 
 
-def condense_bodies(placed: Placed) -> Condensed:
+def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
     """Condense both bodies onto what the phases of the motion ask for; collective."""
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
@@ -143,7 +149,7 @@ def condense_bodies(placed: Placed) -> Condensed:
         onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1])
     else:
         onto_strip = Request(bodies.strip, csr_array(middle.transfer.T), middle.normal_on_strip, couplings[1])
-    punch, strip = condense_together([onto_punch, onto_strip])
+    punch, strip = condense_together([onto_punch, onto_strip], keep=True, fresh=fresh)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()

@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
+from fenwear.bodies import kept
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import make_together, solve_together
 from fenwear.bodies.response import Request, respond_together
@@ -42,6 +43,11 @@ class CondensedBody:
     response: Array
     by_load: Array
     by_temperature: Array | None = None
+
+    def arrays(self) -> dict[str, Array]:
+        """Return what was solved for, by its name."""
+        found = {"response": self.response, "by_load": self.by_load}
+        return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
 
     def normal_response(self, normal: Array, reading: csr_array | None = None) -> Array:
         """Return the displacement along e_n at each contact node from unit forces along the axes at each (n, n, d).
@@ -89,21 +95,46 @@ def condense(
     return condense_together([Request(elastic, patterns, directions, thermal_coupling)])[0]
 
 
-def condense_together(requests: Sequence[Request]) -> list[CondensedBody]:
+def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh: bool = False) -> list[CondensedBody]:
     """Condense bodies onto patterns of force, each on a rank of its own at once; collective.
 
     One elimination gives the Schur complement of the surface, or one factor a solution for each pattern
     and direction. With the coupling G of thermal expansion the solutions give B^T K^-1 G, as K is symmetric.
 
+    Args:
+        requests: Of the bodies, with their patterns.
+        keep: Whether the results are kept on disk, and taken from there where they are.
+        fresh: Compute them whatever is kept.
+
     Raises:
+        CaseError: the limit of what is kept is no number.
         ConvergenceError: a stiffness has no factor.
         ValueError: a thermal coupling with all axes.
     """
     if any(one.thermal_coupling is not None and one.directions is None for one in requests):
         raise ValueError("the response to temperature needs one direction for each pattern")
+    comm = requests[0].elastic.body.mesh.comm
+    if not keep or comm.bcast(kept.limit()) == 0:
+        return _condensed(requests)
+    keys = [kept.common_key(comm, [kept.surroundings(), *one.identity()]) for one in requests]
+    stored = [None if fresh else kept.load(comm, key) for key in keys]
+    computed = iter(_condensed([one for one, found in zip(requests, stored, strict=True) if found is None]))
+    condensed = []
+    for one, key, found in zip(requests, keys, stored, strict=True):
+        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found)
+        if found is None:
+            kept.save(comm, key, body.arrays())
+        condensed.append(body)
+    return condensed
+
+
+def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
+    """Factor and solve; collective."""
+    if not requests:
+        return []
     factors = [
         one.elastic.begin_factor(number, with_surface=one.by_surface) for number, one in enumerate(reversed(requests))
-    ][::-1]  # the first rank, which made the mesh, gets the last one
+    ][::-1]  # the first rank gets the last one
     make_together(factors)
     found = respond_together(requests)
     loads = solve_together(factors, [one.elastic.load for one in requests])

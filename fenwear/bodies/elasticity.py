@@ -94,7 +94,7 @@ class ElasticBody:
         self.supported = self._owned_dofs(self._bcs)
         self._set_loads(description.loads)
         try:
-            self._form = fem.form(a)
+            self._ufl, self._form = a, fem.form(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
         self._factors: list[Factor] = []  # none or one, of all bodies that differ by their loads
@@ -130,6 +130,14 @@ class ElasticBody:
         matrix = assembled(self._form, self._bcs)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         return matrix
+
+    def identity(self) -> list[object]:
+        """Return all that this rank's part of K and f follows from: the form, its values, the mesh, the supports."""
+        mesh, form = self.body.mesh, self._ufl
+        values = [constant.value for constant in form.constants()]
+        values += [function.x.array for function in form.coefficients()]
+        nodes = [mesh.geometry.x, compat.geometry_dofmap(mesh), self.space.dofmap.list]
+        return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs]
 
     @property
     def factor(self) -> Factor:

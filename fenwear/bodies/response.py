@@ -55,6 +55,12 @@ class Request:
         """Number of columns q a."""
         return int(self.patterns.shape[1] * self.along.shape[2])
 
+    def identity(self) -> list[object]:
+        """Return all that the answer follows from, on this rank."""
+        patterns, coupling = csr_array(self.patterns), self.thermal_coupling
+        values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
+        return [*self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
+
     def forces(self, columns: NDArray[np.int64]) -> Array:
         """Return the forces on the trace nodes of some columns (N, d, k): column l a is pattern l along direction a."""
         count = self.along.shape[2]

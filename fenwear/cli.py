@@ -130,14 +130,14 @@ def steady_command(
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     _print_json(
         {
-            "x": system.pair.x.tolist(),
+            **_coordinates(system),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
             "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
             "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
             "growth_rate": rate,
-            "contact_width": state.contact_width.tolist(),
+            "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
             "cycles_to_1_percent": cycles,
@@ -146,6 +146,15 @@ def steady_command(
             "warnings": warnings,
         }
     )
+
+
+def _coordinates(system: Tribosystem) -> dict[str, Any]:
+    """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
+    if system.case.model.kind == "plane":
+        return {"x": system.pair.x.tolist()}
+    x = system.pair.punch.x
+    names = ("r", "z") if x.shape[1] == 2 else ("x", "y", "z")
+    return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
 def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:

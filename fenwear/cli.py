@@ -112,6 +112,9 @@ def steady_command(
 
     begin = time.perf_counter()
     loaded = _load(case, settings)
+    if loaded.contact.law == "coulomb":
+        _print_final(case, loaded, as_json=as_json)
+        return
     system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
@@ -130,14 +133,14 @@ def steady_command(
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     _print_json(
         {
-            "x": system.pair.x.tolist(),
+            **_coordinates(system),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
             "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
             "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
             "growth_rate": rate,
-            "contact_width": state.contact_width.tolist(),
+            "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
             "cycles_to_1_percent": cycles,
@@ -146,6 +149,26 @@ def steady_command(
             "warnings": warnings,
         }
     )
+
+
+def _print_final(name: str, case: Case, *, as_json: bool) -> None:
+    """Print the shape to which partial slip wears."""
+    from fenwear.stick.command import final_of, final_text
+
+    _, numbers = final_of(case)
+    if as_json:
+        _print_json(numbers)
+    else:
+        print(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
+
+
+def _coordinates(system: Tribosystem) -> dict[str, Any]:
+    """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
+    if system.case.model.kind == "plane":
+        return {"x": system.pair.x.tolist()}
+    x = system.pair.punch.x
+    names = ("r", "z") if x.shape[1] == 2 else ("x", "y", "z")
+    return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
 def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
@@ -220,6 +243,15 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
+    if loaded.contact.law == "coulomb":
+        from fenwear.stick.command import check_text
+
+        text = check_text(loaded)
+        for warning in doubts(loaded):
+            log(f"warning: {warning}")
+        print(loaded.to_toml())
+        log(text)
+        return
     placed = place_case(loaded)
     log(needs_of(placed).text())
     system = elastic(placed)

@@ -31,11 +31,8 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
-    <<<<<<< HEAD
         regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
-    =======
         densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
-    >>>>>>> main
     """
 
     punch: ElasticBody

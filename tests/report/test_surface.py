@@ -14,6 +14,7 @@ from matplotlib.text import Text
 
 from fenwear import load_case
 from fenwear.report.animation import draw_animation
+from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.figures import read_history
 from fenwear.report.maps import LEVELS, map_figure, quantities
 from fenwear.report.page import numbers_of
@@ -261,3 +262,15 @@ def test_strip_below_its_own_track(folders: dict[str, Path]) -> None:
     assert np.ptp(strip.map[:, 0]) == pytest.approx(np.ptp(punch.map[:, 0]) + 0.2, rel=1e-6)
     figure = turned_figure(history, [1, 4])
     assert [trace["name"] for trace in figure["data"]] == [q.title for q in quantities(history).values()]
+
+
+@pytest.mark.parametrize(("names", "lines"), [(["pin-on-disc", "ball-on-flat"], 4), (["ring-on-ring"] * 2, 2),
+                                              (["ring-on-ring", "pin-on-disc"], 0)])  # fmt: skip
+def test_compared(folders: dict[str, Path], tmp_path: Path, names: list[str], lines: int) -> None:
+    """Runs of one model have their cuts, or lines over the radius, on common axes; others their series."""
+    found = compare([folders[name] for name in names])
+    figure = comparison_figure(found)
+    assert len(figure.axes) == lines + 2
+    assert all(len(ax.get_lines()) == 2 for ax in figure.axes)
+    assert draw_comparison(found, tmp_path / "both.png").stat().st_size > 10_000
+    assert "forward.max_pressure_MPa" in found.numbers

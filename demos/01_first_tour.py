@@ -147,7 +147,7 @@ peak_figure(history)
 # %% [markdown]
 # ## Stress in the bodies
 #
-# The folder `fields` has displacement and stress in both bodies at the last half-cycle: as `.bp` for ParaView, and as
+# The folder `fields` has displacement and stress in both bodies at the last half-cycle: as a series for ParaView, and as
 # plain NetCDF of nodes and values, which any plotting library can draw.
 
 # %%

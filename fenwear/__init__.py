@@ -24,7 +24,9 @@ __all__ = [
     "load_case",
     "make_case",
     "march",
+    "register_law",
     "steady",
+    "sweep",
     "vary",
 ]
 
@@ -32,6 +34,7 @@ _HOMES = {
     "Case": "case",
     "load_case": "case",
     "make_case": "case",
+    "register_law": "case",
     "CaseError": "errors",
     "ConvergenceError": "errors",
     "FenwearError": "errors",
@@ -41,6 +44,7 @@ _HOMES = {
     "jump": "cycle",
     "march": "cycle",
     "steady": "cycle",
+    "sweep": "sweeps",
 }
 
 

@@ -21,9 +21,9 @@ def main() -> int:
     arguments, petsc_options = _split(sys.argv[1:])
     import numpy as np
     import petsc4py
+    from mpi4py import MPI  # before PETSc, which asks for no threads: a sweep on several ranks has one for its messages
 
     petsc4py.init([sys.argv[0], "-no_signal_handler", *petsc_options])  # signals are ours, or the system's
-    from mpi4py import MPI
     from petsc4py import PETSc
 
     comm = MPI.COMM_WORLD
@@ -46,6 +46,7 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
 
     from fenwear.cli import app
     from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError
+    from fenwear.signals import ignore_from_now_on
 
     try:
         result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
@@ -62,6 +63,8 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
         return 3
     except (InterruptedRunError, OutputError) as error:
         print(f"fenwear: {error}", file=sys.stderr)
+        if isinstance(error, InterruptedRunError):
+            ignore_from_now_on()
         return 1
     except (click.Abort, KeyboardInterrupt):
         print("fenwear: interrupted", file=sys.stderr)

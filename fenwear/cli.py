@@ -35,6 +35,7 @@ CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (
 SetOption = Annotated[
     list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
 ]
+FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -72,9 +73,11 @@ def run(
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    fresh: FreshOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.results.sheet import sheet_text
     from fenwear.run import Progress, run_case
 
     loaded = _load(case, settings)
@@ -84,15 +87,24 @@ def run(
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress)
+    summary, directory = run_case(
+        loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True, fresh=fresh
+    )
     if as_json:
         _print_json(summary)
     else:
+        if not quiet:
+            print(sheet_text(summary))
         say(f"results in {directory}")
 
 
 @app.command("steady")
-def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+def steady_command(
+    case: CaseArgument,
+    settings: SetOption = [],  # noqa: B006
+    fresh: FreshOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
@@ -100,10 +112,13 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
 
     begin = time.perf_counter()
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="reduced")
+    if loaded.contact.law == "coulomb":
+        _print_final(case, loaded, as_json=as_json)
+        return
+    system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    warnings = [*doubts(loaded), *steady_warnings(system, state)]
+    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
@@ -118,14 +133,14 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     _print_json(
         {
-            "x": system.pair.x.tolist(),
+            **_coordinates(system),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
             "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
             "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
             "growth_rate": rate,
-            "contact_width": state.contact_width.tolist(),
+            "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
             "cycles_to_1_percent": cycles,
@@ -136,12 +151,33 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     )
 
 
+def _print_final(name: str, case: Case, *, as_json: bool) -> None:
+    """Print the shape to which partial slip wears."""
+    from fenwear.stick.command import final_of, final_text
+
+    _, numbers = final_of(case)
+    if as_json:
+        _print_json(numbers)
+    else:
+        print(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
+
+
+def _coordinates(system: Tribosystem) -> dict[str, Any]:
+    """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
+    if system.case.model.kind == "plane":
+        return {"x": system.pair.x.tolist()}
+    x = system.pair.punch.x
+    names = ("r", "z") if x.shape[1] == 2 else ("x", "y", "z")
+    return {name: x[:, k].tolist() for k, name in enumerate(names)}
+
+
 def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     """Print the state as soon as it is there: the way to it may take longer."""
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
+    words = system.sliding.field.words
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
-        print(f"  strip moves {'rightward' if d > 0 else 'leftward':9} largest pressure {p.max():8.3f} MPa, "
+        print(f"  strip moves {words[d]:9} largest pressure {p.max():8.3f} MPa, "
               f"contact {part.format(width)}")  # fmt: skip
     print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
@@ -179,7 +215,7 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
     from fenwear.assembly import place_case
 
     system = place_case(_load(case, settings))
-    found = {name: system.optimum(d) for name, d in (("leftward", -1), ("rightward", 1))}
+    found = {name: system.optimum(d) for d, name in reversed(system.sliding.field.words.items())}
     if as_json:
         x = system.pair.x.tolist()
         _print_json(
@@ -201,21 +237,59 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import assemble
+    from fenwear.assembly import elastic, needs_of, place_case
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="none")
+    if loaded.contact.law == "coulomb":
+        from fenwear.stick.command import check_text
+
+        text = check_text(loaded)
+        for warning in doubts(loaded):
+            log(f"warning: {warning}")
+        print(loaded.to_toml())
+        log(text)
+        return
+    placed = place_case(loaded)
+    log(needs_of(placed).text())
+    system = elastic(placed)
     number = stability_number(system)
     system.check_touching()
-    for warning in [*position_warnings(system), *doubts(loaded), *initial_warnings(system)]:
+    warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
+    for warning in warnings:
         log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
+
+
+@app.command("new")
+def new_command(
+    template: Annotated[
+        str | None, typer.Argument(metavar="TEST", help="Such as block-on-ring; without it all are listed.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The case file to write; by default TEST.toml.")
+    ] = None,
+    settings: Annotated[
+        list[str], typer.Option("--set", metavar="DIMENSION=VALUE", help='A dimension: --set load="50 N"; repeatable.')
+    ] = [],  # noqa: B006
+    list_dimensions: Annotated[bool, typer.Option("--list", help="Print the dimensions and end.")] = False,
+) -> None:
+    """Write a commented case of a usual test, with its dimensions, to go on from."""
+    from fenwear.case.templates import all_text, dimensions_text, write_case_of
+
+    if template is None:
+        print(all_text())
+    elif list_dimensions:
+        print(dimensions_text(template))
+    else:
+        path = output or Path(f"{template}.toml")
+        on_root(MPI.COMM_WORLD, lambda: write_case_of(template, path, settings))
+        log(f"case in {path}; next: fenwear check {path}")
 
 
 @app.command("mesh")
@@ -400,6 +474,39 @@ def life_command(
     log(f"results in {folder}")
 
 
+@app.command("sweep")
+def sweep_command(
+    case: CaseArgument,
+    over: Annotated[
+        list[str],
+        typer.Option(metavar="KEY=VALUES", help="0.1:0.3:9 is nine values; or a list: 10 mm,12 mm; may be repeated."),
+    ] = [],  # noqa: B006
+    of: Annotated[str, typer.Option(metavar="WHAT", help="steady, optimum or run.")] = "steady",
+    zipped: Annotated[bool, typer.Option("--zip", help="First values together, second ones, and so on.")] = False,
+    table: Annotated[Path | None, typer.Option(help="CSV of variants: a heading of keys, then rows.")] = None,
+    processes: Annotated[int | None, typer.Option(help="Local processes; by default cores, where that pays.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Compute what the folder lacks.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")] = False,
+    settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Compute many variants of a case side by side: keys over their values, in one dataset."""
+    from fenwear.sweeps import command
+
+    dataset, folder = command.run_sweep(
+        _load(case, settings), Path(case).stem, over, table, of, output, log,
+        zipped=zipped, resume=resume, processes=processes, quiet=quiet,
+    )  # fmt: skip
+    if as_json:
+        _print_json(command.as_json(dataset))
+    else:
+        print(command.text(dataset))
+    log(f"results in {folder}")
+    if (dataset["trouble"].values != "").any():
+        raise typer.Exit(3)
+
+
 @app.command("info")
 def info_command(
     key: Annotated[
@@ -408,6 +515,7 @@ def info_command(
     as_json: JsonOption = False,
 ) -> None:
     """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
+    from fenwear.bodies import kept
     from fenwear.case.keys import find_keys
     from fenwear.versions import versions
 
@@ -419,10 +527,14 @@ def info_command(
             print("\n".join(k.text() for k in found))
         return
     if as_json:
-        _print_json({"versions": versions(), "cases": builtin_cases()})
+        _print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})
         return
     for name, version in versions().items():
         print(f"{name:14} {version}")
+    state = kept.summary()
+    print(
+        f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}"
+    )
     print("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
         print(f"  {name:26} {title}")

@@ -8,6 +8,7 @@ the equilibrium of force and moment (7), (18) by Newton's method. For a tilting 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ from scipy.optimize import linprog
 from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import RigidEquilibrium
+
+TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
 
 
 @dataclass(frozen=True)
@@ -35,11 +38,11 @@ class Optimum:
     tilt: Array
 
 
-def check_equilibrium(rigid: RigidEquilibrium, direction: int, friction_ratio: Array) -> None:
+def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) -> None:
     """Make sure that some pressure p >= 0 balances the loads.
 
     Args:
-        direction: Sliding direction d, for the message.
+        way: Word for the sliding direction, for the message.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
 
     Raises:
@@ -53,7 +56,6 @@ def check_equilibrium(rigid: RigidEquilibrium, direction: int, friction_ratio: A
     if len(target) and (
         size == 0 or linprog(np.zeros(rows.shape[1]), A_eq=rows / scale[:, None], b_eq=target / size).status
     ):
-        way = "rightward" if direction > 0 else "leftward"
         raise CaseError(
             InputError(
                 "punch.loads",
@@ -120,6 +122,41 @@ def optimum(
         pressure = pressure * zone
     tilt = np.arctan2(_tangential(rigid, velocity), modes @ velocity)
     return Optimum(pressure * p_mean, dict(zip(names, velocity.tolist(), strict=True)), residual, tilt)
+
+
+def optimum_on_track(
+    rigid: RigidEquilibrium,
+    friction_ratio: Array,
+    wear_rate: Array,
+    pressure_exponent: float,
+    recession: Callable[[Array], Array],
+    zone: Mask | None = None,
+) -> Optimum:
+    """Return the optimum of a punch on a strip that recedes by what is spread along its closed track.
+
+    With r(p) the recession, K p^b + r(p) = w_n: the same as K_eff p^b = w_n with K_eff = K + r(p) / p^b, which is
+    taken again until the pressure repeats.
+
+    Args:
+        rigid, friction_ratio, wear_rate, pressure_exponent, zone: As of `optimum`; K of the punch alone.
+        recession: The velocity at which the strip recedes opposite each node at pressures (n,), mm/s.
+
+    Raises:
+        ConvergenceError: Newton's method found no equilibrium, or the pressure does not come to rest.
+    """
+    b, rate = pressure_exponent, wear_rate
+    pressure: Array = np.full(len(wear_rate), rigid.mean_pressure)
+    for _ in range(TRACK_ROUNDS):
+        before, powered = pressure, pressure**b
+        touches = powered > 0
+        rate = wear_rate + np.where(touches, recession(pressure), 0.0) / np.where(touches, powered, 1.0)
+        found = optimum(rigid, friction_ratio, rate, b, zone)
+        pressure = found.pressure
+        if np.abs(pressure - before).max() <= AT_REST * pressure.max():
+            return found
+    raise ConvergenceError(
+        "the optimum on a closed track did not come to rest: the strip wears much more than the punch"
+    )
 
 
 def _tangential(rigid: RigidEquilibrium, velocity: Array) -> Array:

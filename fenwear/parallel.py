@@ -1,4 +1,9 @@
-"""Ranks: what one finds wrong, every rank raises; what they add up is the same to the last bit."""
+"""Ranks: what one finds wrong, every rank raises; what they add up is the same to the last bit.
+
+PETSc's objects on several ranks are freed by all of them together, so that petsc4py keeps those that
+Python drops until it is told to free them. What is large is destroyed where it was made, and the rest
+where `release` is called.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 T = TypeVar("T")
 
@@ -37,3 +43,18 @@ def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
     comm.Reduce(np.ascontiguousarray(partial), result, op=MPI.SUM, root=0)
     comm.Bcast(result, root=0)
     return result
+
+
+def lasting(comm: MPI.Comm) -> MPI.Comm:
+    """Return the communicator for PETSc's objects on these ranks: of all ranks the one that outlives their mesh.
+
+    A mesh has a communicator of its own, with which what was not freed before would stay.
+    """
+    alike = MPI.Comm.Compare(comm, MPI.COMM_WORLD) in (MPI.IDENT, MPI.CONGRUENT)
+    return MPI.COMM_WORLD if alike else comm
+
+
+def release(comm: MPI.Comm) -> None:
+    """Free the objects of PETSc that every one of these ranks has dropped; collective."""
+    if comm.size > 1:
+        PETSc.garbage_cleanup(lasting(comm))

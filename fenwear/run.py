@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Any, Literal
 
 import numpy as np
@@ -18,11 +16,12 @@ from tqdm import tqdm
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
-from fenwear.cycle import Block, follow, jump, march, stability_number, stationary_growth
+from fenwear.cycle import Block, Span, follow_program, jump, march, stability_number, stationary_growth
+from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
-from fenwear.report.page import try_report
 from fenwear.results import checkpoint
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -34,6 +33,8 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
+from fenwear.signals import Signals
+from fenwear.stick.run import run_stick
 from fenwear.watch import Watch
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -53,6 +54,8 @@ def run_case(
     resume: bool = False,
     progress: Progress = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
+    last: bool = False,
+    fresh: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
 
@@ -64,6 +67,8 @@ def run_case(
         resume: Go on from the checkpoint in `output`.
         progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
+        last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Returns:
         The summary and the folder.
@@ -75,23 +80,27 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    if case.model.kind != "plane":
-        reason = "results are written of plane models so far; `steady`, `optimum` and Python's march and jump take all"
-        raise CaseError(InputError("model.kind", reason))
+    if case.contact.law == "coulomb":
+        if resume:
+            raise CaseError(
+                InputError("--resume", "runs with contact.law = 'coulomb' start anew: they keep no checkpoint")
+            )
+        return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
     begin = time.perf_counter()
-    system = assemble(case, comm, heat=preparation_of(case))
+    system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
     if not resume:
         system.check_touching()
     setup = time.perf_counter() - begin
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
     try:
-        return _run(system, directory, log, progress, setup, resume=resume), directory
+        signals = Signals(comm, last=last)
+        return _run(system, directory, log, progress, setup, signals, resume=resume), directory
     except OutputError as error:
         raise OutputError(error.path, error.reason, on_root(comm, lambda: _way_on(directory))) from error
 
 
 def _run(
-    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, *, resume: bool
+    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, noted: Signals, *, resume: bool
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
@@ -105,7 +114,7 @@ def _run(
         how = {"stop": run.stop(failure), **times, "warnings": warnings, "retries": run.remedies}
         return run.finish(how, report=report)
 
-    with _Signals(system.comm) as signals:
+    with noted as signals:
         try:
             run.march(progress, signals)
         except ConvergenceError as error:
@@ -156,7 +165,7 @@ class _Run:
         self.writer: HistoryWriter | None = None  # of rank 0
         on_root(self.comm, lambda: self._open_history(None if start is None else start.half_cycle))
         self.start = start
-        self.state = start or RunState(0, system.unworn(), (), None)
+        self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
         self.extremes = {"largest_equilibrium_error": 0.0}
         self.warnings: list[str] = []
@@ -164,12 +173,12 @@ class _Run:
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
-        self.warnings += [*position_warnings(system), *doubts(self.case)]
+        self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
-        self._signals: _Signals | None = None
+        self._signals: Signals | None = None
         self._progress: _Progress | None = None
         self._block_begun = self._looked = time.monotonic()
         self._block_over = False
@@ -184,7 +193,7 @@ class _Run:
         writer = self.writer
         on_root(self.comm, lambda: None if writer is None else act(writer))
 
-    def march(self, progress: Progress, signals: _Signals) -> None:
+    def march(self, progress: Progress, signals: Signals) -> None:
         """Compute all half-cycles; collective.
 
         Raises:
@@ -222,7 +231,7 @@ class _Run:
         self._looked = now = time.monotonic()
         root, signals = self.comm.rank == 0, self._signals
         wishes = [
-            signals is not None and signals.received > 0,
+            signals is not None and signals.received,
             root and now > self._checkpoint_due,
             root and now > self._block_begun + BLOCK_SECONDS,
         ]
@@ -231,10 +240,12 @@ class _Run:
             self._save()
         if self._progress is not None:
             self._progress.working(self.state.half_cycle)
+        if interrupted and signals is not None:
+            signals.ending = True
         return bool(interrupted)
 
     def _blocks(self) -> Iterator[Block]:
-        for block in follow(self.system, self._integrate, self.start):
+        for block in follow_program(self.system, self._integrate, self._last, self.start):
             yield block
             if block.end.half_cycle >= self._last:  # meshes that nothing more is computed on need not follow
                 return
@@ -246,7 +257,7 @@ class _Run:
         return self.case.run.half_cycles // strokes * strokes
 
     def _integrate(
-        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]
+        self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
         shared: dict[str, Any] = {
@@ -255,15 +266,16 @@ class _Run:
             "stops": self._fields_at,
             "leave": leave,
             "watch": self._watch,
+            "loading": span.loading,
         }
         if run.integration == "jump":
-            return jump(system, run.half_cycles, tolerance=run.jump_tolerance, **shared)
-        return march(system, run.half_cycles, implicit=run.integration == "implicit", **shared)
+            return jump(system, span.until, tolerance=run.jump_tolerance, **shared)
+        return march(system, span.until, implicit=run.integration == "implicit", **shared)
 
     def _take(self, block: Block) -> None:
-        if block.system is not self.system:
+        if block.system.bodies.followed is not self.system.bodies.followed:
             self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
-            self.system = block.system
+        self.system = block.system
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
         if block.heat is not None:
@@ -293,8 +305,10 @@ class _Run:
         half_cycle, motion = int(block.half_cycle[-1]), self.system.motion
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
-        fields = body_fields(self.system, block.pressure[-1], block.rigid[-1], phase, temperatures)
-        write_fields(self.directory, self.system, half_cycle, fields, int(block.direction[-1]), block.end.worn)
+        pressed = at_loads(self.system, float(block.load_factor[-1]))
+        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures)
+        direction, worn = int(block.direction[-1]), block.end.worn
+        write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
@@ -333,6 +347,8 @@ class _Run:
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
+            from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
+
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 
@@ -350,29 +366,6 @@ class _Run:
         else:
             self.log(f"no growth rate of disturbances: {reason}")
         return reason
-
-
-class _Signals:
-    """Notes SIGINT and SIGTERM instead of dying at once."""
-
-    def __init__(self, comm: MPI.Comm) -> None:
-        self.comm, self.received = comm, 0
-
-    def __enter__(self) -> _Signals:
-        self._before = {s: signal.signal(s, self._note) for s in (signal.SIGINT, signal.SIGTERM)}
-        return self
-
-    def _note(self, number: int, _frame: FrameType | None) -> None:
-        if self.received:  # asked twice: at once, wherever in a solver this is, and with all ranks
-            os.write(2, b"fenwear: interrupted at once; what came after the last checkpoint is lost\n")
-            if self.comm.size > 1:
-                self.comm.Abort(1)
-            os._exit(1)
-        self.received = number
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
 
 
 def position_warnings(system: Tribosystem) -> list[str]:

@@ -8,6 +8,7 @@ DefineConstant[
   outer_radius = 100,
   angle = 60,             // of the pad, below 120
   pad_height = 12,
+  plate_height = 0,       // of a backing plate on the pad, a region of its own
   disc_height = 12,
   margin = 20,            // by which the disc is wider on each side, below inner_radius
   margin_angle = 20,      // by which it goes on beyond the pad's ends
@@ -15,12 +16,16 @@ DefineConstant[
   along = 6,              // elements over the pad's length
   margin_elements = 2,    // over each margin
   pad_layers = 2,         // elements over the height
+  plate_layers = 1,
   disc_layers = 2,
   growth = 1              // of an element's height over that of its neighbour towards the contact
 ];
 
 If(inner_radius <= 0 || outer_radius <= inner_radius || pad_height <= 0 || disc_height <= 0)
   Error("expected 0 < inner_radius < outer_radius, and positive heights");
+EndIf
+If(plate_height < 0 || plate_layers < 1)
+  Error("plate_height must not be negative, plate_layers at least 1");
 EndIf
 If(angle <= 0 || angle >= 120 || margin_angle < 0 || margin_angle >= 120)
   Error("angle must lie between 0 and 120, margin_angle between 0 and 120");
@@ -32,14 +37,6 @@ If(across < 1 || along < 1 || margin_elements < 1 || pad_layers < 1 || disc_laye
   Error("across, along, margin_elements, pad_layers and disc_layers must be at least 1, growth positive");
 EndIf
 
-heights[] = {pad_height, -disc_height};
-layers[] = {pad_layers, disc_layers};
-levels[] = {0, pad_height, -disc_height};
-o[] = {};
-For k In {0 : 2}
-  n = newp; Point(n) = {0, 0, levels[k]};
-  o[] += n;
-EndFor
 For body In {0 : 1}
   // Radii and angles of the grid, and the elements between them.
   x[] = {}; y[] = {}; nx[] = {}; ny[] = {};
@@ -57,19 +54,26 @@ For body In {0 : 1}
   If(body == 1 && margin_angle > 0)
     y[] += {angle / 2 + margin_angle}; ny[] += margin_elements;
   EndIf
-  mx = #x[]; my = #y[];
+  // Levels of the grid, and the elements between them.
+  z[] = {0, (body == 0) ? pad_height : -disc_height}; nz[] = {(body == 0) ? pad_layers : disc_layers};
+  If(body == 0 && plate_height > 0)
+    z[] += {pad_height + plate_height}; nz[] += {plate_layers};
+  EndIf
+  mx = #x[]; my = #y[]; mz = #z[]; o[] = {};
 
   // Points, lines along the radius, the circumference and z, faces and volumes by their place in the grid.
   p[] = {}; lx[] = {}; ly[] = {}; lz[] = {}; fx[] = {}; fy[] = {}; fz[] = {}; volumes~{body}[] = {};
-  For k In {0 : 1}
+  For k In {0 : mz - 1}
+    n = newp; Point(n) = {0, 0, z[k]};
+    o[] += n;
     For j In {0 : my - 1}
       For i In {0 : mx - 1}
-        n = newp; Point(n) = {x[i] * Cos(y[j] * Pi / 180), x[i] * Sin(y[j] * Pi / 180), k * heights[body]};
+        n = newp; Point(n) = {x[i] * Cos(y[j] * Pi / 180), x[i] * Sin(y[j] * Pi / 180), z[k]};
         p[] += n;
       EndFor
     EndFor
   EndFor
-  For k In {0 : 1}
+  For k In {0 : mz - 1}
     For j In {0 : my - 1}
       For i In {0 : mx - 2}
         l = newl; Line(l) = {p[i + mx * (j + my * k)], p[i + 1 + mx * (j + my * k)]};
@@ -80,20 +84,22 @@ For body In {0 : 1}
     For j In {0 : my - 2}
       For i In {0 : mx - 1}
         l = newl;
-        Circle(l) = {p[i + mx * (j + my * k)], o[k * (1 + body)], p[i + mx * (j + 1 + my * k)]};
+        Circle(l) = {p[i + mx * (j + my * k)], o[k], p[i + mx * (j + 1 + my * k)]};
         Transfinite Curve{l} = ny[j] + 1;
         ly[] += l;
       EndFor
     EndFor
   EndFor
-  For j In {0 : my - 1}
-    For i In {0 : mx - 1}
-      l = newl; Line(l) = {p[i + mx * j], p[i + mx * (j + my)]};
-      Transfinite Curve{l} = layers[body] + 1 Using Progression growth;
-      lz[] += l;
+  For k In {0 : mz - 2}
+    For j In {0 : my - 1}
+      For i In {0 : mx - 1}
+        l = newl; Line(l) = {p[i + mx * (j + my * k)], p[i + mx * (j + my * (k + 1))]};
+        Transfinite Curve{l} = nz[k] + 1 Using Progression (k == 0) ? growth : 1;
+        lz[] += l;
+      EndFor
     EndFor
   EndFor
-  For k In {0 : 1}
+  For k In {0 : mz - 1}
     For j In {0 : my - 2}
       For i In {0 : mx - 2}
         a = lx[i + (mx - 1) * (j + my * k)]; b = ly[i + 1 + mx * (j + (my - 1) * k)];
@@ -104,47 +110,59 @@ For body In {0 : 1}
       EndFor
     EndFor
   EndFor
-  For j In {0 : my - 1}
-    For i In {0 : mx - 2}
-      n = newll;
-      Curve Loop(n) = {lx[i + (mx - 1) * j], lz[i + 1 + mx * j], -lx[i + (mx - 1) * (j + my)], -lz[i + mx * j]};
-      s = news; Plane Surface(s) = {n};
-      fy[] += s;
+  For k In {0 : mz - 2}
+    For j In {0 : my - 1}
+      For i In {0 : mx - 2}
+        n = newll;
+        Curve Loop(n) = {lx[i + (mx - 1) * (j + my * k)], lz[i + 1 + mx * (j + my * k)],
+                         -lx[i + (mx - 1) * (j + my * (k + 1))], -lz[i + mx * (j + my * k)]};
+        s = news; Plane Surface(s) = {n};
+        fy[] += s;
+      EndFor
+    EndFor
+    For j In {0 : my - 2}
+      For i In {0 : mx - 1}
+        n = newll;
+        Curve Loop(n) = {ly[i + mx * (j + (my - 1) * k)], lz[i + mx * (j + 1 + my * k)],
+                         -ly[i + mx * (j + (my - 1) * (k + 1))], -lz[i + mx * (j + my * k)]};
+        s = news; Surface(s) = {n};
+        fx[] += s;
+      EndFor
     EndFor
   EndFor
-  For j In {0 : my - 2}
-    For i In {0 : mx - 1}
-      n = newll;
-      Curve Loop(n) = {ly[i + mx * j], lz[i + mx * (j + 1)], -ly[i + mx * (j + my - 1)], -lz[i + mx * j]};
-      s = news; Surface(s) = {n};
-      fx[] += s;
-    EndFor
-  EndFor
-  For j In {0 : my - 2}
-    For i In {0 : mx - 2}
-      n = newsl;
-      Surface Loop(n) = {fz[i + (mx - 1) * j], fz[i + (mx - 1) * (j + my - 1)], fy[i + (mx - 1) * j],
-                         fy[i + (mx - 1) * (j + 1)], fx[i + mx * j], fx[i + 1 + mx * j]};
-      v = newv; Volume(v) = {n};
-      volumes~{body}[] += v;
+  cells = (mx - 1) * (my - 1);
+  For k In {0 : mz - 2}
+    For j In {0 : my - 2}
+      For i In {0 : mx - 2}
+        n = newsl;
+        Surface Loop(n) = {fz[i + (mx - 1) * j + cells * k], fz[i + (mx - 1) * j + cells * (k + 1)],
+                           fy[i + (mx - 1) * (j + my * k)], fy[i + (mx - 1) * (j + 1 + my * k)],
+                           fx[i + mx * (j + (my - 1) * k)], fx[i + 1 + mx * (j + (my - 1) * k)]};
+        v = newv; Volume(v) = {n};
+        volumes~{body}[] += v;
+      EndFor
     EndFor
   EndFor
   Transfinite Surface{fx[], fy[], fz[]};
   Transfinite Volume{volumes~{body}[]};
   Recombine Surface{fx[], fy[], fz[]};
-  cells = (mx - 1) * (my - 1);
   contact~{body}[] = {fz[{0 : cells - 1}]};
-  far~{body}[] = {fz[{cells : 2 * cells - 1}]};
+  far~{body}[] = {fz[{cells * (mz - 1) : cells * mz - 1}]};
   sides~{body}[] = {}; ends~{body}[] = {};
-  For i In {0 : mx - 2}
-    ends~{body}[] += {fy[i], fy[i + (mx - 1) * (my - 1)]};
-  EndFor
-  For j In {0 : my - 2}
-    sides~{body}[] += {fx[mx * j], fx[mx - 1 + mx * j]};
+  For k In {0 : mz - 2}
+    For i In {0 : mx - 2}
+      ends~{body}[] += {fy[i + (mx - 1) * my * k], fy[i + (mx - 1) * (my - 1 + my * k)]};
+    EndFor
+    For j In {0 : my - 2}
+      sides~{body}[] += {fx[mx * (j + (my - 1) * k)], fx[mx - 1 + mx * (j + (my - 1) * k)]};
+    EndFor
   EndFor
 EndFor
 
-Physical Volume("punch_body") = volumes_0[];
+Physical Volume("punch_body") = volumes_0[0];
+If(plate_height > 0)
+  Physical Volume("punch_plate") = volumes_0[1];
+EndIf
 Physical Surface("punch_contact") = contact_0[];
 Physical Surface("punch_far") = far_0[];
 Physical Surface("punch_sides") = sides_0[];      // the inner and the outer one

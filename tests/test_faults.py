@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -96,10 +95,14 @@ def check_gone(processes: list[int]) -> None:
 
 def _runs(pid: int) -> bool:
     try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+        return _state(pid) not in "ZX"
     except (FileNotFoundError, ProcessLookupError):
         return False
-    return state not in "ZX"
+
+
+def _state(pid: int) -> str:
+    """Return the letter that ps shows for a process: R or S for one that runs, T for a stopped one, Z for a zombie."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
 
 
 def check_history(folder: Path) -> int:
@@ -278,17 +281,26 @@ def test_killed_ranks(fenwear: Run, tmp_path: Path, victims: int) -> None:
 
 
 def test_killed_at_any_moment(tmp_path: Path) -> None:
-    """Killed twelve times, at moments spread over several writes of history and checkpoint: always whole."""
-    for number in range(12):
-        folder = tmp_path / str(number)
-        with running(folder, "output.checkpoint=0.01") as process:
-            time.sleep(0.037 * number)
-            process.send_signal(signal.SIGKILL)
-            process.communicate(timeout=PATIENCE)
-        present = [name for name in ("checkpoint", "checkpoint.old") if (folder / name / "state.npz").exists()]
-        assert present
-        with np.load(folder / present[0] / "state.npz") as moment:
-            assert int(moment["half_cycle"]) <= check_history(folder) + 20
+    """What a killed run leaves is whole, at any of thirty moments spread over many writes of history and checkpoint.
+
+    The run is stopped, where a kill would have ended it, and goes on once its folder has been copied.
+    """
+    folder = tmp_path / "run"
+    reached = set()
+    with running(folder, "output.checkpoint=0.01") as process:
+        for number in range(30):
+            time.sleep(0.0037 * number)
+            process.send_signal(signal.SIGSTOP)
+            wait_until(lambda: _state(process.pid) == "T")
+            copy = tmp_path / str(number)
+            shutil.copytree(folder, copy)
+            process.send_signal(signal.SIGCONT)
+            present = [name for name in ("checkpoint", "checkpoint.old") if (copy / name / "state.npz").exists()]
+            assert present
+            with np.load(copy / present[0] / "state.npz") as moment:
+                assert int(moment["half_cycle"]) <= check_history(copy) + 20
+                reached.add(int(moment["half_cycle"]))
+    assert len(reached) > 3
 
 
 RICH = {
@@ -501,12 +513,42 @@ def test_wear_beyond_all_numbers(fenwear: Run, tmp_path: Path, coefficient: str,
     check_history(folder)
 
 
-def test_second_signal_ends_all_ranks(tmp_path: Path) -> None:
-    """Asked twice, a rank leaves at once and takes the other with it."""
+TWICE = """
+import os, signal
+from mpi4py import MPI
+from fenwear.signals import Signals
+
+with Signals(MPI.COMM_WORLD):
+    if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
+        os.kill(os.getpid(), signal.SIGTERM)
+        print("noted", flush=True)
+        os.kill(os.getpid(), signal.SIGINT)
+        print("too late", flush=True)
+    MPI.COMM_WORLD.Barrier()
+    MPI.COMM_WORLD.recv()  # for ever
+"""
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_second_signal_ends_all_ranks(run_python: Run, ranks: int) -> None:
+    """Asked twice, a rank leaves at once and takes the other with it, which waits for it."""
+    done = run_python("-c", TWICE, ranks=ranks)
+    assert done.returncode == 1
+    assert done.stdout == "noted\n"
+    assert "interrupted at once" in done.stderr
+
+
+def test_signals_until_the_end(tmp_path: Path) -> None:
+    """Those that come while an interrupted run ends do not kill it, to the last moment: the exit status stays."""
     folder = tmp_path / "run"
     with running(folder, "contact.solver='full'", ranks=2, case="example1") as process:
-        pid = ranks_of(process)[1]
-        os.kill(pid, signal.SIGTERM)
-        threading.Timer(0.2, lambda: Path(f"/proc/{pid}").exists() and os.kill(pid, signal.SIGTERM)).start()
-        process.communicate(timeout=PATIENCE)
-    assert process.returncode == 1
+        ranks = ranks_of(process)
+        os.kill(ranks[1], signal.SIGTERM)
+        wait_until((folder / "summary.json").exists)
+        while process.poll() is None:
+            with suppress(ProcessLookupError):
+                os.kill(ranks[1], signal.SIGTERM)
+            time.sleep(0.002)
+        messages = process.communicate()[1]
+    assert process.returncode == 1, messages
+    check_gone(ranks)

@@ -15,7 +15,8 @@ from fenwear.bodies.mesh import meshes_folder
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history
+from fenwear.results import history, sheet, surfaces
+from fenwear.stick import results as stick
 from fenwear.verify.suite import registered
 
 
@@ -100,6 +101,13 @@ class Commands(Written):
                 yield from _table(("option", "does"), rows)
 
 
+def _of_surfaces() -> dict[str, Any]:
+    """Return the variables that are others in solids and rings."""
+    plane = {**history.VARIABLES, **history.STRIP_VARIABLES}
+    found = surfaces.on_surfaces(plane)
+    return {name: variable for name, variable in found.items() if plane.get(name, ("", "", ""))[1:] != variable[1:]}
+
+
 class Results(Written):
     """The variables of history.nc."""
 
@@ -108,8 +116,22 @@ class Results(Written):
         heat = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in history.HEAT_TERMS.items()}
         groups: dict[str, Any] = {
             "In every run": history.VARIABLES,
+            "What a tribometer measures; with _strip of the strip": {
+                **sheet.SLIDING,
+                **{
+                    name: (over, unit, text.format(body="punch"))
+                    for name, (over, unit, text) in {
+                        **sheet.OF_A_BODY,
+                        **sheet.of_the_scar(("x",), ("length", "width")),
+                    }.items()
+                },
+            },
             "Where the strip wears": history.STRIP_VARIABLES,
+            "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
             "With heat": {**history.HEAT_VARIABLES, **heat},
+            "With heat.track": history.BULK,
+            "Of solids and rings instead, or as well": _of_surfaces(),
+            "With contact.law = coulomb, these alone": stick.VARIABLES,
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

@@ -12,7 +12,7 @@ takes again what a changed case makes necessary, and keeps the rest.
 """
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
-from fenwear.assembly.placed import Placed, Sliding, make_sliding, place
+from fenwear.assembly.placed import Clock, Placed, Sliding, make_sliding, place
 from fenwear.assembly.tribosystem import (
     Condensed,
     Preparation,
@@ -20,15 +20,17 @@ from fenwear.assembly.tribosystem import (
     elastic,
     gap_rows,
     heating_friction,
+    needs_of,
     preparation,
     steady_exchange,
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.assembly.variants import assemble, in_parts, place_case, vary, with_case
+from fenwear.assembly.variants import assemble, in_parts, place_case, set_up_by, vary, with_case
 
 __all__ = [
     "Bodies",
+    "Clock",
     "Condensed",
     "Placed",
     "Preparation",
@@ -43,9 +45,11 @@ __all__ = [
     "heating_friction",
     "in_parts",
     "make_sliding",
+    "needs_of",
     "place",
     "place_case",
     "preparation",
+    "set_up_by",
     "steady_exchange",
     "vary",
     "with_case",

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.case import Case, Dependence, Heat, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, InputError
 from fenwear.interface import (
     ContactPair,
@@ -23,11 +25,12 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import in_model, in_space
-from fenwear.optimum import Optimum, check_equilibrium, optimum
+from fenwear.optimum import Optimum, check_equilibrium, optimum, optimum_on_track
 from fenwear.remedies import Remedies
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion, make_motion
+from fenwear.sliding.track import on_closed_track
 from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
@@ -43,7 +46,7 @@ class Sliding:
         field: The velocity of the counter-body over the contact.
         friction: The law of friction.
         wear: The wear laws of punch and strip; None where a body does not wear.
-        track: Length of the closed track that the strip runs on, mm; None for its own nodes.
+        track: What closes the track that a strip which wears runs on: its length, mm, or 2 pi rad; None for none.
         to_and_fro: Whether the strip's worn track passes to and fro under the punch.
     """
 
@@ -65,7 +68,7 @@ def make_sliding(case: Case, parts: int = 1) -> Sliding:
         sliding_field,
         Friction(case.contact, sliding_field),
         (case.wear.punch, case.wear.strip),
-        case.motion.track if isinstance(case.motion, OneWay) else None,
+        _closed_track(case),
         case.passes and not one_way,
     )
 
@@ -79,9 +82,31 @@ def _sliding_field(case: Case) -> SlidingField:
     return ALONG_X if motion.axis == "x" else ALONG_Y
 
 
+def _closed_track(case: Case) -> float | None:
+    if isinstance(case.motion, OneWay):
+        return case.motion.track
+    turns = isinstance(case.motion, Rotation) and case.passes  # rings have their whole track under the punch
+    return 2 * math.pi if turns and case.wear.strip is not None else None
+
+
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
     x, y, z = (np.array(vector) / np.linalg.norm(vector)).tolist()
     return x, y, z
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When a motion began that is one of several.
+
+    Attributes:
+        half_cycles: Before it.
+        time: s.
+        slid: How far the motions before it went, mm or rad.
+    """
+
+    half_cycles: int = 0
+    time: float = 0.0
+    slid: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -98,6 +123,7 @@ class Placed:
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
         rigid: The same in the middle position under the mean loads.
         remedies: What had to be solved in another way.
+        clock: When its motion began.
     """
 
     bodies: Bodies
@@ -109,6 +135,17 @@ class Placed:
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
     remedies: Remedies = field(default_factory=Remedies)
+    clock: Clock = Clock()
+
+    def time(self, half_cycle: NDArray[np.int64]) -> Array:
+        """Return the time at the end of half-cycles of its motion, given by their numbers from 1, s."""
+        return self.clock.time + self.motion.time(np.asarray(half_cycle) - self.clock.half_cycles)
+
+    @property
+    def normal_force(self) -> float:
+        """The mean force of the loads on the contact, N; 0 where supports and not the contact carry it."""
+        force = self.rigid.mean_pressure * self.pair.weights.sum() * self.bodies.punch.thickness
+        return float(force) if "lambda_F" in self.rigid.mode_names else 0.0
 
     def __repr__(self) -> str:
         """Say in a line what it is."""
@@ -168,13 +205,16 @@ class Placed:
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
             slid.append(self.motion.sliding(exponent)[:, None] * self.slid**exponent)
-        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.sliding.track)
+        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction)
 
     @property
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
-        offsets = np.unique([phase.offset for phase in self.motion.phases])
-        return float(np.diff(offsets).max(initial=0.0) / np.median(np.diff(self.pair.x)))
+        offsets, pair = np.unique([phase.offset for phase in self.motion.phases]), self.pair
+        moved = np.diff(offsets).max(initial=0.0) * self.slid.max()
+        # Among the nodes of a solid there is no order along the sliding.
+        spacing = np.median(np.diff(pair.x)) if pair.punch.dim == 2 else np.sqrt(np.median(pair.weights))
+        return float(moved / spacing)
 
     @property
     def track_deepens(self) -> bool:
@@ -182,8 +222,18 @@ class Placed:
         return self.strip_wears and self.sliding.to_and_fro
 
     @property
+    def passing_laws(self) -> list[str]:
+        """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
+        laws = zip(("punch", "strip"), self.sliding.wear, strict=True)
+        given: dict[str, object] = {
+            f"wear.{body}.coefficient": law.coefficient for body, law in laws if law is not None
+        }
+        given["contact.friction"] = self.friction.contact.friction
+        return [key for key, value in given.items() if isinstance(value, Dependence) and value.passes]
+
+    @property
     def constant_coefficients(self) -> bool:
-        """Whether friction and wear are the same at any temperature, pressure and speed."""
+        """Whether friction and wear are the same at any temperature, pressure and speed, depth and distance."""
         return self.friction.constant and self.wear.constant
 
     @cached_property
@@ -221,8 +271,34 @@ class Placed:
         """Height of the elements at the contact nodes of both bodies, mm."""
         return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
+    @cached_property
+    def _places(self) -> tuple[tuple[Array, Array], ...]:
+        """Where the nodes are on the punch and on the strip's material in each phase, and in the middle at last."""
+        found = []
+        for facing in (*self.pairs, self.pair):
+            x = facing.punch.x
+            found.append((in_space(x), in_space(facing.placement.points_back(x))))
+        return tuple(found)
+
+    @cached_property
+    def _regions(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """Shares of the regions of punch and strip at the contact nodes (n,); none where there is one region alone."""
+        punch, strip = self.bodies.regions
+        onto = self.pair.material
+        return punch, {name: onto @ share for name, share in strip.items()}
+
+    def slid_after(self, half_cycles: float) -> float:
+        """Return how far the motion has gone after half-cycles from the start of the run, mm or rad."""
+        strokes, each = self.motion.half_cycles, sum(phase.distance for phase in self.motion.phases)
+        return self.clock.slid + (half_cycles - self.clock.half_cycles) / strokes * each
+
     def conditions(
-        self, phase: int | None, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
+        self,
+        phase: int | None,
+        pressure: Array | None = None,
+        temperatures: tuple[Array, Array] | None = None,
+        worn: Worn | None = None,
+        half_cycles: float | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
@@ -230,6 +306,8 @@ class Placed:
             phase: Its number; None for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
+            worn: Depths; by default none.
+            half_cycles: Done since the start of the run; by default those before its motion.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
@@ -237,10 +315,16 @@ class Placed:
             speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
         else:
             speed = self.motion.phases[phase].speed * self.slid[phase]
+        pair, slid = (self.pair, self.slid[0]) if phase is None else (self.pairs[phase], self.slid[phase])
+        none = np.zeros(n)
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
             speed,
             (initial, initial) if temperatures is None else temperatures,
+            self._places[-1 if phase is None else phase],
+            (none, none) if worn is None else (worn.punch, pair.material @ worn.strip),
+            slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
+            self._regions,
         )
 
     def friction_ratio(self, direction: int) -> Array:
@@ -278,7 +362,7 @@ class Placed:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
 
         K is the sum over both bodies of the mean of beta~ v^a (the punch's alone where their pressure
-        exponents differ), at the mean pressure. On a closed track the strip recedes evenly instead.
+        exponents differ), at the mean pressure. On a closed track the strip recedes by what is spread along it.
 
         Args:
             direction: Sliding direction d.
@@ -295,15 +379,20 @@ class Placed:
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
         bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.exponent == exponent]
-        on_track = wear.track is not None and wear.punch is not None
+        on_track = self.sliding.track is not None and wear.strip is not None
         rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
-        rate = rates[0] if on_track else np.sum([np.zeros(len(self.pair.weights)), *rates], axis=0)
-        found = optimum(self.rigid, self.friction_ratio(direction), rate, exponent, zone)
-        if on_track and wear.strip is not None and "lambda_F" in found.velocity:
-            depth = wear.worn(np.tile(found.pressure, (len(self.motion.phases), 1))).strip.mean()
-            velocity = {**found.velocity, "lambda_F": found.velocity["lambda_F"] + depth / self.motion.period}
-            return replace(found, velocity=velocity)
-        return found
+        ratio, phases = self.friction_ratio(direction), len(self.motion.phases)
+
+        def recession(pressure: Array) -> Array:
+            worn = wear.worn(np.tile(pressure, (phases, 1)))
+            return np.asarray(self.pair.material @ worn.strip / self.motion.period)
+
+        if on_track and wear.punch is not None:
+            return optimum_on_track(self.rigid, ratio, rates[0], exponent, recession, zone)
+        if on_track:  # the strip alone: of all pressures that wear it evenly, one that is even along it
+            rates = [recession(np.ones(len(self.pair.weights)))]
+        rate = np.sum([np.zeros(len(self.pair.weights)), *rates], axis=0)
+        return optimum(self.rigid, ratio, rate, exponent, zone)
 
 
 def place(
@@ -329,6 +418,8 @@ def place(
     if bodies.followed is None:
         check_distance(middle)
     _check_axis(middle, sliding)
+    if sliding.track is not None:
+        middle = on_closed_track(middle, sliding.field, sliding.track)
     whole = heat is None
     pairs = {
         offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
@@ -358,7 +449,7 @@ def place(
         rigid=rigid,
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        check_equilibrium(one, phase.direction, ratio)
+        check_equilibrium(one, sliding.field.words[phase.direction], ratio)
     return placed
 
 

@@ -22,11 +22,17 @@ from fenwear.assembly.tribosystem import (
     with_reduced_heat,
 )
 from fenwear.case import Case, Heat, changed_case
+from fenwear.errors import CaseError, InputError
 from fenwear.sliding.wear import Worn
 
 
 def assemble(
-    case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None, *, heat: Preparation = "as set"
+    case: Case,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    followed: Worn | None = None,
+    *,
+    heat: Preparation = "as set",
+    fresh: bool = False,
 ) -> Tribosystem:
     """Return the system of a case: all steps; collective.
 
@@ -36,12 +42,16 @@ def assemble(
         followed: Worn depths that the meshes follow; by default they are as they were made.
         heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    system = elastic(place_case(case, comm, followed))
+    if case.contact.law == "coulomb":
+        reason = "expected 'gross-sliding' here: with 'coulomb', `run`, `check`, `steady` and fenwear.stick go on"
+        raise CaseError(InputError("contact.law", reason))
+    system = elastic(place_case(case, comm, followed), fresh=fresh)
     if heat == "none":
         return system
     return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)
@@ -90,7 +100,7 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
         CaseError: the punch would tip over.
     """
     before = system.case
-    if not _same_bodies(before, case):
+    if set_up_by(before) != set_up_by(case):
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
     bodies, condensed, sliding = system.bodies, system.condensed, system.sliding
     if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
@@ -121,20 +131,10 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
     return cut if system.exchange is None else with_exchange(cut, reduced=system.exchange.reduced)
 
 
-def _same_bodies(one: Case, other: Case) -> bool:
-    """Return whether two cases have the same meshes, stiffnesses and thermal expansion."""
-    first, second = (
-        (
-            case.geometry,
-            case.folder,
-            case.model,
-            case.materials,
-            case.heat is None,
-            *((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip)),
-        )
-        for case in (one, other)
-    )
-    return first == second
+def set_up_by(case: Case) -> tuple[object, ...]:
+    """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
+    bodies = ((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip))
+    return (case.geometry, case.folder, case.model, case.materials, case.heat is None, *bodies)
 
 
 def _same_conduction(one: Case, other: Case) -> bool:

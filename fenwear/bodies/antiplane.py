@@ -1,10 +1,14 @@
-"""Displacement out of the plane: antiplane shear by tractions along y, a generalised plane state.
+"""Displacement out of the plane: antiplane shear by tractions along y, and torsion of rings by those around the axis.
 
 Nothing changes along y, so that u_y(x, z) obeys div(G grad u_y) = 0 on its own: pressure, gap and
-wear stay as they are without it. What supports a body in the plane is taken to hold it along y, too.
+wear stay as they are without it. In rings u_y is the displacement around the axis, and its shear strains are
+u_y,r - u_y / r and u_y,z. What supports a body in the plane is taken to hold it along y, too; a ring without supports
+is taken to be held from turning where it is loaded.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import basix.ufl
 import numpy as np
@@ -16,7 +20,19 @@ from petsc4py import PETSc
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
 from fenwear.bodies.elasticity import PREFIX, ElasticBody
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import factored
+from fenwear.bodies.material import measure
+from fenwear.case import Kind
+
+ON_AXIS = 1e-9  # of the contact's largest radius
+
+
+def shear_strain(u: Any, kind: Kind) -> Any:
+    """Return the shear strains (2,) of a displacement out of the plane, or around the axis of rings, in UFL."""
+    if kind != "axisymmetric":
+        return ufl.grad(u)
+    r = ufl.SpatialCoordinate(ufl.domain.extract_unique_domain(u))[0]
+    return ufl.as_vector((u.dx(0) - u / r, u.dx(1)))
 
 
 def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: Array) -> fem.Function:
@@ -25,7 +41,7 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
     Args:
         elastic: The body.
         blocks: Global numbers of the blocks of displacements at the loaded nodes (n,).
-        force: Per thickness (n,), N/mm.
+        force: Per thickness (n,), N/mm; of whole rings, N.
     """
     mesh, shear_modulus = elastic.body.mesh, elastic.law.shear_modulus
     element = basix.ufl.element("Lagrange", mesh.basix_cell(), elastic.space.ufl_element().degree)
@@ -38,22 +54,34 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
     start, stop = index_map.local_range
     own = (blocks >= start) & (blocks < stop)
     given.x.array[2 * (blocks[own] - start)] = force[own]
-    held.x.array[2 * (elastic.supported // 2)] = 1.0
+    held.x.array[2 * (_held(elastic) // 2)] = 1.0
     held.x.scatter_forward()
 
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    a = shear_modulus * ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx
+    strains = ufl.inner(shear_strain(u, elastic.law.kind), shear_strain(v, elastic.law.kind))
+    a = shear_modulus * strains * measure(mesh, elastic.law.kind) * ufl.dx
     supports = np.flatnonzero(held.x.array[2 * to_node] > 0).astype(np.int32)
     bc = fem.dirichletbc(PETSc.ScalarType(0), supports, space)
     matrix = assembled(a, [bc])
     matrix.setOption(PETSc.Mat.Option.SPD, True)
-    load, solution = matrix.createVecLeft(), fem.Function(space, name="displacement_out_of_plane")
+    solution = fem.Function(space, name="displacement_out_of_plane")
     owned = space.dofmap.index_map.size_local
-    load.array[:] = given.x.array[2 * to_node[:owned]]
-    load.array[supports[supports < owned]] = 0.0
+    load = given.x.array[2 * to_node[:owned]]
+    load[supports[supports < owned]] = 0.0
 
-    found = load.duplicate()
-    Factor(matrix, PREFIX, "cholesky").solve(load, found)
-    solution.x.array[:owned] = found.array_r
+    factor = factored(matrix, PREFIX, "cholesky", comm=mesh.comm, dim=elastic.dim)
+    solution.x.array[:owned] = factor.solve(load)
+    factor.free()
+    matrix.destroy()
     solution.x.scatter_forward()
     return solution
+
+
+def _held(elastic: ElasticBody) -> NDArray[np.int64]:
+    """Return owned degrees of freedom of the nodes that are held; collective."""
+    if elastic.law.kind != "axisymmetric" or not elastic.rigid_modes:
+        return elastic.supported.astype(np.int64)
+    owned = elastic.space.dofmap.index_map.size_local
+    radius = elastic.space.tabulate_dof_coordinates()[:owned, 0]
+    on_axis = 2 * np.flatnonzero(radius < ON_AXIS * elastic.surface.trace[:, 0].max())
+    return np.concatenate([np.flatnonzero(elastic.load), on_axis])

@@ -1,4 +1,4 @@
-"""Assembled matrices, the same to the last bit in every run on as many ranks.
+"""Assembled matrices and vectors, the same to the last bit in every run on as many ranks.
 
 PETSc adds what the ranks give to a row in the order in which it arrives; dolfinx's own matrices add it
 in the order of the ranks.
@@ -11,9 +11,12 @@ from typing import Any
 
 import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
-from dolfinx import fem
+from dolfinx import fem, la
 from petsc4py import PETSc
 from scipy.sparse import bsr_array
+
+from fenwear.arrays import Array
+from fenwear.parallel import lasting
 
 
 def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: bool = False) -> PETSc.Mat:
@@ -43,6 +46,65 @@ def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: b
     part.sort_indices()
     sizes = ((shape[0], maps[0].size_global * blocks[0]), (maps[1].size_local * blocks[1], shape[1]))
     csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
-    matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=form.mesh.comm)
+    matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=lasting(form.mesh.comm))
     matrix.assemble()
     return matrix
+
+
+def assembled_vector(form: Any) -> Array:
+    """Return the vector of a linear form on this rank's own degrees of freedom (owned,); collective.
+
+    Args:
+        form: Of UFL, or compiled.
+    """
+    vector = fem.assemble_vector(form if isinstance(form, fem.Form) else fem.form(form))
+    vector.scatter_reverse(la.InsertMode.add)
+    owned = vector.index_map.size_local * vector.block_size
+    return np.array(vector.array[:owned])
+
+
+def times(matrix: PETSc.Mat, fields: Array) -> Array:
+    """Return a matrix times this rank's part of fields (owned,) or (owned, k); collective."""
+    if fields.ndim == 1:
+        before, after = matrix.createVecRight(), matrix.createVecLeft()
+        before.array[:] = fields
+        matrix.mult(before, after)
+        result = np.array(after.array_r)
+        destroy(before, after)
+        return result
+    right = dense(matrix.getSizes()[1], fields, matrix.comm)
+    product = matrix.matMult(right)
+    result = np.array(product.getDenseArray())
+    destroy(right, product)
+    return result
+
+
+def transposed_times(matrix: PETSc.Mat, field: Array) -> Array:
+    """Return the transpose of a matrix times this rank's part of a field (owned,); collective."""
+    before, after = matrix.createVecLeft(), matrix.createVecRight()
+    before.array[:] = field
+    matrix.multTranspose(before, after)
+    result = np.array(after.array_r)
+    destroy(before, after)
+    return result
+
+
+def dense(sizes: tuple[int, int], fields: Array, comm: PETSc.Comm) -> PETSc.Mat:
+    """Return fields (owned, k) as a dense matrix; collective.
+
+    Args:
+        sizes: Of its rows, on this rank and in all.
+        fields: This rank's rows.
+        comm: The ranks.
+    """
+    matrix = PETSc.Mat().createDense((sizes, (PETSc.DECIDE, fields.shape[1])), comm=comm)
+    matrix.setUp()
+    matrix.getDenseArray()[:] = fields
+    matrix.assemble()
+    return matrix
+
+
+def destroy(*objects: PETSc.Object) -> None:
+    """Destroy objects of PETSc; collective where they are."""
+    for one in objects:
+        one.destroy()

@@ -15,16 +15,15 @@ from functools import cached_property
 from typing import Any
 
 import basix
-import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
+from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.mesh import BodyMesh
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
@@ -132,7 +131,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     degree, dim = space.ufl_element().degree, mesh.geometry.dim
     cell = basix.cell.subentity_types(space.element.basix_element.cell_type)[fdim][0].name
     points = space.tabulate_dof_coordinates()[:, :dim]
-    local, cells = _facet_dofs(body, space)
+    local, cells = facet_dofs(body, space)
     local = np.take_along_axis(local, _in_reference_order(local, points, cell, degree), axis=1)
     own = space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64).reshape(local.shape)
     inner = points[space.dofmap.list[cells]].mean(axis=1)
@@ -175,7 +174,7 @@ def trace_of(surface: Trace, vector: fem.FunctionSpace, space: fem.FunctionSpace
     return Trace(surface.surface, space, blocks)
 
 
-def _facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return the local blocks of this rank's own contact facets (f, k), corners first, and their cells (f,)."""
     topology, fdim = body.mesh.topology, body.mesh.topology.dim - 1
     topology.create_connectivity(fdim, fdim + 1)
@@ -229,9 +228,8 @@ def _integrals(
     own = np.flatnonzero((blocks >= start) & (blocks < stop))
     found = np.zeros((2, len(blocks), dim))
     for k, traction in enumerate((ufl.as_vector((1.0,) * dim), ufl.FacetNormal(body.mesh))):
-        vector = fem.petsc.assemble_vector(fem.form(measure * ufl.inner(traction, v) * ds))
-        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        found[k, own] = vector.array_r.reshape(-1, dim)[blocks[own] - start]
+        vector = assembled_vector(measure * ufl.inner(traction, v) * ds)
+        found[k, own] = vector.reshape(-1, dim)[blocks[own] - start]
     body.mesh.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
     weights, normals = found[0, :, 0], found[1]
     size = np.linalg.norm(normals, axis=1, keepdims=True)

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import basix.ufl
-import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import scipy.linalg
 import ufl
@@ -19,9 +18,9 @@ from ufl.algorithms.check_arities import ArityMismatch
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled
+from fenwear.bodies.assembly import assembled, assembled_vector
 from fenwear.bodies.contact_surface import contact_surface
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
 from fenwear.case import Body, Kind, Load, Support
@@ -57,9 +56,8 @@ class ElasticBody:
 
     Attributes:
         space: Vector Lagrange space on Gauss-Lobatto nodes, mm.
-        stiffness: K with all supports eliminated, per thickness, MPa.
         supported: The owned degrees of freedom that are held at zero.
-        load: f, per thickness, N/mm, zero where supported.
+        load: f of this rank's own degrees of freedom (owned,), per thickness, N/mm, zero where supported.
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
@@ -92,22 +90,20 @@ class ElasticBody:
 
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         a = ufl.inner(law.stress(u), strain_of(v, law.kind)) * measure(mesh, law.kind) * ufl.dx
-        bcs = supports + self._regularise()
-        self.supported = self._owned_dofs(bcs)
+        self._bcs = supports + self._regularise()
+        self.supported = self._owned_dofs(self._bcs)
         self._set_loads(description.loads)
         try:
-            form = fem.form(a)
+            self._ufl, self._form = a, fem.form(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
-        self.stiffness = assembled(form, bcs)
-        self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
-        self._factor: Factor | None = None
+        self._factors: list[Factor] = []  # none or one, of all bodies that differ by their loads
 
     def _set_loads(self, loads: Sequence[Load]) -> None:
         load = self._assemble_load(loads)
-        resultant = np.array([mode @ load.array_r for mode in self.rigid_modes])
+        resultant = np.array([mode @ load for mode in self.rigid_modes])
         self.rigid_resultant = total(self.body.mesh.comm, resultant)
-        load.array[self.supported] = 0.0
+        load[self.supported] = 0.0
         self.load = load
 
     def with_loads(self, loads: Sequence[Load]) -> ElasticBody:
@@ -124,11 +120,71 @@ class ElasticBody:
         return self.trace.pick(np.array(self.rigid_modes).T)
 
     @property
+    def size(self) -> int:
+        """Number of degrees of freedom on all ranks."""
+        return int(self.dim * self.space.dofmap.index_map.size_global)
+
+    def matrix_entries(self) -> int:
+        """Return about how many entries K has, without assembling it; collective.
+
+        On a grid of quadrilaterals or hexahedra of degree p a cell adds (p² + 2 p)^d pairs of nodes: along an
+        axis p - 1 inner nodes see p + 1 and the one at its end 2 p + 1.
+        """
+        topology, degree = self.body.mesh.topology, self.space.ufl_element().degree
+        if self.body.mesh.basix_cell().name in ("quadrilateral", "hexahedron"):
+            pairs = (degree**2 + 2 * degree) ** topology.dim
+            return int(self.dim**2 * topology.index_map(topology.dim).size_global * pairs)
+        pattern = fem.create_sparsity_pattern(self._form)
+        pattern.finalize()
+        return int(self.dim**2 * self.body.mesh.comm.allreduce(pattern.num_nonzeros))
+
+    @cached_property
+    def stiffness(self) -> PETSc.Mat:
+        """K with all supports eliminated, per thickness, MPa; collective at first use."""
+        matrix = assembled(self._form, self._bcs)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        return matrix
+
+    def identity(self) -> list[object]:
+        """Return all that this rank's part of K and f follows from: the form, its values, the mesh, the supports."""
+        mesh, form = self.body.mesh, self._ufl
+        values = [constant.value for constant in form.constants()]
+        values += [function.x.array for function in form.coefficients()]
+        nodes = [mesh.geometry.x, compat.geometry_dofmap(mesh), self.space.dofmap.list]
+        return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs]
+
+    @property
     def factor(self) -> Factor:
         """The Cholesky factor of K, made once; collective at first use."""
-        if self._factor is None:
-            self._factor = Factor(self.stiffness, PREFIX, "cholesky")
-        return self._factor
+        factor = self.begin_factor()
+        if not factor.is_made:
+            make_together([factor])
+        return factor
+
+    def begin_factor(self, owner: int = 0, *, with_surface: bool = False) -> Factor:
+        """Return the factor of K, made or yet to be made; collective at first use.
+
+        Args:
+            owner: The rank that gets it at first use.
+            with_surface: Whether it keeps the Schur complement of the surface's degrees of freedom.
+        """
+        if not self._factors:
+            kept = "stiffness" in self.__dict__
+            matrix = self.stiffness
+            surface = self.surface_dofs if with_surface else None
+            comm = self.body.mesh.comm
+            factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface)
+            self._factors.append(factor)
+            if not kept:  # all that needs it has it now
+                del self.stiffness
+                if factor.is_moved:
+                    matrix.destroy()
+        return self._factors[0]
+
+    @cached_property
+    def surface_dofs(self) -> NDArray[np.int64]:
+        """Global numbers of the degrees of freedom of the contact surface's trace nodes (N d,)."""
+        return np.asarray((self.dim * self.trace.blocks[:, None] + np.arange(self.dim)).ravel())
 
     def _supports(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
         key = f"{self.body.name}.supports"
@@ -263,18 +319,15 @@ class ElasticBody:
         coupling.zeroRows((self.supported + start).astype(np.int32), diag=0.0)
         return coupling
 
-    def surface_integral(self, traction: Any, tag: int) -> PETSc.Vec:
-        """Return the vector of the integral of traction . v over the facets tagged `tag`; collective."""
+    def surface_integral(self, traction: Any, tag: int) -> Array:
+        """Return the integral of traction . v over the facets tagged `tag` (owned,); collective."""
         ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.body.facet_tags)
         work = ufl.inner(traction, ufl.TestFunction(self.space)) * measure(self.body.mesh, self.law.kind)
-        vector = fem.petsc.assemble_vector(fem.form(work * ds(tag)))
-        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        return vector
+        return assembled_vector(work * ds(tag))
 
-    def _assemble_load(self, loads: Sequence[Load]) -> PETSc.Vec:
+    def _assemble_load(self, loads: Sequence[Load]) -> Array:
         mesh = self.body.mesh
-        zero = fem.Function(self.space)  # owns the memory of its petsc_vec
-        total = zero.x.petsc_vec.copy()
+        total = np.zeros(self.dim * self.space.dofmap.index_map.size_local)
         for number, load in enumerate(loads):
             tag = self.body.curve(load.on, f"{self.body.name}.loads.{number}.on")
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
@@ -282,7 +335,7 @@ class ElasticBody:
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
             resultant = load.force if load.traction is None else [area * component for component in load.traction]
             traction = np.array(resultant) / area
-            total.axpy(1.0, self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag))
+            total += self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag)
         return total
 
 

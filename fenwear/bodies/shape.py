@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.bodies.assembly import assembled_vector, destroy
 from fenwear.bodies.contact_surface import Trace, contact_surface, contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.mesh import BodyMesh
@@ -95,9 +96,7 @@ def element_height(elastic: ElasticBody) -> Array:
     w = ufl.TestFunction(elastic.space)[0]
     sums = []
     for f in (height, ufl.as_ufl(1.0)):
-        vector = fem.petsc.assemble_vector(fem.form(f * w * ds(tag)))
-        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        sums.append(elastic.trace.pick(vector.array_r[:, None])[:, 0, 0])
+        sums.append(elastic.trace.pick(assembled_vector(f * w * ds(tag))[:, None])[:, 0, 0])
     return sums[0] / sums[1]
 
 
@@ -151,6 +150,7 @@ def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) ->
     solution = fem.Function(space)
     ksp.solve(load.x.petsc_vec, solution.x.petsc_vec)
     solution.x.scatter_forward()
+    destroy(ksp, matrix)
     return solution
 
 

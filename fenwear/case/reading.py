@@ -12,9 +12,12 @@ import pydantic
 
 from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
+from fenwear.case.program import check_length, half_cycles_of, with_program
 from fenwear.case.schema import Case
 from fenwear.case.units import shown
 from fenwear.errors import CaseError, InputError
+
+PLACEHOLDER = 2  # half-cycles, until the program is read
 
 
 def builtin_cases() -> dict[str, str]:
@@ -66,6 +69,8 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if folder is not None and base.endswith(".toml"):
         base = str(folder / base)
     below, base_folder = _read_tables(base, (*base_of, base))
+    if "program" in data and isinstance(below.get("run"), dict) and "half_cycles" not in data.get("run", {}):
+        below["run"].pop("half_cycles", None)  # the program tells how far the run goes
     own_geometry = "file" in data.get("geometry", {})
     return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
 
@@ -86,10 +91,20 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
+    data = with_program(data, folder)
+    open_end = isinstance(data.get("program"), Mapping) and "half_cycles" not in data.get("run", {})
+    if open_end and isinstance(data.get("run", {}), Mapping):  # a program tells itself how far a run goes
+        data["run"] = {**data.get("run", {}), "half_cycles": PLACEHOLDER}
     try:
         case = Case.model_validate(data)
     except pydantic.ValidationError as error:
-        raise CaseError([p for e in error.errors() for p in problems_of(e, data)]) from None
+        # A list whose entries are wrong counts as too short besides.
+        found = [e for e in error.errors() if e["type"] != "too_short" or e["ctx"]["actual_length"] == len(e["input"])]
+        raise CaseError([p for e in found for p in problems_of(e, data)]) from None
+    if open_end:
+        run = case.run.model_copy(update={"half_cycles": half_cycles_of(case)})
+        case = case.model_copy(update={"run": run})
+    check_length(case)
     return case.at(folder, written(data, case.resolved()))
 
 

@@ -27,7 +27,16 @@ from pydantic import (
 )
 
 from fenwear.arrays import Array
-from fenwear.case.dependence import evaluate, parse_expression, variables_of
+from fenwear.case.dependence import (
+    UNITS,
+    VARIABLES,
+    check_law,
+    evaluate,
+    evaluate_law,
+    parse_expression,
+    variables_of,
+    variables_of_law,
+)
 from fenwear.case.units import convert, quantity_text, shown
 from fenwear.errors import CaseError, InputError
 
@@ -194,6 +203,10 @@ class Load(_Part):
                 raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
         return self
 
+    def times(self, factor: float) -> Load:
+        """Return the load times a factor at every time."""
+        return self._scaled(factor).model_copy(update={"over_cycle": self.over_cycle})
+
     def at(self, fraction: float) -> Load:
         """Return the load at this fraction of the cycle."""
         if self.over_cycle is None:
@@ -235,19 +248,31 @@ class Body(_Part):
 
 
 class Dependence(_Part):
-    """A coefficient that depends on T (K), p (MPa) or v (mm/s): an expression, or a table with straight lines."""
+    """A coefficient that depends on the state: an expression, a table with straight lines, values of regions, a law."""
 
-    expression: str | None = Field(default=None, description="arithmetic on T (K), p (MPa) and v (mm/s)")
+    expression: str | None = Field(
+        default=None,
+        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn) and s (mm, slid)",
+    )
     table: tuple[tuple[Number, Number], ...] | None = Field(
         default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
-    of: Literal["T", "p", "v"] = Field(default="T", description="argument of the table")
+    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s"] = Field(default="T", description="argument of the table")
+    regions: dict[str, Annotated[Number, Field(ge=0)]] | None = Field(
+        default=None, description="value of each material region of the body, of the punch for friction"
+    )
+    law: str | None = Field(default=None, description="name of a law registered in Python")
     unit: str = Field(default="", description="unit of the values")
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        if (self.expression is None) == (self.table is None):
-            raise ValueError("give either expression or table")
+        if sum(form is not None for form in (self.expression, self.table, self.regions, self.law)) != 1:
+            raise ValueError("give one of expression, table, regions and law")
+        if self.law is not None:
+            try:
+                check_law(self.law)
+            except ValueError as error:
+                raise ValueError(f"law: {error}") from None
         if self.expression is not None:
             try:
                 parse_expression(self.expression)
@@ -260,24 +285,46 @@ class Dependence(_Part):
         return self
 
     def depends_on(self, name: str) -> bool:
-        """Return whether T, p or v is in it."""
-        return name == self.of if self.table is not None else name in variables_of(self.expression or "")
+        """Return whether a variable such as T, p or depth is in it."""
+        if self.expression is not None:
+            return name in variables_of(self.expression)
+        if self.law is not None:
+            return name in variables_of_law(self.law)
+        return self.table is not None and name == self.of
+
+    @property
+    def varies(self) -> bool:
+        """Whether it changes with more than the place."""
+        return any(self.depends_on(name) for name in ("T", "p", "v", "depth", "s"))
+
+    @property
+    def passes(self) -> bool:
+        """Whether it changes as long as a run goes on: with the worn depth, or with what has been slid."""
+        return self.depends_on("depth") or self.depends_on("s")
 
     def values(self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str) -> Array:
-        """Return the coefficient times `factor` at T, p, v of the `state` (shape).
+        """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
 
         Raises:
             CaseError: it is negative or not finite somewhere; `key` is the case's key.
         """
         if self.table is not None:
             values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
+        elif self.regions is not None:
+            values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
+        elif self.law is not None:
+            try:
+                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES}, shape)
+            except ValueError as error:
+                raise CaseError(InputError(key, str(error))) from error
         else:
             values = evaluate(parse_expression(self.expression or ""), state, shape)
         wrong = ~(np.isfinite(values) & (values >= 0))
         if wrong.any():
             node = int(np.flatnonzero(wrong)[0])
-            at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g}" for name in ("T", "p", "v"))
-            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at} (K, MPa, mm/s)"))
+            named = [name for name in VARIABLES if name in ("T", "p", "v") or self.depends_on(name)]
+            at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
+            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at}"))
         return values * factor
 
 
@@ -294,8 +341,13 @@ def _constant_or_dependence(constant: Any) -> Any:
 
 
 class Contact(_Part):
-    """Unilateral contact with Coulomb friction in gross sliding."""
+    """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
 
+    law: Literal["gross-sliding", "coulomb"] = Field(
+        default="gross-sliding",
+        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
+        "as in fretting",
+    )
     friction: _constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
         default=0.0, description="mu"
     )
@@ -310,6 +362,43 @@ class Contact(_Part):
     def _pure_number(self) -> Self:
         if isinstance(self.friction, Dependence) and self.friction.unit:
             raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
+        return self
+
+
+class Stick(_Part):
+    """How the rig drives a contact with stick, and its time steps; with contact.law = "coulomb"."""
+
+    force: Annotated[Force, Field(gt=0)] | None = Field(
+        default=None,
+        description="largest tangential force on the strip, which then follows the course of the motion in place of "
+        "its displacement",
+    )
+    bulk_stress: Stress = Field(
+        default=0.0, description="largest bulk stress along x in the strip, as in fretting fatigue, with the motion"
+    )
+    bulk_over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None,
+        description="[fraction of the cycle, factor] pairs from 0 to 1 of the bulk stress; by default it follows the "
+        "motion",
+    )
+    steps: Annotated[int, Field(ge=2, le=1000, strict=True)] = Field(
+        default=20, description="time steps of a half-cycle, at least"
+    )
+    step_tolerance: Annotated[Number, Field(gt=0)] = Field(
+        default=0.02,
+        description="change of force and friction's work of the first cycle by which the steps are fine enough; they "
+        "are doubled until then",
+    )
+    load_steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(
+        default=5, description="in which the loads rise at the start"
+    )
+
+    @model_validator(mode="after")
+    def _bulk_table(self) -> Self:
+        if self.bulk_over_cycle is not None:
+            fractions = [fraction for fraction, _ in self.bulk_over_cycle]
+            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
+                raise ValueError("bulk_over_cycle: expected pairs [fraction, factor] with fractions rising from 0 to 1")
         return self
 
 
@@ -331,6 +420,12 @@ class WearLaw(_Part):
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )
     pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
+    pressure_threshold: Annotated[Stress, Field(ge=0)] = Field(
+        default=0.0, description="p_0: nothing wears below it, and above it (p - p_0)^b does"
+    )
+    pressure_cap: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None, description="such as the hardness: more pressure than it wears no more"
+    )
     speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
 
     @staticmethod
@@ -370,6 +465,8 @@ class WearLaw(_Part):
             value = getattr(self, key)
             if isinstance(value, float) and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{key}: expected a finite number, zero or larger")
+        if self.pressure_cap is not None and self.pressure_cap <= self.pressure_threshold:
+            raise ValueError("pressure_cap: expected more than pressure_threshold")
         if (self.archard is None) != (self.hardness is None):
             raise ValueError("hardness: expected together with archard, and only then")
         if (self.archard, self.energy) != (None, None) and (self.pressure_exponent, self.speed_exponent) != (1.0, 1.0):
@@ -557,6 +654,17 @@ PerfectOrConductance = Annotated[
 Motions = Reciprocating | OneWay | Tabulated | Oscillation | Rotation
 
 
+class Track(_Part):
+    """The rest of a disc or ring whose material passes under the punch, warms up and comes back."""
+
+    heat_capacity: Annotated[float, *_quantity("N*mm/K"), Field(gt=0)] = Field(
+        description="of what is not meshed, its mass times c; 1 J/K = 1000"
+    )
+    loss: Annotated[float, *_quantity("N*mm/(s*K)"), Field(ge=0)] = Field(
+        default=0.0, description="to the surroundings, its area times h; 1 W/K = 1000"
+    )
+
+
 class Heat(_Part):
     """Friction heat and its conduction; without this table a case knows no temperature."""
 
@@ -585,6 +693,7 @@ class Heat(_Part):
         description="of the strip's material that enters through free ends; by default, sliding one way, the "
         "ambient, and to and fro what has left comes back as it was",
     )
+    track: Track | None = Field(default=None, description="closed track of one-way sliding, which warms up as a whole")
     initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
     coupling: Literal["implicit", "split"] = Field(
@@ -638,6 +747,76 @@ class Run(_Part):
     )
 
 
+@dataclass(frozen=True)
+class OneOrTwo:
+    """One value, or two that are the ends of a ramp; in the JSON schema a value alone may stand for the list."""
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a value or a list."""
+        several = handler(core)
+        return {"anyOf": [several, several.get("items", {})]}
+
+
+def _ramp(quantity: Any) -> Any:
+    """Return the type of what is held, or goes from one value to another, in a step of a program."""
+    listed = BeforeValidator(lambda value: value if isinstance(value, list | tuple) else (value,))
+    return Annotated[tuple[quantity, ...], Field(min_length=1, max_length=2), OneOrTwo(), listed] | None
+
+
+class ProgramStep(_Part):
+    """A step of a test program: how long it takes, and what acts in it; [from, to] is a ramp."""
+
+    cycles: Annotated[int, Field(ge=1, strict=True)] | None = Field(default=None, description="how long it takes")
+    distance: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="or: of sliding")
+    time: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or: how long")
+    load: _ramp(Annotated[Force, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="normal force: all loads of the case change in its proportion"
+    )
+    load_factor: _ramp(Annotated[Number, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="or: all loads of the case times this"
+    )
+    speed: _ramp(Annotated[Speed, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of one-way sliding"
+    )
+    angular_speed: _ramp(Annotated[AngularFrequency, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of a rotation"
+    )
+    amplitude: _ramp(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of reciprocating sliding"
+    )
+    angular_frequency: _ramp(Annotated[AngularFrequency, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of reciprocating sliding or an oscillation"
+    )
+    period: _ramp(Annotated[Time, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="or: of a whole cycle"
+    )
+    ambient: _ramp(Temperature) = Field(  # type: ignore[valid-type]
+        default=None, description="heat.ambient"
+    )
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if sum(length is not None for length in (self.cycles, self.distance, self.time)) != 1:
+            raise ValueError("give one of cycles, distance and time: how long the step takes")
+        for one, other in (("load", "load_factor"), ("angular_frequency", "period")):
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise ValueError(f"{one}: give either {one} or {other}")
+        for key in ("speed", "angular_speed"):
+            if getattr(self, key) is not None and not any(getattr(self, key)):
+                raise ValueError(f"{key}: expected more than zero: nothing slides in this step")
+        return self
+
+
+class Program(_Part):
+    """A test program: steps one after the other. What a step does not name stays as it was."""
+
+    steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="in their order")
+    levels: Annotated[int, Field(ge=1, le=10000, strict=True)] = Field(
+        default=20,
+        description="that a ramp of motion or ambient temperature is cut into; loads change continuously",
+    )
+
+
 class Output(_Part):
     """What a run keeps."""
 
@@ -677,9 +856,11 @@ class Case(_Part):
     punch: Body = Field(description="the body above, body 1")
     strip: Body = Field(description="the body below, which slides, body 2")
     contact: Contact = Field(default=Contact(), description="between the two")
+    stick: Stick = Field(default=Stick(), description="of contact with stick: what the rig imposes, time steps")
     wear: Wear = Field(description="of punch, strip or both")
     motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
     heat: Heat | None = Field(default=None, description="without this table there is no temperature")
+    program: Program | None = Field(default=None, description="loads, motion and ambient temperature that change")
     run: Run = Field(description="how far, and how")
     output: Output = Field(default=Output(), description="what is kept")
 
@@ -706,6 +887,7 @@ class Case(_Part):
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
         problems += [*self._kind_problems(), *self._sliding_problems()]
+        problems += [*self._program_problems(), *self._stick_problems()]
         problems += [
             f"{body}.regions: missing, but required"
             for body, part in (("punch", self.punch), ("strip", self.strip))
@@ -739,16 +921,14 @@ class Case(_Part):
                 if vector is not None and len(vector) != len(axes)
             ]
         if isinstance(motion, Oscillation | Rotation):
-            if kind == "plane":
-                problems.append("motion.kind: expected reciprocating, one-way or table in a plane model")
+            if kind == "plane" and (motion.axis[0] or motion.axis[2] or not motion.axis[1]):
+                problems.append("motion.axis: expected [0, 1, 0], out of the plane, in a plane model")
             if kind == "axisymmetric" and (any(motion.axis[:2]) or any(motion.centre[:2])):
                 problems.append("motion.axis: expected the axis z of the rings, through x = y = 0")
         elif kind == "axisymmetric":
             problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
-        if kind == "axisymmetric" and self.heat is not None:
-            problems.append("heat: expected a plane model or a solid: heat is not followed in rings yet")
         if kind != "plane" and self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' but in plane models")
         return problems
@@ -756,7 +936,7 @@ class Case(_Part):
     @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
-        return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis == "x")
+        return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
 
     def _sliding_problems(self) -> list[str]:
         problems = []
@@ -764,9 +944,9 @@ class Case(_Part):
         least = 1 if one_way else 2
         if self.run.integration == "jump" and self.run.half_cycles < least:
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
-        if self.wear.strip is not None and self.passes:
+        if self.wear.strip is not None and self.passes and self.contact.law == "gross-sliding":
             problems += self._track_problems()
-        if not self.passes and self.heat is not None:
+        if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
@@ -779,27 +959,78 @@ class Case(_Part):
             problems += [
                 f"{key}: depends on the temperature T, which a case without the table heat does not know"
                 for key, value in given.items()
-                if isinstance(value, Dependence) and value.depends_on("T")
+                if isinstance(value, Dependence) and value.law is None and value.depends_on("T")
             ]
+        problems += self._region_problems()
         friction = self.contact.friction
         for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
             if law is not None and law.coefficient is None and law.archard is None and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
 
+    def _region_problems(self) -> list[str]:
+        """Return what is wrong with coefficients that are given by regions."""
+        given = {"contact.friction": (self.contact.friction, self.punch)}
+        for name, law, body in (("punch", self.wear.punch, self.punch), ("strip", self.wear.strip, self.strip)):
+            given[f"wear.{name}.coefficient"] = (None if law is None else law.coefficient, body)
+        problems = []
+        for key, (value, body) in given.items():
+            if not isinstance(value, Dependence) or value.regions is None:
+                continue
+            known = ", ".join(body.regions)
+            problems += [
+                f"{key}.regions.{r}: no such region; known are {known}" for r in value.regions.keys() - body.regions
+            ]
+            problems += [f"{key}.regions.{r}: missing, but required" for r in body.regions.keys() - value.regions]
+        return problems
+
+    def _program_problems(self) -> list[str]:
+        """Return what of a program does not go with the motion and the heat."""
+        if self.program is None:
+            return []
+        motion, problems = self.motion, []
+        turns = isinstance(motion, Oscillation | Rotation)
+        for number, step in enumerate(self.program.steps):
+            at = f"program.steps.{number}"
+            for key in ("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
+                known = key in type(motion).model_fields and not (key == "amplitude" and turns)
+                if getattr(step, key) is not None and not known:
+                    problems.append(f"{at}.{key}: does not change with motion.kind = '{motion.kind}'")
+            if step.distance is not None and turns:
+                problems.append(f"{at}.distance: expected cycles or time where the strip turns")
+            if step.ambient is not None and self.heat is None:
+                problems.append(f"{at}.ambient: expected a case with the table heat")
+        if self.contact.solver == "full":
+            problems.append("contact.solver: expected 'condensed' with a program")
+        if self.run.periodic_within is not None:
+            problems.append("run.periodic_within: a program ends with its last step; expected none")
+        return problems
+
     def _track_problems(self) -> list[str]:
         """Return what does not go with wear of a strip that passes under the punch."""
         motion = self.motion
-        if self.model.kind == "solid" and isinstance(motion, OneWay | Rotation):
-            return [
-                "wear.strip: not followed in solids around a closed track yet; expected the wear of the punch alone, "
-                "an axisymmetric model, or sliding to and fro"
-            ]
         if isinstance(motion, OneWay) and motion.track is None:
             return ["motion.track: missing, but required where the strip wears in one-way sliding"]
         if not isinstance(motion, OneWay | Rotation) and motion.positions == 1:
             return ["motion.positions: expected 2 or more, since the strip's wear spreads over the stroke"]
         return []
+
+    def _stick_problems(self) -> list[str]:
+        """Return what does not go with contact with stick."""
+        if self.contact.law == "gross-sliding":
+            return [] if self.stick == Stick() else ["stick: expected with contact.law = 'coulomb' only"]
+        wrong = {
+            "contact.friction: expected a constant": isinstance(self.contact.friction, Dependence),
+            "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
+            "contact.solver: expected 'condensed'": self.contact.solver == "full",
+            "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
+            "heat: expected none": self.heat is not None,
+            "program: expected none": self.program is not None,
+            "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
+            "motion.axis: expected 'x'": not self.passes,
+            "run.integration: expected 'explicit' or 'jump'": self.run.integration == "implicit",
+        }
+        return [f"{problem} with contact.law = 'coulomb'" for problem, so in wrong.items() if so]
 
     @property
     def varies(self) -> bool:
@@ -820,6 +1051,13 @@ class Case(_Part):
         ]
         if self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' with heat")
+        if heat.track is not None:
+            if not isinstance(self.motion, OneWay | Rotation):
+                problems.append("heat.track: expected one-way sliding: to and fro the same material stays")
+            if heat.inflow is not None:
+                problems.append("heat.inflow: expected none with heat.track, whose bulk comes in")
+            if heat.operator != "reduced":
+                problems.append("heat.operator: expected 'reduced' with heat.track")
         if heat.conductance_per_pressure is not None and heat.conductance != 0:
             problems.append("heat.conductance: give either conductance or conductance_per_pressure")
         return problems

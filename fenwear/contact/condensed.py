@@ -107,9 +107,8 @@ class CondensedContact:
         self._unit = np.concatenate([np.full(n, self._pressure_scale), self._rigid_scale])
         self._blocks = np.zeros((m, size, size))
         self._offset = np.zeros((m, size))
-        self._loads = np.array([phase.interface.load_gap for phase in self.phases])
-        for phase, block, offset in zip(self.phases, self._blocks, self._offset, strict=True):
-            offset[n:] = phase.interface.rigid.resultant / self._resultant_scale
+        self.press(1.0)
+        for phase, block in zip(self.phases, self._blocks, strict=True):
             block[:n, n:] = phase.interface.rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
         self._ratios = [phase.friction_ratio for phase in self.phases]
         for k, ratio in enumerate(self._ratios):
@@ -127,6 +126,13 @@ class CondensedContact:
         balance = interface.rigid.equilibrium(ratio)
         self._blocks[k, :n, :n] = interface.compliance(ratio) * (self._pressure_scale / self._gap_scale)
         self._blocks[k, n:, :n] = balance * (self._pressure_scale / self._resultant_scale[:, None])
+
+    def press(self, factor: float) -> None:
+        """Take all loads times a factor."""
+        n = self.shape[1]
+        self._loads = factor * np.array([phase.interface.load_gap for phase in self.phases])
+        for phase, offset in zip(self.phases, self._offset, strict=True):
+            offset[n:] = factor * phase.interface.rigid.resultant / self._resultant_scale
 
     def slide(self, ratios: Sequence[Array]) -> None:
         """Set tau of each phase, (n, d) each."""

@@ -10,6 +10,8 @@ change of the active set factors the whole system again.
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_array
@@ -19,6 +21,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.contact.condensed import ContactState, Layer
 from fenwear.contact.inequality import check, configure
 from fenwear.interface import Interface
+from fenwear.parallel import lasting
 
 # Where a step is cut off at p = 0 the gap, a function of u alone, is still zero up to rounding of either sign: this
 # much, over the scale of gaps, makes the node open.
@@ -34,7 +37,7 @@ class FullContact:
 
     def __init__(self, punch: ElasticBody, strip: ElasticBody, interface: Interface, friction_ratio: Array) -> None:
         self.interface = interface
-        self.comm = punch.body.mesh.comm
+        self.comm = lasting(punch.body.mesh.comm)
         rigid, pair = interface.rigid, interface.pair
         self._pressure_scale = rigid.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
@@ -61,8 +64,8 @@ class FullContact:
         self._free = sum(sizes)
         self._scale_system()
         self._constant = self._offset.array.copy()
-        self._constant[: sizes[0]] = -punch.load.array_r / self._force_scale
-        self._constant[sizes[0] : self._free] = -strip.load.array_r / self._force_scale
+        self._constant[: sizes[0]] = -punch.load / self._force_scale
+        self._constant[sizes[0] : self._free] = -strip.load / self._force_scale
         if self.comm.rank == 0:
             self._constant[self._free + n :] = rigid.resultant / self._force_scale
         self._build_snes()
@@ -89,7 +92,12 @@ class FullContact:
             lower.array[self._free : self._free + n] = 0.0
         self._bounds = (lower, upper)
         self.snes = PETSc.SNES().create(self.comm)
-        self.snes.setFunction(self._residual, self._x.duplicate())
+        own = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
+
+        def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+            own._residual(snes, x, f)
+
+        self.snes.setFunction(residual, self._x.duplicate())
         self.snes.setJacobian(lambda snes, x, J, P: None, self._operator)
         configure(self.snes, "fenwear_full_contact_")
         self.snes.setTolerances(atol=1e-9)  # the rounding of a system with all displacements in it
@@ -166,7 +174,7 @@ def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc
     free = np.ones(shape[0])
     free[elastic.supported] = 0.0
     local = csr_array(local.multiply(free[:, None]))
-    comm = elastic.body.mesh.comm
+    comm = lasting(elastic.body.mesh.comm)
     sizes = (elastic.stiffness.getSizes()[0], (shape[1] if comm.rank == 0 else 0, shape[1]))
     csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
     matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=comm)
@@ -176,7 +184,7 @@ def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc
 
 def _normals(elastic: ElasticBody, patterns: csr_array, normal: Array) -> PETSc.Mat:
     """Return N (n, dofs): the displacement along e_n that each contact node sees of this body; collective."""
-    comm, count = elastic.body.mesh.comm, len(normal)
+    comm, count = lasting(elastic.body.mesh.comm), len(normal)
     part = csr_array(patterns.T).tocoo()
     rows, nodes = part.coords
     dim = elastic.dim

@@ -8,16 +8,19 @@ from fenwear.cycle.follow import follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
+from fenwear.cycle.program import Span, follow_program
 from fenwear.cycle.stability import critical_speed, growth_rate, stability_number, stationary_growth
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
 
 __all__ = [
     "Block",
     "Monotonic",
+    "Span",
     "Steady",
     "critical_speed",
     "cycles_to_reach",
     "follow",
+    "follow_program",
     "growth_rate",
     "jump",
     "march",

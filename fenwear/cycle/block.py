@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState, pressure_scales
+from fenwear.cycle.totals import Totals
 from fenwear.sliding.wear import Worn
 
 
@@ -26,12 +28,14 @@ class BlockHeat:
         temperature_strip: Of the strip's (k, n), K.
         terms: Heat of each half-cycle by `fenwear.heat.exchange.TERMS` (k, 6), mJ.
         coupling_iterations: Of heat and contact (k,).
+        temperature_bulk: Of the bulk of the strip's closed track at the end (k,), K; NaN where there is none.
     """
 
     temperature_punch: Array
     temperature_strip: Array
     terms: Array
     coupling_iterations: NDArray[np.int64]
+    temperature_bulk: Array
 
     @property
     def max_temperature(self) -> Array:
@@ -53,11 +57,13 @@ class HalfCycleHeat:
     temperature_strip: Array
     terms: Array
     coupling_iterations: int
+    temperature_bulk: float = np.nan
 
     def then(self, later: HalfCycleHeat) -> HalfCycleHeat:
         """Return the heat of this phase and the next one."""
         iterations = max(self.coupling_iterations, later.coupling_iterations)
-        return HalfCycleHeat(later.temperature_punch, later.temperature_strip, self.terms + later.terms, iterations)
+        terms, bulk = self.terms + later.terms, later.temperature_bulk
+        return HalfCycleHeat(later.temperature_punch, later.temperature_strip, terms, iterations, bulk)
 
 
 @dataclass(frozen=True)
@@ -73,8 +79,8 @@ class Block:
         wear: Worn depth of the punch at its end (k, n), mm.
         wear_strip: Of the strip, on its material (k, n_strip), mm.
         rigid: Amplitudes of the rigid modes there (k, modes).
-        worn_area: Cross-section worn off the punch in it, the integral of its wear (k,), mm².
-        worn_area_strip: The same of the strip (k,), mm².
+        totals: What all half-cycles up to its end add up to, k of them.
+        adds: What it adds itself, k of them.
         optimum_distance: Largest distance to the optimal pressure of the present contact zone, over the pressure
             scale, see `fenwear.cycle.state.pressure_scale` (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
@@ -83,6 +89,7 @@ class Block:
         retries: What had to be solved in another way in it, a count (k,).
         heat: Temperatures and heat balance; None without heat.
         remedies: How it was solved then, and how often.
+        load_factor: Of all loads in it (k,).
         end: From where the run goes on.
     """
 
@@ -94,14 +101,15 @@ class Block:
     wear: Array
     wear_strip: Array
     rigid: Array
-    worn_area: Array
-    worn_area_strip: Array
+    totals: Totals
+    adds: Totals
     optimum_distance: Array
     periodicity: Array
     equilibrium_error: Array
     retries: NDArray[np.int64]
     heat: BlockHeat | None = field(default=None, kw_only=True)
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
+    load_factor: Array = field(kw_only=True)
     end: RunState = field(kw_only=True)
 
     def __len__(self) -> int:
@@ -110,12 +118,38 @@ class Block:
     @property
     def time(self) -> Array:
         """Time at the end of each half-cycle (k,), s."""
-        return self.system.motion.time(self.half_cycle)
+        return self.system.time(self.half_cycle)
+
+    @property
+    def load(self) -> Array:
+        """Mean normal force of each half-cycle (k,), N; 0 where supports and not the contact carry the loads."""
+        return self.system.normal_force * self.load_factor
+
+    @property
+    def speed(self) -> Array:
+        """Mean speed of the motion (k,), mm/s or rad/s."""
+        return np.full(len(self), self.system.motion.mean_speed)
+
+    @property
+    def ambient(self) -> Array:
+        """Temperature of the surroundings (k,), K; 0 without heat."""
+        heat = self.system.heat
+        return np.full(len(self), 0.0 if heat is None else heat.ambient)
 
     @property
     def max_pressure(self) -> Array:
         """Largest pressure of each half-cycle (k,), MPa."""
         return self.pressure.max(axis=1)
+
+    @property
+    def worn_area(self) -> Array:
+        """Cross-section worn off the punch in each, the integral of its wear (k,), mm²; a volume in mm³ else."""
+        return self.adds.of("volume_punch") * (1 / self.system.bodies.punch.thickness)
+
+    @property
+    def worn_area_strip(self) -> Array:
+        """The same of the strip (k,), mm²."""
+        return self.adds.of("volume_strip") * (1 / self.system.bodies.punch.thickness)
 
     @property
     def contact_width(self) -> Array:
@@ -132,14 +166,14 @@ class PhaseRecord:
         phase: Its number in the cycle.
         contact: Its contact.
         before: Pressure of the same phase one cycle ago (n,), MPa; None in the first cycle.
-        areas: Cross-sections worn off punch and strip, mm².
+        adds: What it adds to the totals.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
     """
 
     phase: int
     contact: ContactState
     before: Array | None
-    areas: tuple[float, float]
+    adds: Totals
     friction_ratio: Array
 
 
@@ -149,7 +183,9 @@ class _Row(NamedTuple):
     half_cycle: int
     phases: Sequence[PhaseRecord]
     worn: Worn
+    totals: Totals
     retries: int
+    load: float
 
 
 @dataclass
@@ -163,19 +199,29 @@ class Recorder:
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
 
-    def add(self, half_cycle: int, phases: Sequence[PhaseRecord], worn: Worn, heat: HalfCycleHeat | None) -> None:
+    def add(
+        self,
+        half_cycle: int,
+        phases: Sequence[PhaseRecord],
+        worn: Worn,
+        totals: Totals,
+        heat: HalfCycleHeat | None,
+        load: float = 1.0,
+    ) -> None:
         """Record one half-cycle.
 
         Args:
             half_cycle: Its number.
             phases: Its phases in their order.
             worn: Depths at its end.
+            totals: Of all half-cycles up to its end.
             heat: Of all its phases.
+            load: Factor of all loads.
         """
         taken = self.system.remedies.take()
         if taken:
             self._remedies += taken
-        self._rows.append(_Row(half_cycle, phases, worn, taken.total()))
+        self._rows.append(_Row(half_cycle, phases, worn, totals, taken.total(), load))
         if heat is not None:
             self._heat.append(heat)
 
@@ -203,11 +249,13 @@ class Recorder:
         middles = [row.phases[len(row.phases) // 2] for row in rows]
         directions = [system.motion.phases[middle.phase].direction for middle in middles]
         pressure = np.concatenate([middle.contact.pressure for middle in middles])
-        areas = np.array([np.sum([p.areas for p in row.phases], axis=0) for row in rows])
-        optima = np.array([self._optimum(d, p) for d, p in zip(directions, pressure, strict=True)])
+        adds = [reduce(Totals.__add__, [p.adds for p in row.phases]) for row in rows]
+        loads = np.array([row.load for row in rows])
+        # Pressures that balance the loads grow with them.
+        optima = np.array([f * self._optimum(d, p) for d, p, f in zip(directions, pressure, loads, strict=True)])
         heat = None
         if self._heat:
-            names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
+            names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations", "temperature_bulk")
             heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
         block = Block(
             system,
@@ -218,14 +266,15 @@ class Recorder:
             np.array([row.worn.punch for row in rows]),
             np.array([row.worn.strip for row in rows]),
             np.concatenate([middle.contact.rigid for middle in middles]),
-            areas[:, 0],
-            areas[:, 1],
+            _stacked([row.totals for row in rows]),
+            _stacked(adds),
             np.abs(pressure - optima).max(axis=1) / scales,
             changes,
             self._balances(),
             np.array([row.retries for row in rows]),
             heat=heat,
             remedies=self._remedies,
+            load_factor=loads,
             end=end,
         )
         self._rows, self._heat, self._remedies = [], [], Counter()
@@ -248,7 +297,8 @@ class Recorder:
             force = (pressure * equilibrium.pair.weights).sum(axis=1)
             force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
             rows = equilibrium.equilibrium(records[0].friction_ratio)
-            balance = np.einsum("kn,mn->km", pressure, rows) + equilibrium.resultant
+            loads = np.array([self._rows[number].load for number in numbers])
+            balance = np.einsum("kn,mn->km", pressure, rows) + loads[:, None] * equilibrium.resultant
             error = np.abs(balance / (self.system.mode_lengths * force[:, None])).max(axis=1, initial=0.0)
             np.maximum.at(errors, list(numbers), error)
         return errors
@@ -262,3 +312,7 @@ class Recorder:
                 self._optima.clear()
             self._optima[key] = self.system.optimum(direction, zone).pressure
         return self._optima[key]
+
+
+def _stacked(totals: Sequence[Totals]) -> Totals:
+    return Totals(np.array([t.sums for t in totals]), np.array([t.energy for t in totals]))

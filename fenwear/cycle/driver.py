@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.state import RunState
+from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError, InterruptedRunError
 from fenwear.sliding.wear import Worn
 
@@ -16,6 +17,15 @@ BLOCK = 200  # half-cycles
 
 # Asked between solves, on all ranks together: true where the block is to end, InterruptedRunError where all is.
 Watch = Callable[[], bool]
+
+
+# The factor of all loads after a number of half-cycles, which need not be whole.
+Loading = Callable[[float], float]
+
+
+def as_given(_half_cycles: float) -> float:
+    """Leave the loads as the case has them."""
+    return 1.0
 
 
 def unwatched() -> bool:
@@ -29,7 +39,9 @@ class HalfCycle(NamedTuple):
     number: int
     phases: Sequence[PhaseRecord]
     worn: Worn
+    totals: Totals
     heat: HalfCycleHeat | None
+    load: float = 1.0
 
 
 class Step(Protocol):
@@ -84,7 +96,7 @@ def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> I
             raise type(error)(f"half-cycle {state.half_cycle + 1}: {error}") from error
         periodic = state.periodic_phases
         for one in recorded:
-            recorder.add(one.number, one.phases, one.worn, one.heat)
+            recorder.add(one.number, one.phases, one.worn, one.totals, one.heat, one.load)
             repeats = course.periodic_within is not None and recorder.change() < course.periodic_within
             periodic = periodic + 1 if repeats else 0
         state = replace(after, periodic_phases=periodic)

@@ -27,13 +27,19 @@ from fenwear.heat.field import HeatState
 Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
 
 
-def follow(system: Tribosystem, integrate: Integrate, start: RunState | None = None) -> Iterator[Block]:
+def follow(
+    system: Tribosystem,
+    integrate: Integrate,
+    start: RunState | None = None,
+    adapt: Callable[[Tribosystem], Tribosystem] = lambda system: system,
+) -> Iterator[Block]:
     """Yield the blocks of a run whose meshes follow large wear; collective. Each block knows its system.
 
     Args:
         system: The assembled problem.
         integrate: Yields the blocks on one system, such as `march` with its arguments.
         start: Where to go on from; by default the beginning.
+        adapt: What is to be made of the system of the case on moved meshes, such as another motion; collective.
 
     Raises:
         ConvergenceError: as `integrate`.
@@ -42,7 +48,7 @@ def follow(system: Tribosystem, integrate: Integrate, start: RunState | None = N
     state = start
     while True:
         if state is not None and system.outworn(state.worn):  # a run may also go on from just there
-            moved = assemble(system.case, system.comm, state.worn, heat=preparation(system))
+            moved = adapt(assemble(system.case, system.comm, state.worn, heat=preparation(system)))
             state = replace(state, temperature=_carried(state.temperature, moved))
             system = moved
         for block in integrate(system, state, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
@@ -58,7 +64,8 @@ def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:
     if state is None or bodies is None:
         return None
     pairs = zip(state.functions(), bodies, strict=True)
-    return HeatState.nodal(bodies, [_in_place(old, body.function(body.initial())) for old, body in pairs])
+    moved_along = [_in_place(old, body.function(body.initial())) for old, body in pairs]
+    return HeatState.nodal(bodies, moved_along, state.bulk)
 
 
 def _in_place(old: fem.Function, new: fem.Function) -> Array:

@@ -13,6 +13,7 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
+from fenwear.cycle.totals import PhaseMeter
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
@@ -46,27 +47,41 @@ class PhaseStep:
 
     def __init__(self, system: Tribosystem, phase: int, *, implicit: bool) -> None:
         self.system, self.phase, self.implicit = system, phase, implicit
-        self._constant = system.constant_coefficients
+        self._constant, self._load = system.constant_coefficients, 1.0
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
         self._contact = system.phase_contact((phase,))
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
         conditions = system.conditions(phase)
-        self._friction_ratio = system.phase_friction(phase, system.friction.values(conditions))
+        self._mu = system.friction.values(conditions)
+        self._friction_ratio = system.phase_friction(phase, self._mu)
         self._wear = system.wear.phases([conditions], [phase])
+        self._meter = PhaseMeter(system, phase, self._mu, self._wear)
 
-    def solve(self, temperature: HeatState | None, worn: Worn, before: ContactState | None) -> PhaseEnd:
+    def solve(
+        self,
+        temperature: HeatState | None,
+        worn: Worn,
+        before: ContactState | None,
+        load: float = 1.0,
+        half_cycles: float = 0.0,
+    ) -> PhaseEnd:
         """Return the end of the phase.
 
         Args:
             temperature: At its start; None without heat, or for the initial one.
             worn: Depths at its start.
             before: The same phase one cycle ago.
+            load: Factor of all loads.
+            half_cycles: Done since the start of the run, in its middle.
 
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
         """
         temperature = temperature or self._initial
+        if load != self._load and isinstance(self._contact, CondensedContact):
+            self._contact.press(load)
+            self._load = load
         if self._thermal is not None and temperature is not None:
             temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn)
@@ -76,7 +91,7 @@ class PhaseStep:
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            wear = self._update(pressure, temperature)
+            wear = self._update(pressure, temperature, worn, half_cycles)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
             except ConvergenceError as error:
@@ -94,15 +109,17 @@ class PhaseStep:
         )
         return self._end(contact, after, heat, before, wear)
 
-    def _update(self, pressure: Array | None, temperature: HeatState | None) -> PhasesWear:
-        """Take friction and wear at this pressure and at the temperature at the start of the phase."""
+    def _update(
+        self, pressure: Array | None, temperature: HeatState | None, worn: Worn, half_cycles: float
+    ) -> PhasesWear:
+        """Take friction and wear at this pressure, and at temperature and depths at the start of the phase."""
         system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature)
-        conditions = system.conditions(self.phase, pressure, surfaces)
+        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles)
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
-            mu = system.friction.values(conditions)
+            mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = system.phase_friction(self.phase, mu)
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
@@ -126,6 +143,6 @@ class PhaseStep:
         wear: PhasesWear,
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
-        areas = wear.worn_area(contact.pressure)
-        record = PhaseRecord(self.phase, contact, previous, areas, self._friction_ratio)
+        meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, wear)
+        record = PhaseRecord(self.phase, contact, previous, meter(contact.pressure[0]), self._friction_ratio)
         return PhaseEnd(record, temperature, heat, wear.worn(contact.pressure))

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from functools import reduce
 
-import numpy as np
-
 from fenwear.assembly import Tribosystem, in_parts
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.state import RunState
+from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.remedies import SMALLER_STEPS
@@ -35,34 +34,36 @@ class SmallerSteps:
         self.system, self.implicit = system, implicit
         self._steps: dict[int, list[PhaseStep]] = {}
 
-    def half_cycle(self, state: RunState, phases: range, error: ConvergenceError) -> list[PhaseEnd]:
+    def half_cycle(self, state: RunState, phases: range, error: ConvergenceError, load: float = 1.0) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle.
 
         Args:
             state: At its start.
             phases: Their numbers in the cycle.
             error: Why it is not solved as a whole.
+            load: Factor of all loads.
 
         Raises:
             ConvergenceError: it does not converge in the smallest parts either; `error` as it was.
         """
         for parts in PARTS:
             try:
-                ends = self._in_parts(state, phases, parts)
+                ends = self._in_parts(state, phases, parts, load)
             except ConvergenceError:
                 continue
             self.system.remedies.note(SMALLER_STEPS.format(parts * len(phases)))
             return ends
         raise error
 
-    def _in_parts(self, state: RunState, phases: range, parts: int) -> list[PhaseEnd]:
+    def _in_parts(self, state: RunState, phases: range, parts: int, load: float) -> list[PhaseEnd]:
         steps = self._prepared(parts)
         temperature, worn, ends = state.temperature, state.worn, []
         for phase in phases:
-            before = state.contacts[phase]
+            before, place = state.contacts[phase], phase - phases.start
             contact, own = before, []
-            for step in steps[phase * parts : (phase + 1) * parts]:
-                end = step.solve(temperature, worn, contact)
+            for part, step in enumerate(steps[phase * parts : (phase + 1) * parts]):
+                done = state.half_cycle + (place + (part + 0.5) / parts) / len(phases)
+                end = step.solve(temperature, worn, contact, load, done)
                 contact, temperature, worn = end.record.contact, end.temperature, worn + end.worn
                 own.append(end)
             ends.append(_joined(own, phase, before, temperature))
@@ -79,11 +80,11 @@ class SmallerSteps:
 def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: HeatState | None) -> PhaseEnd:
     """Return the parts of a phase as one: the contact in its middle, and all that it wears and heats."""
     middle = ends[len(ends) // 2].record
-    punch, strip = np.sum([end.record.areas for end in ends], axis=0).tolist()
+    adds = reduce(Totals.__add__, [end.record.adds for end in ends])
     previous = None if before is None else before.pressure[0]
     heats = [end.heat for end in ends if end.heat is not None]
     return PhaseEnd(
-        PhaseRecord(phase, middle.contact, previous, (punch, strip), middle.friction_ratio),
+        PhaseRecord(phase, middle.contact, previous, adds, middle.friction_ratio),
         temperature,
         reduce(HalfCycleHeat.then, heats) if heats else None,
         reduce(Worn.__add__, [end.worn for end in ends]),

@@ -9,6 +9,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
+from fenwear.cycle.totals import Totals, none_yet
 from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import Worn
 
@@ -22,6 +23,7 @@ class RunState:
         worn: Worn depths of both bodies.
         contacts: The last contact of each phase; None where there was none yet.
         temperature: Of both bodies; None without heat.
+        totals: What all half-cycles so far add up to.
         jump_length: Cycles that the next jump tries.
         periodic_phases: Half-cycles in a row that repeated.
     """
@@ -30,13 +32,14 @@ class RunState:
     worn: Worn
     contacts: tuple[ContactState | None, ...]
     temperature: HeatState | None
+    totals: Totals
     jump_length: int = 1
     periodic_phases: int = 0
 
 
 def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:
     """Return the unworn bodies at their initial temperature."""
-    return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature)
+    return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature, none_yet(system))
 
 
 def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:

@@ -16,13 +16,11 @@ order of the elements is kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import basix.ufl
-import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
@@ -31,15 +29,16 @@ from petsc4py import PETSc
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled
+from fenwear.bodies.assembly import assembled, assembled_vector, destroy, times, transposed_times
 from fenwear.bodies.contact_surface import contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import Factor, factored
 from fenwear.bodies.material import measure
 from fenwear.case import Body, Heat, Kind
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.material import ConductionLaw
 from fenwear.interface.placement import ZERO
+from fenwear.parallel import total
 from fenwear.sliding.field import ALONG_X, SlidingField
 
 PREFIX = "fenwear_heat_"
@@ -97,6 +96,8 @@ class HeatBody:
         body = self.body = elastic.body
         self.law, self.heat, self.kind = law, heat, elastic.law.kind
         self.inflow = heat.ambient if heat.inflow is None else heat.inflow
+        if heat.track is not None:  # what comes back is counted from the initial temperature on
+            self.inflow = heat.initial
         degree = elastic.space.ufl_element().degree
         self.space = fem.functionspace(body.mesh, basix.ufl.element("Lagrange", body.mesh.basix_cell(), degree))
         self.surface, self.trace = elastic.surface, trace_of(elastic.trace, elastic.space, self.space)
@@ -132,15 +133,16 @@ class HeatBody:
         self.held_values = held.x.array[self.held]
 
     def _ds(self, integrand: Any, tag: int) -> Any:
-        return self._measure * integrand * ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.boundary)(tag)
+        ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.boundary, metadata=self._quadrature)
+        return self._measure * integrand * ds(tag)
 
     def _dx(self, integrand: Any) -> Any:
-        return self._measure * integrand * ufl.dx(self.body.mesh)
+        return self._measure * integrand * ufl.dx(self.body.mesh, metadata=self._quadrature)
 
-    def _vector(self, form: Any) -> PETSc.Vec:
-        vector = fem.petsc.assemble_vector(form if isinstance(form, fem.Form) else fem.form(form))
-        vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-        return vector
+    @property
+    def _quadrature(self) -> dict[str, int]:
+        """One for all integrals, so that balances hold on curved elements, too; the stabilisation has kinks."""
+        return {"quadrature_degree": 2 * self.space.ufl_element().degree + 1}
 
     def flow(self, sliding: SlidingField) -> _Flow:
         """Return what depends on how the material moves; made once for each motion; collective."""
@@ -165,15 +167,21 @@ class HeatBody:
         forms = flow.forms
         forms.rate.value = 0.0 if math.isinf(duration) else 1 / duration
         forms.speed.value, forms.renewed.value = speed, float(surroundings.renewed)
-        a, b, f, entering = assembled(forms.a), assembled(forms.b), self._vector(forms.f), self._vector(forms.entering)
+        a, b, f, entering = (
+            assembled(forms.a),
+            assembled(forms.b),
+            assembled_vector(forms.f),
+            assembled_vector(forms.entering),
+        )
         if surroundings.exposed is not None:
             loss = a.createVecLeft()
             loss.array[:] = self.heat.convection * surroundings.exposed
             a.setDiagonal(loss, addv=PETSc.InsertMode.ADD)
-            f.axpy(self.heat.ambient, loss)
-        carried = speed * flow.carried + entering.array_r
-        brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.array_r.sum()))
-        return HeatStep(self, a, b, f, duration, carried, brought)
+            f += self.heat.ambient * loss.array_r
+            loss.destroy()
+        carried = speed * flow.carried + entering
+        brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.sum()))
+        return HeatStep(self, a, b, f, duration, carried, brought, entering)
 
     def loses_heat(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> bool:
         """Return whether a heat sink exists: convection, a held temperature or new material; collective."""
@@ -222,14 +230,12 @@ class HeatBody:
 
     def store(self, theta: Array) -> Array:
         """Return the heat capacity matrix times fields (owned,) or (owned, k); collective."""
-        fields = theta.reshape(self.owned, -1)
-        product = self._capacity_matrix.matMult(_dense(self._capacity_matrix, fields))
-        return product.getDenseArray().reshape(theta.shape).copy()
+        return times(self._capacity_matrix, theta)
 
     @cached_property
     def storage(self) -> Array:
         """Heat stored for each degree of freedom's kelvin, per thickness (owned,), mJ/(mm K)."""
-        return self._vector(self._dx(self.law.capacity * ufl.TestFunction(self.space))).array_r.copy()
+        return assembled_vector(self._dx(self.law.capacity * ufl.TestFunction(self.space)))
 
     @cached_property
     def convected(self) -> Array:
@@ -237,7 +243,7 @@ class HeatBody:
         w = ufl.TestFunction(self.space)
         faces = fem.Constant(self.body.mesh, PETSc.ScalarType(self.face_loss))
         edges = fem.Constant(self.body.mesh, PETSc.ScalarType(self.heat.convection))
-        return self._vector(self._dx(faces * w) + self._ds(edges * w, FREE)).array_r.copy()
+        return assembled_vector(self._dx(faces * w) + self._ds(edges * w, FREE))
 
 
 class _Flow:
@@ -263,8 +269,8 @@ class _Flow:
         body, v, normal = self.body, self.velocity, ufl.FacetNormal(self.body.body.mesh)
         comm, through = body.body.mesh.comm, ufl.dot(v, normal)
         if self.turns:
-            means = body._vector(body._ds(through * ufl.TestFunction(self._constants), FREE))
-            flow = comm.allreduce(float(np.abs(means.array_r).sum()))
+            means = assembled_vector(body._ds(through * ufl.TestFunction(self._constants), FREE))
+            flow = comm.allreduce(float(np.abs(means).sum()))
         else:
             flow = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(abs(through), FREE))))
         along = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))))
@@ -278,7 +284,7 @@ class _Flow:
     def carried(self) -> Array:
         """Heat carried out by material moving at unit speed, for each kelvin (owned,), mJ/(mm² K); collective."""
         body, w = self.body, ufl.TestFunction(self.body.space)
-        return body._vector(body._dx(body.law.capacity * ufl.dot(self.velocity, ufl.grad(w)))).array_r.copy()
+        return assembled_vector(body._dx(body.law.capacity * ufl.dot(self.velocity, ufl.grad(w))))
 
     @cached_property
     def forms(self) -> _StepForms:
@@ -289,8 +295,7 @@ class _Flow:
         rate, speed, renewed = (fem.Constant(domain, PETSc.ScalarType(0)) for _ in range(3))
         v = speed * self.velocity
         rho_c, r = law.capacity, body._measure
-        degree = body.space.ufl_element().degree
-        dx = ufl.dx(domain, metadata={"quadrature_degree": 2 * degree + 1})  # tau is constant in an element
+        dx = ufl.dx(domain, metadata=body._quadrature)  # tau is constant in an element
         ambient = fem.Constant(domain, PETSc.ScalarType(body.heat.ambient))
         faces = fem.Constant(domain, PETSc.ScalarType(body.face_loss))
         edges = fem.Constant(domain, PETSc.ScalarType(h))
@@ -375,6 +380,7 @@ class HeatStep:
         body: Whose step it is.
         carried: Heat that the material carries out a second, for each kelvin (owned,), mW/(mm K).
         brought: Heat that new material brings in a second, mW/mm.
+        entering: Heat capacity of what enters in a second (owned,), mW/(mm K).
         held_by_end, held_by_start, held_source: Sums of the rows of A, B and f that held
             temperatures replace: with them the heat that enters through these boundaries.
     """
@@ -384,27 +390,27 @@ class HeatStep:
         body: HeatBody,
         a: PETSc.Mat,
         b: PETSc.Mat,
-        f: PETSc.Vec,
+        f: Array,
         duration: float,
         carried: Array,
         brought: float,
+        entering: Array,
     ) -> None:
-        self.body, self.carried, self.brought = body, carried, brought
+        self.body, self.carried, self.brought, self.entering = body, carried, brought, entering
         start = body.space.dofmap.index_map.local_range[0]
         rows = (body.held + start).astype(np.int32)
-        indicator = a.createVecLeft()
-        indicator.array[body.held] = 1.0
-        self.held_by_end, self.held_by_start = (_transposed(m, indicator) for m in (a, b))
-        self.held_source = float(body.body.mesh.comm.allreduce(f.array_r[body.held].sum()))
+        indicator = np.zeros(body.owned)
+        indicator[body.held] = 1.0
+        self.held_by_end, self.held_by_start = (transposed_times(m, indicator) for m in (a, b))
+        self.held_source = float(body.body.mesh.comm.allreduce(f[body.held].sum()))
         a.zeroRows(rows, diag=1.0)
         b.zeroRows(rows, diag=0.0)
-        self.source = f.array_r.copy()
+        self.source = f
         self.source[body.held] = body.held_values
         self.a, self.b = a, b
         self._is_held = np.zeros(body.owned, dtype=bool)
         self._is_held[body.held] = True
-        self._rhs, self._solution = a.createVecLeft(), a.createVecRight()
-        self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
+        self._factor = self._factored(repeated=duration < np.inf)
         self._pivoted, self._solved = duration == np.inf, 0
 
     def advance(self, theta: Array, *, sources: bool = True) -> Array:
@@ -415,67 +421,50 @@ class HeatStep:
             sources: False for what becomes of changes of temperature, A^-1 B.
         """
         if theta.ndim == 2:
-            return self._solve_many(theta, self.b.matMult)
-        self._solution.array[:] = theta
-        self.b.mult(self._solution, self._rhs)
+            return self._solve_many(times(self.b, theta))
+        rhs = times(self.b, theta)
         if sources:
-            self._rhs.array[:] += self.source
-        self._factor.solve(self._rhs, self._solution)
+            rhs += self.source
+        solution = self._factor.solve(rhs)
         self._solved += 1
-        if self._solved % CHECK_EVERY == 1 and not self._is_exact(self._rhs, self._solution):
+        if self._solved % CHECK_EVERY == 1 and not self._is_exact(rhs, solution):
             self._pivot()
-            self._factor.solve(self._rhs, self._solution)
-        return self._solution.array_r.copy()
-
-    def _is_exact(self, rhs: PETSc.Vec, solution: PETSc.Vec) -> bool:
-        """Return whether a solution of the factor is one of the matrix, or no factor can be better; collective."""
-        if self._pivoted:
-            return True
-        residual = rhs.duplicate()
-        self.a.mult(solution, residual)
-        residual.axpy(-1.0, rhs)
-        return bool(residual.norm() <= LARGEST_RESIDUAL * rhs.norm())
-
-    def _pivot(self) -> None:
-        """Factor again, with pivoting; collective."""
-        self._factor, self._pivoted = Factor(self.a, PREFIX, "lu"), True
+            solution = self._factor.solve(rhs)
+        return solution
 
     def respond(self, load: Array) -> Array:
         """Return A^-1 of several loads (owned, k), mW/mm; collective."""
-        return self._solve_many(np.where(self._is_held[:, None], 0.0, load), lambda loads: loads)
+        return self._solve_many(np.where(self._is_held[:, None], 0.0, load))
 
     def apply(self, fields: Array) -> tuple[Array, Array]:
         """Return A and B times several fields (owned, k); collective."""
-        dense = _dense(self.a, fields)
-        by_a, by_b = self.a.matMult(dense), self.b.matMult(dense)  # named: their arrays live no longer than they
-        return by_a.getDenseArray().copy(), by_b.getDenseArray().copy()
+        return times(self.a, fields), times(self.b, fields)
 
-    def _solve_many(self, fields: Array, prepare: Callable[[PETSc.Mat], PETSc.Mat]) -> Array:
-        rhs = prepare(_dense(self.a, fields))
-        solution = rhs.duplicate()
-        solution.setUp()
-        self._factor.matSolve(rhs, solution)
-        if not self._pivoted and not self._are_exact(rhs, solution):
+    def free(self) -> None:
+        """Free its matrices and its factor, after which it advances nothing; collective."""
+        self._factor.free()
+        destroy(self.a, self.b)
+
+    def _solve_many(self, rhs: Array) -> Array:
+        solution = self._factor.solve(rhs)
+        if not self._is_exact(rhs, solution):
             self._pivot()
-            self._factor.matSolve(rhs, solution)
-        return solution.getDenseArray().copy()
+            solution = self._factor.solve(rhs)
+        return solution
 
-    def _are_exact(self, rhs: PETSc.Mat, solution: PETSc.Mat) -> bool:
-        residual = self.a.matMult(solution)
-        residual.axpy(-1.0, rhs)
-        return bool(residual.norm() <= LARGEST_RESIDUAL * rhs.norm())
+    def _is_exact(self, rhs: Array, solution: Array) -> bool:
+        """Return whether solutions of the factor are those of the matrix, or no factor can be better; collective."""
+        if self._pivoted:
+            return True
+        residual = times(self.a, solution) - rhs
+        squares = total(self.body.body.mesh.comm, np.array([np.vdot(residual, residual), np.vdot(rhs, rhs)]))
+        return bool(squares[0] <= LARGEST_RESIDUAL**2 * squares[1])
 
+    def _factored(self, *, repeated: bool = False) -> Factor:
+        domain = self.body.body.mesh
+        return factored(self.a, PREFIX, "lu", comm=domain.comm, dim=domain.topology.dim, repeated=repeated)
 
-def _dense(like: PETSc.Mat, fields: Array) -> PETSc.Mat:
-    """Return fields (owned, k) as a dense matrix with the rows of `like`; collective."""
-    dense = PETSc.Mat().createDense((like.getSizes()[0], (PETSc.DECIDE, fields.shape[1])), comm=like.comm)
-    dense.setUp()
-    dense.getDenseArray()[:] = fields
-    dense.assemble()
-    return dense
-
-
-def _transposed(matrix: PETSc.Mat, vector: PETSc.Vec) -> Array:
-    result = matrix.createVecRight()
-    matrix.multTranspose(vector, result)
-    return result.array_r.copy()
+    def _pivot(self) -> None:
+        """Factor again, with pivoting; collective."""
+        self._factor.free()
+        self._factor, self._pivoted = self._factored(), True

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
+from fenwear.errors import CaseError, InputError
 
 Indices: TypeAlias = NDArray[np.int64]
 
 SLACK = 1e-6  # of the surface's size: how far the first surface may reach beyond the second
 CURVED, CURVED_STEPS = 1e-13, 20  # of the surface's size: rounding of a point's place; Newton steps to it
+ASTRAY, FOLDED = 1e-9, 1e3  # of the surface's size: what Newton's method may leave, and where it has no end
 NOTHING = 1e-12  # of the smaller of two polygons: they share an edge up to rounding, no area
 RING = {"interval": [0, 1], "triangle": [0, 1, 2], "quadrilateral": [0, 1, 3, 2]}  # basix' corners in order around
 
@@ -177,6 +179,23 @@ def node_areas(surface: ChartedSurface) -> NodeAreas:
     return NodeAreas(polygons, node, sizes)
 
 
+def node_triangles(surface: ChartedSurface) -> tuple[Array, Indices]:
+    """Divide a surface, whose trace may have all coordinates, among its pressure nodes as `node_areas` does.
+
+    Returns:
+        Triangles on the curved facets (m, 3, d), mm, and the pressure node that each belongs to (m,).
+    """
+    reference = _reference_parts(surface.cell, surface.pressure_degree)
+    _, count, flat = reference.shape
+    shape = surface.shape_functions(reference.reshape(-1, flat))
+    polygons = (shape @ surface.s[surface.facets]).reshape(-1, count, surface.s.shape[1])
+    node = surface.pressure_facets.ravel()
+    fan = np.arange(1, count - 1)
+    corners = np.stack([np.zeros_like(fan), fan, fan + 1], axis=1)
+    triangles = polygons[node >= 0][:, corners].reshape(-1, 3, polygons.shape[2])
+    return triangles, np.repeat(node[node >= 0], len(fan))
+
+
 def shared_areas(first: ChartedSurface, second: ChartedSurface) -> csr_array:
     """Return the area that each pressure node of the first surface shares with each of the second (n1, n2)."""
     areas1, areas2 = node_areas(first), node_areas(second)
@@ -235,16 +254,27 @@ def _pull_back_curved(surface: ChartedSurface, facet: Indices, s: Array) -> Arra
 
     Newton's method on s = sum of phi_a s_a over the facet's trace nodes, from the facet of straight edges on: the
     transfer then takes every node's own place to just this place, so that moments are kept.
+
+    Raises:
+        CaseError: a facet folds where the other surface's lies over it.
     """
     points = _pull_back(surface.cell, surface.corners, facet, s)
-    nodes = surface.s[surface.facets]
+    if not len(points):
+        return points
+    nodes, size = surface.s[surface.facets], surface.extent
     element = _element(surface.cell, surface.degree)
-    for _ in range(CURVED_STEPS if len(points) else 0):
+    for step in range(CURVED_STEPS + 1):
         table = element.tabulate(1, points)[..., 0]
         rest = s - np.einsum("qa,qad->qd", table[0], nodes[facet])
-        if np.abs(rest).max(initial=0.0) <= CURVED * surface.extent:
-            break
         slopes = np.einsum("cqa,qad->qdc", table[1:], nodes[facet])
+        largest = float(np.abs(rest).max())
+        if largest <= CURVED * size:
+            break
+        if step == CURVED_STEPS or not largest < FOLDED * size or not np.abs(np.linalg.det(slopes)).min() > 0:
+            if largest <= ASTRAY * size:
+                break
+            message = "elements at the contact are so curved that they fold; expected smaller ones there, or order 1"
+            raise CaseError(InputError("geometry.order", message))
         points = points + np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
     return points
 

@@ -22,8 +22,8 @@ from fenwear.case import Case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 from fenwear.life.model import Model, Snapshot, WornSurface
+from fenwear.results.scar import extents
 
-EDGE = 0.01  # of the largest depth: where a scar ends
 LIMIT = 10_000_000  # cycles after which a level counts as never reached
 
 UNITS = {
@@ -239,25 +239,10 @@ def _volume(quantity: Quantity, snapshot: Snapshot) -> float:
     return float(surface.weights @ depth) * snapshot.thickness
 
 
-def scar_edges(x: Array, depth: Array) -> tuple[float, float]:
-    """Return where the depth passes a hundredth of its largest, linear between the nodes, mm."""
-    level = EDGE * float(depth.max())
-    inside = np.flatnonzero(depth > level)
-    if not len(inside):
-        return 0.0, 0.0
-    first, last = int(inside[0]), int(inside[-1])
-    left, right = float(x[first]), float(x[last])
-    if first > 0:
-        left = float(np.interp(level, depth[first - 1 : first + 1], x[first - 1 : first + 1]))
-    if last + 1 < len(x):
-        right = float(np.interp(-level, -depth[last : last + 2], x[last : last + 2]))
-    return left, right
-
-
 def _scar_width(quantity: Quantity, snapshot: Snapshot) -> float:
     surface, depth = _worn(quantity, snapshot)
-    left, right = scar_edges(surface.x, depth)
-    return right - left
+    nodes = np.arange(len(depth) - 1)
+    return float(extents(depth[None], surface.x[:, None], np.stack([nodes, nodes + 1], axis=1))[0, 0])
 
 
 def _contact_width(_: Quantity, snapshot: Snapshot) -> float:

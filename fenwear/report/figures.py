@@ -10,11 +10,12 @@ import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
-from fenwear.report.boundary import boundary_figure
+from fenwear.report.program import program_figure
 from fenwear.report.style import (
     DIRECTIONS,
     GREY,
     contact_axis,
+    direction_style,
     legend_beside,
     panels,
     reference_line,
@@ -186,7 +187,7 @@ def peak_figure(history: xarray.Dataset) -> Figure:
                             "temperature (K)"),
     }  # fmt: skip
     for ax, (name, (title, label)) in zip(axes, over.items(), strict=False):
-        _by_direction(ax, history, name)
+        by_direction(ax, history, name)
         ax.set_title(title, loc="left")
         ax.set_ylabel(label)
     mean = mean_pressure(history)
@@ -198,7 +199,7 @@ def peak_figure(history: xarray.Dataset) -> Figure:
         ax.set_ylim(bottom=0)
     axes[1].set_ylim(top=1.15 * nominal)
     axes[0].legend(title="strip moves", frameon=False)
-    _half_cycle_axis(axes[-1], history)
+    half_cycle_axis(axes[-1], history)
     return figure
 
 
@@ -210,13 +211,13 @@ def convergence_figure(history: xarray.Dataset) -> Figure:
         "optimum_distance": "Distance to the optimum: largest difference to the optimal pressure",
     }
     for ax, (name, title) in zip(axes, over.items(), strict=True):
-        _by_direction(ax, history, name)
+        by_direction(ax, history, name)
         ax.set_title(title, loc="left")
         ax.set_ylabel("over mean pressure (-)")
     axes[0].set_yscale("log")
     axes[1].set_ylim(bottom=0)
     axes[0].legend(title="strip moves", frameon=False)
-    _half_cycle_axis(axes[-1], history)
+    half_cycle_axis(axes[-1], history)
     return figure
 
 
@@ -256,7 +257,7 @@ def heat_balance_figure(history: xarray.Dataset) -> Figure:
     ax.set_title("Heat of each half-cycle: what friction makes is the sum of the others", loc="left")
     ax.set_ylabel("heat per half-cycle (mJ)")
     legend_beside(ax, "")
-    _half_cycle_axis(ax, history)
+    half_cycle_axis(ax, history)
     return figure
 
 
@@ -267,6 +268,8 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str
     if cycle_means(history, chosen) and len(directions_present(history)) == 2:
         drawn["mean_pressure"] = mean_pressure_figure(history, chosen)
     drawn["peaks"] = peak_figure(history)
+    if "load_factor" in history:
+        drawn["program"] = program_figure(history)
     drawn["convergence"] = convergence_figure(history)
     if "max_temperature" in history:
         drawn["temperature"] = temperature_figure(history, chosen)
@@ -274,30 +277,15 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str
     return drawn
 
 
-def draw_figures(directory: Path, half_cycles: Sequence[int] = ()) -> list[Path]:
-    """Draw all figures of a run into its folder `figures`; return their paths."""
-    folder = directory / FOLDER
-    drawn = all_figures(read_history(directory), half_cycles)
-    files = sorted((directory / "fields").glob("half_cycle_*.nc"))
-    if files and "temperature" in drawn:
-        with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
-            drawn["boundary_temperature"] = boundary_figure(fields)
-    folder.mkdir(exist_ok=True)
-    paths = [folder / f"{name}.png" for name in drawn]
-    for path, figure in zip(paths, drawn.values(), strict=True):
-        figure.savefig(path, dpi=150)
-    return paths
-
-
 def mark_few(points: Sized) -> dict[str, Any]:
     """Return the style of a line of so few points that without marks nothing may be seen."""
     return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
 
 
-def _by_direction(ax: Axes, history: xarray.Dataset, name: str) -> None:
+def by_direction(ax: Axes, history: xarray.Dataset, name: str) -> None:
     """Draw a variable over the half-cycles, a line for each direction."""
     for d in directions_present(history):
-        text, dashes, colour = DIRECTIONS[d]
+        text, dashes, colour = direction_style(history, d)
         rows = history.direction.values == d
         ax.plot(
             history.half_cycle[rows],
@@ -309,7 +297,7 @@ def _by_direction(ax: Axes, history: xarray.Dataset, name: str) -> None:
         )
 
 
-def _half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
+def half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
     """Label the axis of half-cycles: logarithmic where wear alone slows down, linear with heat's own pace."""
     first, last = int(history.half_cycle[0]), int(history.half_cycle[-1])
     if last > 10_000 or "max_temperature" not in history:

@@ -12,17 +12,27 @@ from typing import Any
 import xarray
 
 from fenwear.errors import CaseError, OutputError
-from fenwear.report.figures import FOLDER, draw_figures, read_history
+from fenwear.report.draw import draw_figures
+from fenwear.report.figures import FOLDER, chosen_half_cycles, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
+from fenwear.report.stick import write_stick_report
+from fenwear.report.surface import model_of
+from fenwear.report.turned import Turned, turned_map
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
 SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
+            "program": "Test program: what acted",
             "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
-            "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
+            "boundary_temperature": "Temperature along the boundaries",
+            "pressure_map": "Pressure on the contact surface", "wear_map": "Worn depth of the punch",
+            "wear_strip_map": "Worn depth of the strip", "temperature_map": "Temperature of the punch's surface",
+            "temperature_strip_map": "Temperature of the strip's surface", "cuts_along": "Along the sliding",
+            "cuts_across": "Across the sliding"}  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
 ALT = {
     "shape": "Worn depth of the punch, and of the strip where it wears, in micrometres along the contact, "
@@ -31,12 +41,21 @@ ALT = {
     "a line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
     "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
     "half-cycle.",
     "boundary_temperature": "Temperature round the punch from the middle of its contact on, and along the strip's "
     "upper surface, at the last half-cycle with fields.",
+    "pressure_map": "Maps of the contact pressure in megapascals, one for each chosen half-cycle.",
+    "wear_map": "Maps of the worn depth of the punch over its largest, one for each chosen half-cycle.",
+    "wear_strip_map": "Maps of the worn depth of the strip over its largest, one for each chosen half-cycle.",
+    "temperature_map": "Maps of the temperature of the punch's contact surface, one for each chosen half-cycle.",
+    "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch, one for each chosen "
+    "half-cycle.",
+    "cuts_along": "Pressure, worn depths and temperatures along the sliding, a line for each chosen half-cycle.",
+    "cuts_across": "Pressure, worn depths and temperatures across the sliding, a line for each chosen half-cycle.",
     "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
 }
 
@@ -61,6 +80,8 @@ def write_report(
 
 def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
     case = read_case(directory)
+    if case.get("contact", {}).get("law") == "coulomb":
+        return write_stick_report(directory)
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
     if complete:
         from fenwear.report.animation import draw_animation
@@ -123,7 +144,7 @@ class Places:
 def page(directory: Path) -> str:
     """Return report.html of a run whose figures are drawn."""
     history, summary = read_history(directory), read_summary(directory)
-    images = _images(directory)
+    images, turned = _images(directory), _turned(history)
     written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
     return render(
         "report.html",
@@ -136,9 +157,12 @@ def page(directory: Path) -> str:
         tables=_tables(summary, history),
         places=_places(summary),
         figures=[_figure(images, name, text) for name, text in SECTIONS.items()],
+        turned=turned and turned.html,
+        nonce=turned and turned.nonce,
         bodies=_bodies(images),
         animations=_animations(images),
         change=_change(summary),
+        scale="the mean pressure" if model_of(history) == "plane" else "the pressure where the load is carried",
         retries=summary.get("retries", {}),
         convergence=_figure(images, "convergence", "Periodicity and optimum"),
         equilibrium_error=summary.get("largest_equilibrium_error"),
@@ -151,12 +175,33 @@ def page(directory: Path) -> str:
     )
 
 
+def _turned(history: xarray.Dataset) -> Turned | None:
+    """Return the map to turn of solids and rings; None without plotly, and of plane models."""
+    if model_of(history) == "plane":
+        return None
+    try:
+        return turned_map(history, chosen_half_cycles(history))
+    except (ImportError, OSError):
+        return None
+
+
 def _number(path: str, value: float, *, cut: int = 0) -> Number:
     return Number(path, label_of(path[cut:]), value, number_text(value), unit_of(path))
 
 
 def _table(caption: str, values: dict[str, int | float], *, cut: int = 0) -> Table:
     return Table(caption, [_number(path, value, cut=cut) for path, value in values.items()])
+
+
+def _sheet_table(name: str, sheet: dict[str, int | float]) -> Table:
+    """Return what a tribometer measures of the sliding or of a body, in the units in which it is read."""
+    numbers = []
+    for path, value in sheet.items():
+        of, _, key = path.partition(".")
+        if of == name:
+            line = LINES[key]
+            numbers.append(Number(path, line.label, value, number_text(shown(value, line)), line.unit))
+    return Table(name.capitalize() if name in BODIES else "What a tribometer measures", numbers)
 
 
 def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
@@ -167,13 +212,15 @@ def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
 
 def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
     if not summary:
-        last = {name: float(history[name][-1]) for name in ("max_pressure", "contact_width", "periodicity")}
-        units = {"max_pressure": "_MPa", "contact_width": "_mm"}
-        return [_table("At the last recorded half-cycle", {n + units.get(n, ""): v for n, v in last.items()})]
+        units = {"max_pressure": "_MPa", "contact_width": "_mm", "contact_area": "_mm2", "periodicity": ""}
+        last = {name + unit: float(history[name][-1]) for name, unit in units.items() if name in history}
+        return [_table("At the last recorded half-cycle", last)]
     numbers = numbers_of(summary)
     single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}
-    tables = [_table("The run", single)]
-    for d in ("rightward", "leftward"):
+    sheet = {p: v for p, v in numbers.items() if p.partition(".")[0] in ("sliding", *BODIES) and "[" not in p}
+    tables = [_sheet_table(name, sheet) for name in ("sliding", *BODIES) if name in summary]
+    tables.append(_table("The run", single))
+    for d in ("rightward", "leftward", "forward", "backward"):
         if d in summary:
             inside = {p: v for p, v in numbers.items() if p.startswith(f"{d}.") and "[" not in p}
             tables.append(_table(f"Last half-cycle with the strip moving {d}", inside, cut=len(d) + 1))
@@ -243,15 +290,25 @@ def _figure(images: dict[str, Path], name: str, caption: str, alt: str = "") -> 
     return picture(path.read_bytes(), path.suffix[1:], caption, alt or ALT[name])
 
 
+KINDS = {
+    "solid": "Deformed punch and strip, cut through the middle of the contact",
+    "turned": "Deformed rings, turned about their axis with a quarter left open",
+    "bodies": "Deformed punch and strip near the contact",
+}
+
+
 def _bodies(images: dict[str, Path]) -> list[Picture | None]:
     """Return pictures of the bodies at the last half-cycle that has them."""
     pictures = []
     for field, text in FIELDS.items():
-        names = [n for n in images if n.startswith(f"bodies_{field}_")]
-        if names:
-            number = int(names[-1].rpartition("_")[2])
-            alt = f"Deformed punch and strip near the contact, coloured by {text}, at half-cycle {number:,}."
-            pictures.append(_figure(images, names[-1], f"{text[0].upper()}{text[1:]} at half-cycle {number:,}", alt))
+        for kind, what in KINDS.items():
+            names = [n for n in images if n.startswith(f"{kind}_{field}_")]
+            if names:
+                number = int(names[-1].rpartition("_")[2])
+                alt = f"{what}, coloured by {text}, at half-cycle {number:,}."
+                pictures.append(
+                    _figure(images, names[-1], f"{text[0].upper()}{text[1:]} at half-cycle {number:,}", alt)
+                )
     return pictures
 
 

@@ -11,6 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from xarray import Dataset
 
 WIDTH = 7.0  # inches
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
@@ -18,7 +19,14 @@ BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 COLOURS = (BLUE, RED, GREEN, "#CC79A7", "#56B4E9", "#000000", "#E69F00")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 DIRECTIONS = {1: ("rightward", "-", BLUE), -1: ("leftward", "--", RED)}
+FORWARD = {1: "forward", -1: "backward"}  # of solids and rings: along or around
 ALONG_CONTACT = "position along the contact x (mm)"
+
+
+def direction_style(history: Dataset, direction: int) -> tuple[str, str, str]:
+    """Return name, dashes and colour of a sliding direction in a run."""
+    name, dashes, colour = DIRECTIONS[direction]
+    return (name if history.attrs.get("model", "plane") == "plane" else FORWARD[direction]), dashes, colour
 
 
 def panels(count: int, height: float, *, share_x: bool = True, share_y: bool = False) -> tuple[Figure, list[Axes]]:

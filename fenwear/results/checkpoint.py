@@ -22,6 +22,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
+from fenwear.cycle.totals import SUMS, Totals
 from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import HeatState
@@ -36,6 +37,8 @@ NUMBERS, WEAR, STATES = (
     ("wear", "wear_strip"),
     ("pressure", "gap", "rigid"),
 )
+TOTALS = ("totals", "energy")
+BULK = "bulk"  # temperature of a closed track, NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
 # A run may go on farther than it was meant to, and keep other things.
@@ -86,11 +89,22 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
             file,
             **{name: getattr(state, name) for name in NUMBERS},
             **_depths(WEAR, state.worn),
+            **_totals(state.totals),
+            **_bulk(state.temperature),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
         )
         file.flush()
         os.fsync(file.fileno())
+
+
+def _bulk(temperature: HeatState | None) -> dict[str, Any]:
+    bulk = None if temperature is None else temperature.bulk
+    return {BULK: np.nan if bulk is None else bulk}
+
+
+def _totals(totals: Totals) -> dict[str, Any]:
+    return dict(zip(TOTALS, (totals.sums, totals.energy), strict=True))
 
 
 def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
@@ -128,16 +142,16 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if system.bodies.heat is not None:
-        temperature = HeatState.nodal(
-            system.bodies.heat, [_read_temperature(folder, body) for body in system.bodies.heat]
-        )
+        bulk = None if np.isnan(arrays[BULK]) else float(arrays[BULK])
+        read = [_read_temperature(folder, body) for body in system.bodies.heat]
+        temperature = HeatState.nodal(system.bodies.heat, read, bulk)
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
     numbers = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
-    worn = Worn(*(arrays[name] for name in WEAR))
-    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, *numbers)
+    worn, totals = Worn(*(arrays[name] for name in WEAR)), Totals(*(arrays[name] for name in TOTALS))
+    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, *numbers)
 
 
 def _read_temperature(folder: Path, body: HeatBody) -> Array:
@@ -177,7 +191,7 @@ def _arrays(folder: Path) -> dict[str, Any]:
     try:
         with np.load(folder / ARRAYS) as arrays:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
-            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *STATES, *followed)}
+            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         raise _damaged(folder) from None
 
@@ -201,6 +215,8 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
         for name, unworn in _depths(names, system.unworn()).items():
             if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
                 raise _damaged(folder)
+    if arrays["totals"].shape != (len(SUMS),) or arrays["energy"].shape != system.pair.weights.shape:
+        raise _damaged(folder)
     return arrays
 
 

@@ -1,7 +1,7 @@
-"""Fields in both bodies at chosen half-cycles: displacement, stress, temperature, heat flux.
+"""Fields in both bodies at chosen half-cycles: displacement, stress, temperature, heat flux, contact pressure, wear.
 
 The condensed interface knows the contact alone; here the whole bodies are solved once more,
-K u = f + C p + G (theta - theta_0), and written for ParaView (VTX, in parallel) and, as plain
+K u = f + C p + G (theta - theta_0), and written as one time series for ParaView and pyvista (VTKHDF) and, as plain
 NetCDF on the nodes, for fenwear's own pictures.
 """
 
@@ -9,30 +9,47 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import basix
 import basix.ufl
 import dolfinx
 import numpy as np
-import scipy.spatial
 import ufl
-import xarray
 from dolfinx import fem
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.bodies.antiplane import shear_out_of_plane
+from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
+from fenwear.bodies.assembly import times
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.compat import interpolation_points
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
-from fenwear.results.disk import check_room, writing, writing_together
+from fenwear.results.disk import check_room, writing
+from fenwear.results.series import step_of
+from fenwear.results.subcells import linear_cells
+from fenwear.results.vtkhdf import append
 from fenwear.sliding.wear import Worn
+
+if TYPE_CHECKING:
+    import xarray
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
-AXES = ("x", "z")
+SERIES = "fields.hdf"
+STRESS = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders a symmetric tensor
+MEANINGS = {
+    "displacement": ("mm", "displacement"),
+    "displacement_out_of_plane": ("mm", "displacement out of the plane, along y"),
+    "stress": ("MPa", "stress"),
+    "von_mises": ("MPa", "von Mises stress"),
+    "temperature": ("K", "temperature"),
+    "heat_flux": ("mW/mm2", "heat flux"),
+}
+AXES = {2: ("x", "z"), 3: ("x", "y", "z")}
 
 
 @dataclass(frozen=True)
@@ -41,7 +58,8 @@ class BodyFields:
 
     Attributes:
         displacement: mm.
-        out_of_plane: Displacement along y, mm; None where no traction acts along it.
+        out_of_plane: Displacement along y, around the axis of rings, mm; None where no traction acts along it.
+        stress: Its components by `STRESS`, MPa; in rings x, y and z are r, around and z.
         von_mises: Equivalent stress, MPa.
         temperature: K; None without heat.
         heat_flux: -k grad theta, mW/mm²; None without heat.
@@ -49,6 +67,7 @@ class BodyFields:
 
     displacement: fem.Function
     out_of_plane: fem.Function | None
+    stress: fem.Function
     von_mises: fem.Function
     temperature: fem.Function | None
     heat_flux: fem.Function | None
@@ -110,47 +129,54 @@ def _solve(
 ) -> BodyFields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
     force, dim = elastic.load.copy(), elastic.dim
-    force.array[:] += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
-    force.array[elastic.supported] = 0.0
+    force += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
+    force[elastic.supported] = 0.0
     theta = change = None
     if heat is not None and temperature is not None:
         theta = heat.function(temperature)
         change = heat.function(temperature - heat.heat.initial)
-        elastic.thermal_coupling(heat.space).multAdd(change.x.petsc_vec, force, force)
-    solution = force.duplicate()
-    elastic.factor.solve(force, solution)
+        coupling = elastic.thermal_coupling(heat.space)
+        force += times(coupling, change.x.array[: heat.owned])
+        coupling.destroy()
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
-    displacement.x.array[:owned] = solution.array_r
+    displacement.x.array[:owned] = elastic.factor.solve(force)
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
     out_of_plane = None
     if dim == 2 and load[:, 1].any():
         out_of_plane = shear_out_of_plane(elastic, elastic.trace.blocks, load[:, 1])
-    equivalent = _von_mises(elastic, displacement, out_of_plane, change)
-    von_mises = _interpolated(equivalent, elastic, "von_mises", ())
+    components = _stress(elastic, displacement, out_of_plane, change)
+    stress = _interpolated(ufl.as_vector(components), elastic, "stress", (len(STRESS),))
+    von_mises = _interpolated(_von_mises(*components), elastic, "von_mises", ())
     flux = None
     if heat is not None and theta is not None:
         flux = _interpolated(heat.law.flux(theta), elastic, "heat_flux", (dim,))
-    return BodyFields(displacement, out_of_plane, von_mises, theta, flux)
+    return BodyFields(displacement, out_of_plane, stress, von_mises, theta, flux)
 
 
-def _von_mises(elastic: ElasticBody, displacement: Any, out_of_plane: Any, change: Any) -> Any:
-    """Return sqrt(3/2 s : s), s the deviator of the stress, that out of the plane included."""
+def _stress(elastic: ElasticBody, displacement: Any, out_of_plane: Any, change: Any) -> tuple[Any, ...]:
+    """Return the components of the stress by `STRESS` in UFL, those out of the plane included."""
     sigma = elastic.law.stress(displacement)
     if change is not None:
         sigma = sigma - elastic.law.thermal_stress(change)
-    if sigma.ufl_shape[0] == 3:
-        deviator = ufl.dev(sigma)
-        return ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-    out = elastic.law.stress_out_of_plane(displacement, change)
-    xx, zz, xz = sigma[0, 0], sigma[1, 1], sigma[0, 1]
-    shear = xz**2
+    xy = yz = 0.0 * sigma[0, 0]
     if out_of_plane is not None:
-        slope = elastic.law.shear_modulus * ufl.grad(out_of_plane)
-        shear = shear + ufl.inner(slope, slope)
-    return ufl.sqrt(((xx - zz) ** 2 + (zz - out) ** 2 + (out - xx) ** 2) / 2 + 3 * shear)
+        slope = elastic.law.shear_modulus * shear_strain(out_of_plane, elastic.law.kind)
+        xy, yz = slope[0], slope[1]
+    if sigma.ufl_shape[0] == 2:
+        out = elastic.law.stress_out_of_plane(displacement, change)
+        return sigma[0, 0], out, sigma[1, 1], xy, yz, sigma[0, 1]
+    if elastic.law.kind != "axisymmetric":
+        xy, yz = sigma[0, 1], sigma[1, 2]
+    return sigma[0, 0], sigma[1, 1], sigma[2, 2], xy, yz, sigma[0, 2]
+
+
+def _von_mises(xx: Any, yy: Any, zz: Any, xy: Any, yz: Any, xz: Any) -> Any:
+    """Return sqrt(3/2 s : s), s the deviator of the stress."""
+    normal = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
+    return ufl.sqrt(normal / 2 + 3 * (xy**2 + yz**2 + xz**2))
 
 
 def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple[int, ...]) -> fem.Function:
@@ -158,11 +184,17 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
     mesh, degree = elastic.body.mesh, elastic.space.ufl_element().degree
     broken = fem.functionspace(mesh, basix.ufl.element("DG", mesh.basix_cell(), degree, shape=shape))
     values = fem.Function(broken)
-    values.interpolate(fem.Expression(expression, interpolation_points(broken)))
+    if elastic.law.kind == "axisymmetric":  # on the axis u / r has no value: taken at points inside the elements
+        inner = fem.functionspace(mesh, _inside_cells(mesh.basix_cell(), degree, shape))
+        within = fem.Function(inner)
+        within.interpolate(fem.Expression(expression, interpolation_points(inner)))
+        values.interpolate(within)
+    else:
+        values.interpolate(fem.Expression(expression, interpolation_points(broken)))
     smooth = fem.functionspace(mesh, basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=shape))
     sums, counts = fem.Function(smooth, name=name), fem.Function(smooth)
     size = smooth.dofmap.bs
-    cells = mesh.topology.index_map(2).size_local
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
     to = smooth.dofmap.list[:cells].ravel()
     from_ = broken.dofmap.list[:cells].ravel()
     for component in range(size):
@@ -175,6 +207,12 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
     return sums
 
 
+def _inside_cells(cell: Any, degree: int, shape: tuple[int, ...]) -> Any:
+    """Return the element whose nodes are Gauss-Legendre points, none on an element's edge."""
+    variant = basix.LagrangeVariant.gl_warped
+    return basix.ufl.element("DG", cell, degree, lagrange_variant=variant, shape=shape)
+
+
 def write_fields(
     directory: Path,
     system: Tribosystem,
@@ -182,6 +220,7 @@ def write_fields(
     fields: tuple[BodyFields, BodyFields],
     direction: int,
     worn: Worn,
+    pressure: Array,
 ) -> None:
     """Write the fields of a half-cycle into `directory`/fields; collective.
 
@@ -192,6 +231,7 @@ def write_fields(
         fields: Of punch and strip.
         direction: Sliding direction d.
         worn: Depths at its end.
+        pressure: Of the contact (n,), MPa.
 
     Raises:
         OutputError: they cannot be written.
@@ -204,25 +244,49 @@ def write_fields(
     data: dict[str, Any] = {}
     for elastic, body in zip((system.bodies.punch, system.bodies.strip), fields, strict=True):
         name = elastic.body.name
-        given = (body.displacement, body.out_of_plane, body.von_mises, body.temperature, body.heat_flux)
+        given = (body.displacement, body.out_of_plane, body.stress, body.von_mises, body.temperature, body.heat_flux)
         functions = [f for f in given if f is not None]
-        _write_for_paraview(folder / f"{stem}_{name}", elastic, functions)
         data.update(_gathered(name, elastic, functions))
-    time = float(system.motion.time(np.array(half_cycle)))
-    attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
-    data.update(_contact_surfaces(system, worn))
-    on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder / f"{stem}.nc"))
+    time = float(system.time(np.array(half_cycle)))
+    attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
+    data.update(_contact_surfaces(system, worn, pressure))
+    import xarray  # with pandas, half a second that runs without fields spare themselves
+
+    on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder, stem))
 
 
-def _contact_surfaces(system: Tribosystem, worn: Worn) -> dict[str, Any]:
-    """Return where the contact nodes of both bodies are, and what is worn there that the meshes do not follow."""
+def _frame(system: Tribosystem) -> dict[str, Any]:
+    """Return the model of solids and rings, the strip's way in the middle of the contact and the normal there (3,)."""
+    pair, kind = system.pair, system.bodies.punch.law.kind
+    if kind in ("stress", "strain"):
+        return {}
+    normal = in_space(pair.weights[None] @ pair.normal)[0]
+    normal /= np.linalg.norm(normal)
+    middle = pair.weights[None] @ pair.punch.x / pair.weights.sum()
+    velocity = system.sliding.field.velocity(middle)[0]
+    velocity -= (velocity @ normal) * normal
+    size = float(np.linalg.norm(velocity))
+    if size < 1e-9 * pair.punch.extent():  # a pin that spins on its own axis
+        velocity, size = np.eye(3)[0], 1.0
+    return {"model": kind, "along": velocity / size, "normal": normal}
+
+
+def _contact_surfaces(system: Tribosystem, worn: Worn, pressure: Array) -> dict[str, Any]:
+    """Return where the contact nodes of both bodies are, their pressure and wear, and what no mesh follows of it."""
     rest = worn if system.bodies.moved is None else worn - system.bodies.moved
     pair = system.pair
     data: dict[str, Any] = {}
-    for name, nodes, depth in (("punch", pair.punch, rest.punch), ("strip", pair.strip, rest.strip)):
+    force = pair.material.T @ (pair.weights * pressure)
+    surfaces = (
+        ("punch", pair.punch, rest.punch, worn.punch, pressure),
+        ("strip", pair.strip, rest.strip, worn.strip, force / pair.strip.weights),
+    )
+    for name, nodes, depth, whole, p in surfaces:
         at = f"{name}_contact"
-        data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES)}
-        data[f"{at}_wear"] = (at, depth, {"units": "mm"})
+        data |= {f"{at}_{axis}": (at, nodes.x[:, k], {"units": "mm"}) for k, axis in enumerate(AXES[nodes.dim])}
+        data[f"{at}_wear"] = (at, depth, {"units": "mm", "long_name": "worn depth that the mesh does not follow"})
+        data[f"{at}_depth"] = (at, whole, {"units": "mm", "long_name": "worn depth"})
+        data[f"{at}_pressure"] = (at, p, {"units": "MPa", "long_name": "contact pressure"})
     return data
 
 
@@ -232,55 +296,42 @@ def _make_folder(folder: Path, size: int) -> None:
     check_room(folder, size)
 
 
-def _write_nodal(dataset: xarray.Dataset, path: Path) -> None:
-    part = path.with_suffix(".part")
+def _write_nodal(dataset: xarray.Dataset, folder: Path, stem: str) -> None:
+    path, part = folder / f"{stem}.nc", folder / f"{stem}.part"
     with writing(path):
         dataset.to_netcdf(part, engine="h5netcdf")
         part.replace(path)
-
-
-def _write_for_paraview(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
-    with writing_together(elastic.body.mesh.comm, stem):
-        _write_vtx_or_xdmf(stem, elastic, functions)
-
-
-def _write_vtx_or_xdmf(stem: Path, elastic: ElasticBody, functions: list[fem.Function]) -> None:
-    comm = elastic.body.mesh.comm
-    if dolfinx.has_adios2:
-        with dolfinx.io.VTXWriter(comm, str(stem.with_suffix(".bp")), functions, engine="BP4") as writer:
-            writer.write(0.0)
-        return
-    with dolfinx.io.XDMFFile(comm, str(stem.with_suffix(".xdmf")), "w") as file:
-        file.write_mesh(elastic.body.mesh)
-        for function in functions:  # XDMF knows vertices only
-            element = basix.ufl.element("Lagrange", elastic.body.mesh.basix_cell(), 1, shape=function.ufl_shape)
-            linear = fem.Function(fem.functionspace(elastic.body.mesh, element), name=function.name)
-            linear.interpolate(function)
-            file.write_function(linear)
+    append(folder / SERIES, step_of(dataset))
 
 
 def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) -> dict[str, Any]:
     """Return a body's nodes, cells and nodal values as variables of a dataset, on rank 0; collective."""
-    units = {"von_mises": "MPa", "temperature": "K", "heat_flux": "mW/mm2"}
     comm, space = elastic.body.mesh.comm, elastic.space
-    index_map, degree = space.dofmap.index_map, space.ufl_element().degree
-    cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(2).size_local]
-    corners = _subcells(space)
-    linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, 4)
-    x = space.tabulate_dof_coordinates()[: index_map.size_local, :2]
+    index_map, degree, dim = space.dofmap.index_map, space.ufl_element().degree, elastic.dim
+    cells = space.dofmap.list[: elastic.body.mesh.topology.index_map(dim).size_local]
+    corners = _corners(elastic.body.mesh.basix_cell().name, degree)
+    linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, corners.shape[1])
+    x = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
     parts = comm.gather((x, linear))
     gathered = [(f.name, comm.gather(_on_nodes(f, elastic).reshape(index_map.size_local, -1))) for f in functions]
     if comm.rank != 0:
         return {}
     point, cell = f"{name}_point", f"{name}_cell"
     points = np.concatenate([p[0] for p in parts])
-    data: dict[str, Any] = {f"{name}_{a}": (point, points[:, k], {"units": "mm"}) for k, a in enumerate(AXES)}
-    data[f"{name}_cells"] = ((cell, "corner"), np.concatenate([p[1] for p in parts]), {"degree": degree})
+    data: dict[str, Any] = {f"{name}_{a}": (point, points[:, k], {"units": "mm"}) for k, a in enumerate(AXES[dim])}
+    # Bodies of different elements have corners of their own.
+    corner = "corner" if dim == 2 else f"{name}_corner"
+    data[f"{name}_cells"] = ((cell, corner), np.concatenate([p[1] for p in parts]), {"degree": degree})
     for field, values in gathered:
         joined = np.concatenate(values)
-        names = [field] if joined.shape[1] == 1 else [f"{field}_{a}" for a in AXES]
-        for k, component in enumerate(names):
-            data[f"{name}_{component}"] = (point, joined[:, k], {"units": units.get(field, "mm")})
+        units, text = MEANINGS[field]
+        parts_of = STRESS if field == "stress" else AXES[dim] if joined.shape[1] > 1 else ("",)
+        for k, component in enumerate(parts_of):
+            attributes = {
+                "units": units,
+                "long_name": f"{text} of the {name}" + (f", {component}" if component else ""),
+            }
+            data[f"{name}_{field}{'_' if component else ''}{component}"] = (point, joined[:, k], attributes)
     return data
 
 
@@ -298,12 +349,8 @@ def _on_nodes(function: fem.Function, elastic: ElasticBody) -> Array:
     return values[: index_map.size_local]
 
 
-def _subcells(space: fem.FunctionSpace) -> Array:
-    """Return the corners (count, 4) of the linear cells between the nodes of one element, around each."""
-    points = space.element.basix_element.points
-    degree = space.ufl_element().degree
-    if len(points) != (degree + 1) ** 2:  # triangles: the last corner twice
-        triangles = scipy.spatial.Delaunay(points).simplices
-        return np.hstack([triangles, triangles[:, 2:]])
-    grid = np.lexsort((points[:, 0], points[:, 1])).reshape(degree + 1, degree + 1)
-    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+def _corners(cell: str, degree: int) -> NDArray[np.int64]:
+    """Return the corners of the linear cells between the nodes of one element, around each."""
+    corners = linear_cells(cell, degree)
+    # In the plane all have four: of triangles the last one twice.
+    return np.hstack([corners, corners[:, 2:]]) if cell == "triangle" else corners

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +15,21 @@ import h5netcdf
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
+from fenwear.results import sheet
 from fenwear.results.disk import check_room, claim, write_text, writing
+from fenwear.results.scar import conforming
+from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, surface_columns
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 SECONDS_BETWEEN_WRITES = 2.0
-CHUNK = 256  # rows that a variable's storage grows by
+CHUNK = 256  # rows that a variable's storage grows by, at most
+CHUNK_VALUES = 2**18  # that it grows by at most
 INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
 
 # name: (dimensions, units, long_name); a Block has an attribute of each name but the weights
@@ -45,6 +50,7 @@ VARIABLES = {
     "weight": (("half_cycle", "x"), "mm", "length that each contact node stands for, on the mesh of the half-cycle"),
 }
 
+IN_BLOCK = {new: old for old, (new, *_) in RENAMED.items()}
 INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 
 # the same with heat; the names of a BlockHeat, terms of the balance by their position
@@ -55,6 +61,7 @@ HEAT_VARIABLES = {
     "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
     "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
 }
+BULK = {"temperature_bulk": (("half_cycle",), "K", "temperature of the bulk of the strip's closed track at the end")}
 HEAT_TERMS = {
     "friction": "heat made by friction in the half-cycle",
     "debris": "heat carried off by debris",
@@ -77,37 +84,67 @@ STRIP_VARIABLES = {
 }
 
 
-def _variables(case: Case) -> dict[str, tuple[tuple[str, ...], str, str]]:
+# the same with a program: what acted
+PROGRAM_VARIABLES = {
+    "load": (("half_cycle",), "N", "normal force on the contact, the mean of the cycle"),
+    "load_factor": (("half_cycle",), "1", "all loads over those of the case"),
+    "speed": (("half_cycle",), "mm s-1", "mean sliding speed; of a turning strip in rad s-1"),
+}
+AMBIENT = {"ambient": (("half_cycle",), "K", "temperature of the surroundings")}
+
+
+def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    case = system.case
     variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
-    if case.heat is None:
+    if case.program is not None:
+        variables = {**variables, **PROGRAM_VARIABLES, **({} if case.heat is None else AMBIENT)}
+    if case.heat is not None:
+        terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
+        variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
+    variables = {**variables, **sheet.variables(system)}
+    if case.model.kind == "plane":
         return variables
-    terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
-    return {**variables, **HEAT_VARIABLES, **terms}
+    return on_surfaces(variables)
 
 
-def _coordinates(system: Tribosystem) -> dict[str, tuple[str, Array, str]]:
-    """Return, by name, what does not change in a run: its dimension, values (mm) and long name."""
+def _columns(system: Tribosystem) -> dict[str, Column]:
+    """Return, by name, what does not change in a run."""
     pair = system.pair
-    coordinates = {"x": ("x", pair.x, "position along the contact, from the centre of the geometry")}
+    if system.case.model.kind != "plane":
+        return surface_columns(system)
+    text = "position along the contact, from the centre of the geometry"
+    columns = {"x": Column(("x",), pair.x, {"units": "mm", "long_name": text})}
     if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
-        coordinates["x_strip"] = ("x_strip", pair.strip.x[:, 0], along)
-    return coordinates
+        columns["x_strip"] = Column(("x_strip",), pair.strip.x[:, 0], {"units": "mm", "long_name": along})
+    return columns
+
+
+def _rows(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+    """Return the values of variables over a block's half-cycles."""
+    own = sheet.values(block)
+    return {name: own[name] if name in own else _values(block, name) for name in names}
 
 
 def _values(block: Block, name: str) -> NDArray[Any]:
     """Return the values of a variable over a block's half-cycles."""
+    name = IN_BLOCK.get(name, name)
     if name in ("weight", "weight_strip"):  # meshes that follow the wear change them
         pair = block.system.pair
         weights = pair.weights if name == "weight" else pair.strip.weights
         return np.broadcast_to(weights, (len(block), len(weights)))
-    if name in VARIABLES or name in STRIP_VARIABLES or block.heat is None:
+    if name in (*VARIABLES, *STRIP_VARIABLES, *PROGRAM_VARIABLES, *AMBIENT) or block.heat is None:
         return getattr(block, name)
     if name == "heat_balance_error":
         return block.heat.balance_error
-    if name in HEAT_VARIABLES:
+    if name in HEAT_VARIABLES or name in BULK:
         return getattr(block.heat, name)
     return block.heat.terms[:, TERMS.index(name.removeprefix("heat_"))]
+
+
+def _chunk(inner: tuple[int, ...]) -> int:
+    """Return the rows that a variable's storage grows by, fewer where a row is long."""
+    return max(1, min(CHUNK, CHUNK_VALUES // max(math.prod(inner), 1)))
 
 
 def make_directory(path: Path) -> None:
@@ -151,8 +188,8 @@ class HistoryWriter:
             OutputError: it cannot be written.
         """
         self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
-        self._variables = _variables(system.case)
-        self._coordinates = _coordinates(system)
+        self._variables = _variables(system)
+        self._columns = _columns(system)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
         self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
@@ -170,8 +207,8 @@ class HistoryWriter:
                 self._cut(resumed_after)
 
     def _create(self, system: Tribosystem) -> None:
-        coordinates = sum(values.nbytes for _, values, _ in self._coordinates.values())
-        check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + coordinates)
+        columns = sum(column.values.nbytes + INDEX for column in self._columns.values())
+        check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + columns)
         with h5netcdf.File(self._twin, "w") as file:
             file.attrs["title"] = system.case.title or "fenwear run"
             file.attrs["Conventions"] = "CF-1.11"
@@ -179,15 +216,19 @@ class HistoryWriter:
             file.attrs["versions"] = json.dumps(versions())
             sizes = self._sizes()
             file.dimensions = {"half_cycle": None, **sizes}
-            for name, (dimension, values, long_name) in self._coordinates.items():
-                variable = file.create_variable(name, (dimension,), float)
-                variable[:] = values
-                variable.attrs.update(units="mm", long_name=long_name)
+            if system.case.model.kind != "plane":
+                file.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
+                file.attrs["model"] = system.case.model.kind
+                file.attrs["conforming"] = int(conforming(system.pair))
+            for name, column in self._columns.items():
+                variable = file.create_variable(name, column.dimensions, column.values.dtype)
+                variable[...] = column.values
+                variable.attrs.update(column.attributes)
             for name, (dimensions, units, long_name) in self._variables.items():
                 kind = int if name in INTEGERS else float
-                chunks = (CHUNK, *(sizes[d] for d in dimensions[1:]))
-                variable = file.create_variable(name, dimensions, kind, chunks=chunks)
-                variable.attrs.update(units=units, long_name=long_name)
+                inner = tuple(sizes[d] for d in dimensions[1:])
+                variable = file.create_variable(name, dimensions, kind, chunks=(_chunk(inner), *inner))
+                variable.attrs.update(units=units, long_name=long_name, **on_mesh(dimensions, system.pair.punch.dim))
         self._twin.replace(self.path)
 
     def _cut(self, half_cycle: int) -> None:
@@ -214,7 +255,7 @@ class HistoryWriter:
         Raises:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
-        rows = {name: _values(block, name) for name in self._variables}
+        rows = _rows(block, self._variables)
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
         before = self._last or {name: values[:0] for name, values in rows.items()}
@@ -292,14 +333,21 @@ class HistoryWriter:
         self._seconds_of_copying = time.monotonic() - begin
 
     def _sizes(self) -> dict[str, int]:
-        return {dimension: len(values) for dimension, values, _ in self._coordinates.values()}
+        return {
+            d: n
+            for column in self._columns.values()
+            for d, n in zip(column.dimensions, column.values.shape, strict=True)
+        }
 
     def _bytes(self, rows: int) -> int:
         """Return what so many more rows take at most: whole chunks, and for each variable some nodes of an index."""
-        chunks = (rows > 0) + -(-rows // CHUNK)
-        sizes = self._sizes()
-        values = sum(sizes[d[1]] if len(d) > 1 else 1 for d, _, _ in self._variables.values())
-        return chunks * CHUNK * 8 * values + (chunks // 16 + 1) * INDEX * len(self._variables)
+        sizes, total = self._sizes(), 0
+        for dimensions, _, _ in self._variables.values():
+            inner = tuple(sizes[d] for d in dimensions[1:])
+            chunk = _chunk(inner)
+            chunks = (rows > 0) + -(-rows // chunk)
+            total += chunks * chunk * 8 * math.prod(inner) + (chunks // 16 + 1) * INDEX
+        return total
 
     def _change_places(self) -> None:
         try:
@@ -319,22 +367,37 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         extremes: Largest errors over all half-cycles.
         run: How the run went: stop, times, warnings.
     """
-    pair = system.pair
-    width = pair.x[-1] - pair.x[0]
-    centre = (pair.x[-1] + pair.x[0]) / 2
-    places = centre + width * np.array([-0.25, 0.0, 0.25])
-    phases = system.motion.half_cycles
-    names = {1: "rightward", -1: "leftward"}
+    plane = system.case.model.kind == "plane"
     return {
         "title": system.case.title,
         "half_cycles": int(last.half_cycle[-1]),
         **run,
+        **sheet.sheet(last),
+        **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
+        **({} if last.heat is None else _heat_summary(system, last)),
+        "periodicity": float(last.periodicity[-1]),
+        **extremes,
+        "contact_nodes": len(system.pair.x),
+        "degrees_of_freedom": system.bodies.unknowns,
+        "ranks": system.comm.size,
+        "versions": versions(),
+    }
+
+
+def _places(system: Tribosystem) -> NDArray[np.float64]:
+    """Return three places along a contact that is a line, mm."""
+    x = system.pair.x
+    return (x[-1] + x[0]) / 2 + (x[-1] - x[0]) * np.array([-0.25, 0.0, 0.25])
+
+
+def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+    pair, places, phases = system.pair, _places(system), system.motion.half_cycles
+    return {
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
         "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
-        **_strip_summary(system, last),
         **{
-            names[int(d)]: {
+            {1: "rightward", -1: "leftward"}[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
                 "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
                 "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
@@ -342,36 +405,48 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
             }
             for i, d in enumerate(last.direction[-phases:])
         },
-        **({} if last.heat is None else _heat_summary(system, last, places)),
-        "periodicity": float(last.periodicity[-1]),
-        **extremes,
-        "contact_nodes": len(pair.x),
-        "degrees_of_freedom": system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0],
-        "ranks": system.comm.size,
-        "versions": versions(),
     }
 
 
-def _strip_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
-    """Return the strip's scar: its largest depth, and the cross-sections worn off both bodies in all."""
-    if not system.strip_wears:
-        return {}
-    depth, nodes = last.wear_strip[-1], system.pair.strip
+def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+    """Return the key numbers of solids and rings: their scars, and the contact of the last cycle.
+
+    The mean pressure is that over what is in contact; over the nominal contact only where the surfaces lie on each
+    other before they wear.
+    """
+    pair, phases = system.pair, system.motion.half_cycles
+    mean = {"mean_pressure_MPa": system.rigid.mean_pressure} if conforming(pair) else {}
+    cycle = slice(-phases, None)
+    rows = zip(
+        last.direction[cycle], last.half_cycle[cycle], last.pressure[cycle], last.contact_width[cycle], strict=True
+    )
     return {
-        "wear_strip_max_mm": float(depth.max()),
-        "worn_area_strip_mm2": float(nodes.weights @ depth),
-        "worn_area_punch_mm2": float(system.pair.weights @ last.wear[-1]),
+        **mean,
+        **{
+            {1: "forward", -1: "backward"}[int(d)]: {
+                "half_cycle": int(number),
+                "max_pressure_MPa": float(pressure.max()),
+                "mean_pressure_MPa": float(pair.weights @ pressure / max(area, 1e-300)),
+                "contact_area_mm2": float(area),
+            }
+            for d, number, pressure, area in rows
+        },
     }
 
 
-def _heat_summary(system: Tribosystem, last: Block, places: NDArray[Any]) -> dict[str, Any]:
+def _heat_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     assert last.heat is not None
-    interpolate = system.pair.interpolate
+    heat, along = last.heat, {}
+    if system.case.model.kind == "plane":
+        places, interpolate = _places(system), system.pair.interpolate
+        along = {
+            "temperature_punch_K": interpolate(heat.temperature_punch[-1], places).tolist(),
+            "temperature_strip_K": interpolate(heat.temperature_strip[-1], places).tolist(),
+        }
     return {
-        "max_temperature_K": float(last.heat.max_temperature[-1]),
-        "temperature_punch_K": interpolate(last.heat.temperature_punch[-1], places).tolist(),
-        "temperature_strip_K": interpolate(last.heat.temperature_strip[-1], places).tolist(),
-        "heat_mJ": dict(zip(TERMS, last.heat.terms[-1].tolist(), strict=True)),
+        "max_temperature_K": float(heat.max_temperature[-1]),
+        **along,
+        "heat_mJ": dict(zip(TERMS, heat.terms[-1].tolist(), strict=True)),
     }
 
 

@@ -3,7 +3,7 @@
 The punch's worn depth belongs to its contact nodes, the strip's to the strip's nodes, whose material
 moves under the punch: what is worn in a phase is put on the strip at its offset, so that its
 cross-section is what the pressure wore, and what is felt is read there. On a closed track the
-strip's wear spreads over the whole of it.
+strip's wear spreads along the whole of it, see `fenwear.sliding.track`.
 """
 
 from __future__ import annotations
@@ -45,23 +45,32 @@ class Worn:
 
 @dataclass(frozen=True)
 class _BodyWear:
-    """What a body loses in each phase: rate p^b, the rate = beta~ S of the nodes (m, n), mm/MPa^b."""
+    """What a body loses in each phase: rate q^b, q = min(p, cap) - threshold >= 0, rate = beta~ S (m, n), mm/MPa^b."""
 
     rate: Array
     exponent: float
+    threshold: float = 0.0
+    cap: float = np.inf
+
+    @property
+    def linear(self) -> bool:
+        """Whether depths are the rate times the pressure."""
+        return self.exponent == 1 and self.threshold == 0 and self.cap == np.inf
 
     def depth(self, pressure: Array) -> Array:
         """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes."""
-        if self.exponent == 1:
+        if self.linear:
             return self.rate * pressure
-        return self.rate * np.maximum(pressure, 0.0) ** self.exponent
+        return self.rate * np.maximum(np.minimum(pressure, self.cap) - self.threshold, 0.0) ** self.exponent
 
     def slope(self, pressure: Array) -> Array:
         """Return their derivatives to the pressures (m, n), mm/MPa."""
-        if self.exponent == 1:
+        if self.linear:
             return np.broadcast_to(self.rate, pressure.shape)
         floor = 1e-9 * max(float(pressure.max()), 1e-300)  # b < 1: the slope at p = 0 is infinite
-        return self.rate * self.exponent * np.maximum(pressure, floor) ** (self.exponent - 1)
+        above = np.maximum(pressure - self.threshold, floor)
+        wears = ((pressure >= self.threshold) | (self.threshold == 0)) & (pressure <= self.cap)
+        return np.where(wears, self.rate * self.exponent * above ** (self.exponent - 1), 0.0)
 
 
 @dataclass(frozen=True)
@@ -71,13 +80,11 @@ class PhasesWear:
     Attributes:
         punch, strip: beta~ S p^b at the interface nodes; None where the body does not wear.
         pairs: The surfaces opposite each other in each phase.
-        track: Length of the closed track that the strip runs on, mm; None for its own nodes.
     """
 
     punch: _BodyWear | None
     strip: _BodyWear | None
     pairs: Sequence[ContactPair]
-    track: float | None
 
     def some(self, phases: Sequence[int]) -> PhasesWear:
         """Return the wear of some of the phases."""
@@ -85,7 +92,7 @@ class PhasesWear:
         punch, strip = (
             None if body is None else replace(body, rate=body.rate[chosen]) for body in (self.punch, self.strip)
         )
-        return PhasesWear(punch, strip, [self.pairs[k] for k in chosen], self.track)
+        return PhasesWear(punch, strip, [self.pairs[k] for k in chosen])
 
     def depth(self, pressure: Array) -> Array:
         """Return the depth worn off the punch in each phase (m, n), mm."""
@@ -97,7 +104,7 @@ class PhasesWear:
         strip = np.zeros(len(first.strip.weights))
         if self.strip is not None:
             for pair, depth in zip(self.pairs, self.strip.depth(pressure), strict=True):
-                strip += self._on_strip(pair) @ depth
+                strip += pair.deposit @ depth
         return Worn(self.depth(pressure).sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
@@ -120,7 +127,7 @@ class PhasesWear:
             right[:, nodes, nodes] = self.punch.slope(pressure)
         if self.strip is not None:
             for k, slope in enumerate(self.strip.slope(pressure)):
-                right[k, strip:] = self._on_strip(self.pairs[k]) * slope
+                right[k, strip:] = self.pairs[k].deposit.toarray() * slope
         return self._left, right
 
     @cached_property
@@ -132,24 +139,6 @@ class PhasesWear:
         if self.strip is not None:
             parts.append(np.array([pair.material.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
-
-    def _on_strip(self, pair: ContactPair) -> Array:
-        """Return what puts depths of the contact nodes on the strip's nodes (n_strip, n), areas kept."""
-        if self.track is not None:
-            return np.broadcast_to(pair.weights / self.track, (len(pair.strip.weights), len(pair.weights)))
-        return pair.deposit.toarray()
-
-    def worn_area(self, pressure: Array) -> tuple[float, float]:
-        """Return the cross-sections worn off punch and strip, mm²."""
-        areas = [
-            0.0 if body is None else float(np.vdot(body.depth(pressure), self._weights))
-            for body in (self.punch, self.strip)
-        ]
-        return areas[0], areas[1]
-
-    @cached_property
-    def _weights(self) -> Array:
-        return np.array([pair.weights for pair in self.pairs])
 
 
 @dataclass(frozen=True)
@@ -182,7 +171,6 @@ class Wear:
         sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
         pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
-        track: Length of the closed track, mm.
     """
 
     punch: WearLaw | None
@@ -190,21 +178,20 @@ class Wear:
     sliding: tuple[Array, Array]
     pairs: Sequence[ContactPair]
     friction: Friction
-    track: float | None
 
     @property
     def constant(self) -> bool:
-        """Whether no coefficient depends on temperature, pressure or speed."""
+        """Whether no coefficient depends on more than the place."""
         laws = [law for law in (self.punch, self.strip) if law is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
-        dependent = any(isinstance(law.coefficient, Dependence) for law in laws)
+        dependent = any(isinstance(law.coefficient, Dependence) and law.coefficient.varies for law in laws)
         return not dependent and (self.friction.constant or not of_friction)
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
 
         Args:
-            conditions: T, p and v of each of these phases, for the coefficients that depend on them.
+            conditions: Of each of these phases, for the coefficients that depend on them.
             which: Numbers of the phases; by default all.
 
         Raises:
@@ -220,8 +207,9 @@ class Wear:
                 sliding[k] * coefficient(law, self.friction, state, key)
                 for k, state in zip(chosen, conditions, strict=True)
             ]
-            bodies.append(_BodyWear(np.array(rates), law.pressure_exponent))
-        return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen], self.track)
+            cap = np.inf if law.pressure_cap is None else law.pressure_cap
+            bodies.append(_BodyWear(np.array(rates), law.pressure_exponent, law.pressure_threshold, cap))
+        return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 
 def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:

@@ -1,6 +1,22 @@
 """Problems whose answer is known, solved by fenwear and compared: exact solutions and published results."""
 
-from fenwear.verify import elastic, contact, curved, solid, optimum, wear, jumps, conduction, thermal, solid_heat, ranks  # noqa: I001  (the order of the table)
+from fenwear.verify import (
+    conduction,
+    contact,
+    curved,
+    elastic,
+    fretting,
+    half_space,
+    jumps,
+    optimum,
+    ranks,
+    solid,
+    solid_heat,
+    solid_wear,
+    stick,
+    thermal,
+    wear,
+)
 from fenwear.verify.suite import Outcome, Plot, Result, Row, VerificationCase, registered, run_cases
 
 __all__ = [
@@ -13,6 +29,8 @@ __all__ = [
     "contact",
     "curved",
     "elastic",
+    "fretting",
+    "half_space",
     "jumps",
     "optimum",
     "ranks",
@@ -20,6 +38,8 @@ __all__ = [
     "run_cases",
     "solid",
     "solid_heat",
+    "solid_wear",
+    "stick",
     "thermal",
     "wear",
 ]

@@ -6,13 +6,27 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from fenwear.assembly import Tribosystem, assemble
-from fenwear.case import load_case, make_case
+from fenwear.assembly import Bodies, Tribosystem, assemble, build_bodies
+from fenwear.case import Case, load_case, make_case
 
 STEEL = {"young": 2e5, "poisson": 0.3}
 
 
 def two_blocks(
+    punch_material: Mapping[str, float], strip_material: Mapping[str, float], sizes: Mapping[str, float], **tables: Any
+) -> Tribosystem:
+    """Return two rectangles of the same width on each other, see `two_block_case`; collective."""
+    return assemble(two_block_case(punch_material, strip_material, sizes, **tables))
+
+
+def bodies_of_blocks(
+    punch_material: Mapping[str, float], strip_material: Mapping[str, float], sizes: Mapping[str, float], **tables: Any
+) -> Bodies:
+    """Return two rectangles that are neither condensed nor joined, see `two_block_case`; collective."""
+    return build_bodies(two_block_case(punch_material, strip_material, sizes, **tables))
+
+
+def two_block_case(
     punch_material: Mapping[str, float],
     strip_material: Mapping[str, float],
     sizes: Mapping[str, float],
@@ -22,8 +36,8 @@ def two_blocks(
     punch: Mapping[str, Any] | None = None,
     strip: Mapping[str, Any] | None = None,
     **tables: Any,
-) -> Tribosystem:
-    """Return two rectangles of the same width on each other; collective.
+) -> Case:
+    """Return the case of two rectangles of the same width on each other.
 
     The punch is pressed down with 1 MPa, its sides held in x; the strip stands on its held far side.
 
@@ -55,7 +69,7 @@ def two_blocks(
         "run": {"half_cycles": 1},
         **tables,
     }
-    return assemble(make_case(case))
+    return make_case(case)
 
 
 def clamped(body: str, groups: Sequence[str] = ("sides", "far", "contact")) -> dict[str, Any]:

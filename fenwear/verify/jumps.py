@@ -91,6 +91,30 @@ def block_on_ring() -> Result:
 
 
 @verification(
+    "block-on-ring-published",
+    "The built-in block on a ring: depth of the scar after 800 and 1,600 m",
+    "two published finite-element models of Cruzado's test, one of level sets, one of moving meshes, 18 and 25 hours",
+)
+def published_ring() -> Result:
+    """16.155 and 25.709 um by level sets; (1.5 R A)^(2/3) / 2R of rigid bodies, A = beta~ P' s."""
+    system = assemble(load_case("block-on-ring"))
+    case = system.case
+    depths, rows = (16.155e-3, 25.709e-3), list[Row]()
+    blocks = list(jump(system, 3200, tolerance=3e-3, stops=frozenset((1600,)), block=1))
+    for steps, depth in zip((1600, 3200), depths, strict=True):
+        (worn,) = (block.wear[-1] for block in blocks if block.half_cycle[-1] == steps)
+        area = 2e-9 * 65 / case.model.thickness * 500 * steps
+        rigid = (1.5 * 20 * area) ** (2 / 3) / 40
+        what = f"after {steps // 2:,} m"
+        rows += [
+            number(f"{what}: depth (mm), published", depth, worn.max(), 5e-3),
+            number(f"{what}: depth (mm), of rigid bodies", rigid, worn.max(), 5e-3),
+            number(f"{what}: worn area (mm²)", area, system.pair.weights @ worn, 1e-3),
+        ]
+    return Result(rows)
+
+
+@verification(
     "jumps-of-laws",
     "Cycle jumps against half-cycles one by one, for laws of temperature, pressure and speed",
     "the mean of explicit and implicit marches, whose own difference is the wear within a cycle",

@@ -11,9 +11,9 @@ import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import ufl
 from dolfinx import fem
-from petsc4py import PETSc
 
 from fenwear.arrays import Array
+from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.verify.suite import Line, Plot
 
@@ -46,23 +46,19 @@ def errors(function: fem.Function, exact: Exact) -> tuple[float, float]:
     return math.sqrt(squares[0]), math.sqrt(squares[1])
 
 
-def displacement(body: ElasticBody, force: PETSc.Vec) -> fem.Function:
+def displacement(body: ElasticBody, force: Array) -> fem.Function:
     """Return the displacement of a supported body under nodal forces; collective."""
-    force.array[body.supported] = 0.0
-    solution = force.duplicate()
-    body.factor.solve(force, solution)
+    force[body.supported] = 0.0
     u = fem.Function(body.space)
-    u.x.array[: len(solution.array_r)] = solution.array_r
+    u.x.array[: len(force)] = body.factor.solve(force)
     u.x.scatter_forward()
     return u
 
 
-def body_force(body: ElasticBody, density: Exact) -> PETSc.Vec:
+def body_force(body: ElasticBody, density: Exact) -> Array:
     """Return the nodal forces of a force density per volume; collective."""
     field = _richer(fem.Function(body.space), density)
-    vector = fem.petsc.assemble_vector(fem.form(ufl.inner(field, ufl.TestFunction(body.space)) * ufl.dx))
-    vector.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
-    return vector
+    return assembled_vector(ufl.inner(field, ufl.TestFunction(body.space)) * ufl.dx)
 
 
 def convergence_plot(

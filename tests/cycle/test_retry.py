@@ -35,11 +35,11 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Tribosystem], list[int
     def fails(system: Tribosystem) -> list[int]:
         original, failed = PhaseStep.solve, []
 
-        def solve(self: PhaseStep, temperature: Any, worn: Any, before: ContactState | None) -> PhaseEnd:
+        def solve(self: PhaseStep, temperature: Any, worn: Any, before: ContactState | None, *load: Any) -> PhaseEnd:
             if self.system is system and before is not None and self.phase not in failed:
                 failed.append(self.phase)
                 raise ConvergenceError("on purpose")
-            return original(self, temperature, worn, before)
+            return original(self, temperature, worn, before, *load)
 
         monkeypatch.setattr(PhaseStep, "solve", solve)
         return failed
@@ -144,10 +144,10 @@ def test_jumps_that_fail(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, s
     stepper = sys.modules["fenwear.cycle.jump"]._Stepper
     original = stepper.step
 
-    def step(self: Any, moment: Any, cycles: float) -> Any:
+    def step(self: Any, moment: Any, cycles: float, *since: Any) -> Any:
         if cycles >= shortest:
             raise ConvergenceError("on purpose")
-        return original(self, moment, cycles)
+        return original(self, moment, cycles, *since)
 
     monkeypatch.setattr(stepper, "step", step)
     blocks = list(jump(system, 400, tolerance=1e-3))

@@ -17,6 +17,7 @@ from fenwear.cycle import Block, growth_rate, stationary_growth
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.stability import phase_tangent, repeating_temperatures
 from fenwear.cycle.state import RunState
+from fenwear.cycle.totals import none_yet
 from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., Tribosystem]
@@ -168,7 +169,9 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]
     modes = np.zeros((1, 2))
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.pair.x / 30) ** 2
-    return RunState(0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic)), state
+    return RunState(
+        0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic), none_yet(system)
+    ), state
 
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])
@@ -229,7 +232,7 @@ def test_tangent_of_a_half_cycle(assembled: Assemble, name: str) -> None:
 
     def end(temperature: Array, worn: Array) -> tuple[Array, Array, Array]:
         start = heat.exchange.at(before.values + temperature)
-        moment = RunState(0, Worn(state.shape + worn, 0 * system.pair.strip.weights), contacts, start)
+        moment = RunState(0, Worn(state.shape + worn, 0 * system.pair.strip.weights), contacts, start, none_yet(system))
         block = run(system, 1, implicit=True, start=moment)
         return block.end.temperature.values, block.end.worn.punch, block.pressure[0]
 
@@ -278,7 +281,7 @@ def test_growth_with_friction_by_temperature(assembled: Assemble) -> None:
     for sign in (1, -1):
         temperature = heat.exchange.at(states[0].values + sign * mode[:dim])
         worn = Worn(state.shape + sign * mode[dim:], 0 * system.pair.strip.weights)
-        ends.append(run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature)))
+        ends.append(run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature, none_yet(system))))
     apart = np.linalg.norm(ends[0].pressure - ends[1].pressure, axis=1)[1::2]
     rate = growth_rate(system, pressure)
     assert rate == pytest.approx(np.log(values[largest].real) / system.motion.period, rel=1e-12)

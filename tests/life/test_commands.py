@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
+from fenwear.case import changed_case, load_case
 from fenwear.cli import app
 from fenwear.errors import CaseError
+from fenwear.life.model import Model
 
 SMALL = ["--set", "geometry.degree=2", "--set", "geometry.parameters.elements_along_contact=8"]
 K = "wear.punch.coefficient"
@@ -94,3 +96,10 @@ def test_bounds_that_exclude_the_data_lose_nothing(call: Call, tmp_path: Path) -
 def test_wrong_usage_is_refused(call: Call, arguments: list[str], expected: str) -> None:
     with pytest.raises(CaseError, match=expected):
         call(*arguments)
+
+
+def test_programs_are_not_followed() -> None:
+    """A life, a sensitivity and a calibration are of constant loads: a program is refused by its key."""
+    case = changed_case(load_case("example1"), "program={steps=[{cycles=3}]}", "run.half_cycles=6")
+    with pytest.raises(CaseError, match="program: not followed here"):
+        Model(case)

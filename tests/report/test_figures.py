@@ -12,11 +12,11 @@ from PIL import Image
 
 from fenwear import CaseError, load_case
 from fenwear.report.animation import draw_animation, frames_of
+from fenwear.report.draw import draw_figures
 from fenwear.report.figures import (
     all_figures,
     chosen_half_cycles,
     convergence_figure,
-    draw_figures,
     heat_balance_figure,
     mean_pressure_figure,
     open_history,

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import ufl
 import xarray
 
 from fenwear import Tribosystem, march
+from fenwear.bodies.antiplane import shear_out_of_plane
+from fenwear.bodies.contact_surface import contact_tag
 from fenwear.results.fields import body_fields, write_fields
 
 COARSE = ("geometry.degree=3", "geometry.parameters.elements_along_contact=8")
@@ -22,8 +25,9 @@ def write(system: Tribosystem, folder: Path, half_cycles: int) -> xarray.Dataset
     if system.exchange is not None and block.end.temperature is not None:
         temperatures = block.end.temperature.temperatures()
     direction = int(block.direction[-1])
-    fields = body_fields(system, block.pressure[-1], block.rigid[-1], (half_cycles - 1) % 2, temperatures)
-    write_fields(folder, system, half_cycles, fields, direction, block.end.worn)
+    phase = (half_cycles - 1) % system.motion.half_cycles
+    fields = body_fields(system, block.pressure[-1], block.rigid[-1], phase, temperatures)
+    write_fields(folder, system, half_cycles, fields, direction, block.end.worn, block.pressure[-1])
     with xarray.open_dataset(folder / "fields" / f"half_cycle_{half_cycles:06d}.nc", engine="h5netcdf") as opened:
         return opened.load()
 
@@ -67,3 +71,37 @@ def test_von_mises_of_a_uniaxial_load(
     data = write(assembled("example2", *COARSE, *settings), tmp_path, 1)
     middle = np.abs(data.punch_z - 300) < 25
     np.testing.assert_allclose(data.punch_von_mises[middle], expected * 1e4 / 600, rtol=2e-3)
+
+
+def test_torsion_of_rings(assembled: Callable[..., Tribosystem]) -> None:
+    """A tube held at one end and turned at the other by tractions tau r has u = tau r z / G, exactly."""
+    narrow = ("geometry.parameters.margin_inside=0", "geometry.parameters.margin_outside=0")
+    system = assembled("ring-on-ring", "geometry.degree=2", "geometry.parameters.across=4", *narrow)
+    elastic = system.bodies.strip
+    radius = ufl.SpatialCoordinate(elastic.body.mesh)[0]
+    load = elastic.surface_integral(ufl.as_vector((2.5 * radius, 0.0)), contact_tag(elastic.body))
+    force = elastic.trace.pick(load[:, None])[:, 0, 0]
+    assert force @ elastic.surface.trace[:, 0] == pytest.approx(2.5 * np.pi / 2 * (30**4 - 20**4), rel=1e-12)
+    u = shear_out_of_plane(elastic, elastic.trace.blocks, force)
+    r, z = u.function_space.tabulate_dof_coordinates()[:, :2].T
+    exact = 2.5 / (210e3 / 2.6) * r * (z - z.min())
+    np.testing.assert_allclose(u.x.array, exact, atol=1e-9 * exact.max())
+
+
+TURNED = {"punch": 1, "strip": -1}  # the way that friction takes each body as the strip turns about z
+
+
+def test_stress_of_twisted_rings(assembled: Callable[..., Tribosystem], tmp_path: Path) -> None:
+    """Where a ring turns on another, the traction mu p shears both: von Mises' stress holds it, and every value is."""
+    system = assembled("ring-on-ring", "geometry.degree=2", "geometry.parameters.across=4", "contact.friction=0.5")
+    data = write(system, tmp_path, 1)
+    for body in ("punch", "strip"):
+        assert np.isfinite(data[f"{body}_von_mises"]).all()
+        turned = data[f"{body}_displacement_out_of_plane"]
+        assert float(np.abs(turned).max()) == pytest.approx(float((turned * TURNED[body]).max()))
+    # In the middle of the contact: nearly uniaxial -p and the shear mu p.
+    (block,) = march(system, 1)
+    middle = np.argmin(np.abs(system.pair.x - 25))
+    p = block.pressure[0, middle]
+    at = np.argmin(np.hypot(data.punch_x.values - 25, data.punch_z.values))
+    assert float(data.punch_von_mises[at]) == pytest.approx(p * np.sqrt(1 + 3 * 0.5**2), rel=0.1)

@@ -8,13 +8,10 @@ from mpi4py import MPI
 from fenwear import CaseError
 from fenwear.verify import VerificationCase, registered, run_cases
 
-# On two ranks this one takes 8 GB on each: distributed steps of heat are freed late.
-LARGE = ("conduction",)
-
 
 def marks(case: VerificationCase) -> list[pytest.MarkDecorator]:
     """Return how a case runs."""
-    return [*([pytest.mark.slow] if case.slow else []), *([] if case.name in LARGE else [pytest.mark.mpi])]
+    return [pytest.mark.mpi, *([pytest.mark.slow] if case.slow else [])]
 
 
 CASES = [pytest.param(c, id=c.name, marks=marks(c)) for c in registered()]

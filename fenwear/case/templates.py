@@ -1,0 +1,185 @@
+"""Commented cases of the usual tests: their text with the dimensions that the user gives in place of the usual ones.
+
+A template is a file of two parts. The first names its dimensions, each with its usual value, its unit and its source;
+the second, below a line +++, is the case file, in which jinja2 fills them in.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from fenwear.case.reading import make_case
+from fenwear.case.units import convert
+from fenwear.errors import CaseError, InputError
+
+BETWEEN = "\n+++\n"
+REMARK = re.compile(r"^([^#\n]*\S) {2,}(# .*)$", re.MULTILINE)  # behind a key, put in line with the others
+COLUMN = 32
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A number that a template asks for.
+
+    Attributes:
+        value: The usual one, as a case file has it.
+        unit: It is converted to, and read in where it has none; "" for a pure number.
+        about: What it is, and whose value.
+    """
+
+    value: str | float
+    unit: str
+    about: str
+
+
+@dataclass(frozen=True)
+class Template:
+    """A commented case of a usual test.
+
+    Attributes:
+        name: Of the test, as after `fenwear new`.
+        title: In a line.
+        dimensions: By their names.
+        text: Of the case file, with the dimensions to be filled in.
+    """
+
+    name: str
+    title: str
+    dimensions: Mapping[str, Dimension]
+    text: str
+
+
+def template_names() -> list[str]:
+    """Return the names of the templates."""
+    return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
+
+
+def _folder() -> resources.abc.Traversable:
+    return resources.files("fenwear") / "templates"
+
+
+def find_template(name: str) -> Template:
+    """Return the template of a name.
+
+    Raises:
+        CaseError: there is none; names the nearest.
+    """
+    names = template_names()
+    if name not in names:
+        close = difflib.get_close_matches(name, names, 1, 0.5) or [n for n in names if name and name in n][:1]
+        hint = f"did you mean {close[0]!r}? " if close else ""
+        raise CaseError(InputError("new", f"no template {name!r}; {hint}There are {', '.join(names)}"))
+    head, _, text = (_folder() / f"{name}.toml").read_text("utf-8").partition(BETWEEN)
+    told = tomllib.loads(head)
+    found = {
+        key: Dimension(one["value"], one.get("unit", "mm"), one["about"]) for key, one in told["dimensions"].items()
+    }
+    return Template(name, told["title"], found, text.lstrip("\n"))
+
+
+def fill_in(template: Template, settings: Sequence[str] = ()) -> str:
+    """Return the text of the case file.
+
+    Args:
+        template: Of the test.
+        settings: `dimension=value`, the value as in a case file.
+
+    Raises:
+        CaseError: a dimension that it does not have, or a value that is none; lists all.
+    """
+    import jinja2
+
+    given: dict[str, str | float] = {name: one.value for name, one in template.dimensions.items()}
+    problems = []
+    for setting in settings:
+        name, equals, text = setting.partition("=")
+        name = name.strip()
+        if not equals or name not in given:
+            problems.append(InputError("--set", _unknown(template, setting)))
+            continue
+        try:
+            given[name] = _checked(text.strip().strip("\"'"), template.dimensions[name].unit)
+        except ValueError as error:
+            problems.append(InputError(f"--set {name}", str(error)))
+    if problems:
+        raise CaseError(problems)
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=False, keep_trailing_newline=True)
+    environment.globals.update(
+        pi=math.pi,
+        number=convert,
+        mm=lambda value: convert(value, "mm"),
+        whole=lambda value: max(1, round(value)),
+        g=lambda value: f"{value:.10g}",
+    )
+    text = environment.from_string(template.text).render(given)
+    return REMARK.sub(lambda found: f"{found[1]:<{COLUMN - 2}}  {found[2]}", text)
+
+
+def _checked(text: str, unit: str) -> str | float:
+    """Return a value with its unit, or a pure number.
+
+    Raises:
+        ValueError: it is of another kind, or not positive; says what was expected.
+    """
+    number = convert(text, unit)
+    if number <= 0:
+        raise ValueError(f"expected more than zero, got {text!r}")
+    if not unit:
+        return round(number) if number == round(number) else number
+    bare = text.replace("+", "").replace("-", "").replace(".", "").replace("e", "").replace("E", "").isdigit()
+    return f"{text} {unit}" if bare else text
+
+
+def _unknown(template: Template, setting: str) -> str:
+    name, equals, _ = setting.partition("=")
+    if not equals:
+        return f"expected dimension=value, got {setting!r}"
+    names = list(template.dimensions)
+    close = difflib.get_close_matches(name.strip(), names, 1, 0.5)
+    hint = f"did you mean {close[0]!r}? It has" if close else "it has"
+    return f"{template.name} has no dimension {name.strip()!r}; {hint} {', '.join(names)}"
+
+
+def all_text() -> str:
+    """Return all templates with their titles, in lines."""
+    return "\n".join(f"{name:18} {find_template(name).title}" for name in template_names())
+
+
+def dimensions_text(name: str) -> str:
+    """Return the dimensions of a template, their usual values and what they are, in lines.
+
+    Raises:
+        CaseError: there is no such template.
+    """
+    return "\n".join(f"{k:18} {d.value!s:>10}  {d.about}" for k, d in find_template(name).dimensions.items())
+
+
+def write_case_of(name: str, path: Path, settings: Sequence[str] = ()) -> None:
+    """Write the case file of a template.
+
+    Args:
+        name: Of the template.
+        path: Of the new file.
+        settings: `dimension=value`.
+
+    Raises:
+        CaseError: as `find_template` and `fill_in`; or the file exists, is no .toml or cannot be written.
+    """
+    if path.suffix != ".toml":
+        raise CaseError(InputError("-o", f"expected a file ending in .toml, got {str(path)!r}"))
+    text = fill_in(find_template(name), settings)
+    make_case(tomllib.loads(text))
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise CaseError(InputError("-o", f"{path} exists already; expected a new file")) from None
+    except OSError as error:
+        raise CaseError(InputError("-o", f"{path} cannot be written: {error.strerror}")) from None

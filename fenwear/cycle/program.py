@@ -1,0 +1,125 @@
+"""Test programs: stages of constant motion and surroundings one after the other, each on the operators of the last.
+
+A stage begins with the depths and temperatures that the stage before it has left. Loads may change within it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from fenwear.assembly import Clock, Tribosystem, with_case
+from fenwear.case.program import Stage, stages_of
+from fenwear.cycle.block import Block
+from fenwear.cycle.driver import Loading, as_given
+from fenwear.cycle.follow import follow
+from fenwear.cycle.state import RunState
+from fenwear.errors import CaseError, InputError
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where an integration ends, and the factor of all loads on the way."""
+
+    until: int
+    loading: Loading = as_given
+
+
+# Runs a system from a state over a span, and leaves at the first state for which it is told to.
+IntegrateSpan = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool], Span], Iterator[Block]]
+
+
+def follow_program(
+    system: Tribosystem, integrate: IntegrateSpan, half_cycles: int, start: RunState | None = None
+) -> Iterator[Block]:
+    """Yield the blocks of a run over the program of its case, whose meshes follow large wear; collective.
+
+    Args:
+        system: The assembled problem, of the case as it stands without its program.
+        integrate: Yields the blocks of a span on one system, such as `march` or `jump`.
+        half_cycles: The last one at most.
+        start: Where to go on from; by default the beginning.
+
+    Raises:
+        CaseError: a load is given where supports and not the contact carry the loads.
+        ConvergenceError: as `integrate`.
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    stages = stages_of(system.case)
+    if not stages:
+        span = Span(half_cycles)
+        yield from follow(system, lambda own, state, leave: integrate(own, state, leave, span), start)
+        return
+    base, state = system, start
+    for stage in stages:
+        done = 0 if state is None else state.half_cycle
+        if stage.end <= done:
+            continue
+        if stage.begin >= half_cycles:
+            return
+        span = Span(min(stage.end, half_cycles), loading_of(base, stage))
+
+        def adapt(moved: Tribosystem, stage: Stage = stage) -> Tribosystem:
+            nonlocal base
+            base = moved
+            return at_stage(base, stage)
+
+        def run(
+            own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span = span
+        ) -> Iterator[Block]:
+            return integrate(own, state, leave, span)
+
+        for block in follow(at_stage(base, stage), run, state, adapt):
+            yield block
+            state = block.end
+
+
+def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
+    """Return the system with the motion and surroundings of a stage, sharing all operators that they leave; collective.
+
+    Args:
+        system: Of the case, on meshes as they are now.
+        stage: Of its program.
+    """
+    return replace(
+        with_case(system, stage.case), made_from=system.case, clock=Clock(stage.begin, stage.time, stage.slid)
+    )
+
+
+def loading_of(system: Tribosystem, stage: Stage) -> Loading:
+    """Return the factor of all loads over a stage, linear in the half-cycles.
+
+    Raises:
+        CaseError: a load is given where supports and not the contact carry the loads.
+    """
+    ends = stage.load_factor
+    if stage.load is not None:
+        nominal = system.normal_force
+        if nominal <= 0:
+            key = f"program.steps.{stage.step}.load"
+            raise CaseError(InputError(key, "expected load_factor: supports carry the loads, not the contact alone"))
+        ends = stage.load[0] / nominal, stage.load[1] / nominal
+    if ends == (1.0, 1.0):
+        return as_given
+    first, last = ends
+
+    def loading(half_cycles: float) -> float:
+        share = (half_cycles - stage.begin) / (stage.end - stage.begin)
+        return first + share * (last - first)
+
+    return loading
+
+
+def at_loads(system: Tribosystem, factor: float) -> Tribosystem:
+    """Return the system under all its loads times a factor; collective."""
+    if factor == 1:
+        return system
+    bodies = tuple(
+        body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
+        for body in (system.case.punch, system.case.strip)
+    )
+    case = system.case.model_copy(update={"punch": bodies[0], "strip": bodies[1]})
+    loaded = tuple(
+        own.under(case, phase.fraction) for own, phase in zip(system.loaded, system.motion.phases, strict=True)
+    )
+    return replace(system, loaded=loaded)

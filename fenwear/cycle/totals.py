@@ -1,0 +1,113 @@
+"""What is added up over all half-cycles of a run, recorded or jumped over: wear, sliding, the work of friction.
+
+In a phase in which the strip moves by ds, mm or rad, its material moves by v_i ds at node i, and along the contact
+by r_i ds: v_i = 1 in a translation, and r_i = v_i where the surface is not inclined to the motion.
+
+    sliding distance    s = integral of <v> ds,         <v> the mean over the nominal contact;
+    load path           integral of sum w_i p_i r_i ds, N mm: load times s in a translation, along scars too;
+    work of friction    integral of sum w_i mu p_i r_i ds, N mm = mJ;
+    energy per area     integral of mu p_i r_i ds, mJ/mm²;
+    worn volume, mass   sum w_i h_i, sum w_i rho_i h_i of the depths h_i worn in the phase, of each body.
+
+w_i are the nodes' areas, those of the plane times the thickness. With a = b = 1 volume = beta~ times the load
+path, whatever the pressure and the meshes do. A step of a jump adds these as it adds depths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly import Placed
+from fenwear.sliding.wear import PhasesWear
+
+SUMS = ("distance", "load_path", "work", "volume_punch", "mass_punch", "volume_strip", "mass_strip")
+MILLIGRAM = 1e9  # in N s²/mm, a tonne
+
+
+@dataclass(frozen=True)
+class Totals:
+    """What has been added up, of one state or of k of them.
+
+    Attributes:
+        sums: By `SUMS` (7,) or (k, 7): mm, N mm, mJ, and mm³ and mg of each body; NaN for a mass without density.
+        energy: Dissipated at the contact nodes per area (n,) or (k, n), mJ/mm².
+    """
+
+    sums: Array
+    energy: Array
+
+    def __add__(self, other: Totals) -> Totals:
+        return Totals(self.sums + other.sums, self.energy + other.energy)
+
+    def __sub__(self, other: Totals) -> Totals:
+        return Totals(self.sums - other.sums, self.energy - other.energy)
+
+    def times(self, factor: float) -> Totals:
+        """Return all of it times a factor."""
+        return Totals(factor * self.sums, factor * self.energy)
+
+    def of(self, name: str) -> Array:
+        """Return one of the sums () or (k,), by its name in `SUMS`."""
+        found: Array = self.sums[..., SUMS.index(name)]
+        return found
+
+
+def none_yet(system: Placed) -> Totals:
+    """Return the totals at the start: zero."""
+    return Totals(np.zeros(len(SUMS)), np.zeros(len(system.pair.weights)))
+
+
+class PhaseMeter:
+    """What a phase adds at a pressure: all that is linear in it in one product.
+
+    Args:
+        system: The bodies.
+        phase: Number of the phase.
+        mu: Friction coefficient at the nodes (n,).
+        wear: Of this phase alone.
+    """
+
+    def __init__(self, system: Placed, phase: int, mu: Array, wear: PhasesWear) -> None:
+        pair, slid = system.pairs[phase], system.slid[phase]
+        areas = system.bodies.punch.thickness * pair.weights
+        path = system.motion.phases[phase].distance * slid
+        self._energy = mu * path
+        speed = np.linalg.norm(system.sliding.field.velocity(pair.punch.x), axis=1)
+        self._distance = system.motion.phases[phase].distance * float(speed @ pair.weights / pair.weights.sum())
+        self._rows = np.zeros((len(SUMS), len(areas)))
+        self._rows[SUMS.index("load_path")] = areas * path
+        self._rows[SUMS.index("work")] = areas * self._energy
+        self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
+        for body, own, density in zip(
+            ("punch", "strip"), (wear.punch, wear.strip), opposite_densities(system, phase), strict=True
+        ):
+            first = SUMS.index(f"volume_{body}")
+            weigh = np.array([areas, np.full(len(areas), np.nan) if density is None else MILLIGRAM * density * areas])
+            if own is None:
+                self._rows[first + 1] = 0.0 * weigh[1]
+            elif own.linear:
+                self._rows[first : first + 2] = weigh * own.rate[0]
+            else:
+                self._curved.append((slice(first, first + 2), weigh, own))
+
+    def __call__(self, pressure: Array) -> Totals:
+        """Return what the phase adds at a pressure (n,)."""
+        sums = self._rows @ pressure
+        sums[0] = self._distance
+        for rows, weigh, body in self._curved:
+            sums[rows] = weigh @ body.depth(pressure[None])[0]
+        return Totals(sums, self._energy * pressure)
+
+
+def opposite_densities(system: Placed, phase: int) -> tuple[Array | None, Array | None]:
+    """Return the densities of what is worn at the contact nodes in a phase, of punch and strip, N s²/mm⁴."""
+    pair, (punch, strip) = system.pairs[phase], system.bodies.densities
+    if strip is None:
+        return punch, None
+    nodes = pair.strip.weights
+    if system.sliding.track is not None:
+        return punch, np.full(len(pair.weights), float(nodes @ strip) / float(nodes.sum()))
+    return punch, (pair.deposit.T @ (nodes * strip)) / pair.weights

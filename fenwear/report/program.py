@@ -1,0 +1,40 @@
+"""The figure of a test program: what acted over the run, read from its history."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import xarray
+
+from fenwear.report.style import panels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ACTED = {
+    "load": "normal force (N)",
+    "load_factor": "loads over the case's",
+    "speed": "mean speed",
+    "ambient": "ambient (K)",
+}
+
+
+def program_figure(history: xarray.Dataset) -> Figure:
+    """Draw over the time what acted: the load, the speed and the ambient temperature, where they change."""
+    shown = [name for name in ACTED if name in history and _changes(history[name])]
+    if "load" in shown and "load_factor" in shown:  # the same twice
+        shown.remove("load_factor")
+    figure, axes = panels(max(1, len(shown)), 2.4)
+    for ax, name in zip(axes, shown or ["load_factor"], strict=True):
+        ax.plot(history.time, history[name], color="0", marker=".", markersize=3, linewidth=1)
+        unit = {"mm s-1": " (mm/s)"}.get(str(history[name].attrs.get("units")), "") if name == "speed" else ""
+        ax.set_ylabel(f"{ACTED[name]}{unit}")
+        low, high = float(history[name].min()), float(history[name].max())
+        ax.set_ylim(min(0.0, 1.1 * low), 1.1 * max(high, 1e-300))
+    axes[-1].set_xlabel("time (s)")
+    return figure
+
+
+def _changes(values: xarray.DataArray) -> bool:
+    low, high = float(values.min()), float(values.max())
+    return high - low > 1e-9 * max(abs(low), abs(high))

@@ -1,0 +1,250 @@
+"""Figures and page of a run with stick, drawn from its folder alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+
+from fenwear.report.figures import FOLDER, open_history
+from fenwear.report.html_page import picture, render
+from fenwear.report.key_numbers import read_summary
+from fenwear.report.style import BLUE, GREY, RED, contact_axis, legend_beside, panels, reference_line, shades
+from fenwear.results.disk import write_text, writing
+from fenwear.results.history import CASE, HISTORY
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+REPORT = "report.html"
+GROSS = 0.2  # energy ratio above which sliding is called gross (Fouvry)
+LABELS = {
+    "cycles": ("cycles done", ""),
+    "largest_force_N": ("largest tangential force", "N"),
+    "max_pressure_MPa": ("largest pressure", "MPa"),
+    "largest_traction_MPa": ("largest tangential traction", "MPa"),
+    "largest_stick_traction_MPa": ("largest tangential traction where it sticks", "MPa"),
+    "largest_surface_stress_MPa": ("largest stress along x in the strip's surface", "MPa"),
+    "dissipated_energy_mJ": ("work of friction in the last cycle", "mJ"),
+    "accumulated_energy_mJ": ("work of friction in all cycles", "mJ"),
+    "energy_ratio": ("energy ratio of the last cycle", ""),
+    "contact_width_mm": ("width in contact", "mm"),
+    "stick_width_mm": ("width that sticks all through the cycle", "mm"),
+    "wear_max_mm": ("largest worn depth of the punch", "mm"),
+    "wear_strip_max_mm": ("largest worn depth of the strip", "mm"),
+    "worn_area_punch_mm2": ("cross-section worn off the punch", "mm²"),
+    "largest_energy_balance_error": ("largest error of the energy balance, over its largest term", ""),
+    "largest_jump_error": ("largest estimated error of a jump's depths", ""),
+    "steps_per_half_cycle": ("time steps of a half-cycle", ""),
+    "contact_nodes": ("contact nodes", ""),
+}
+
+
+def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
+    """Return the places of recorded cycles at even shares of the wear, the first and the last among them."""
+    depth = (history.wear.max("x") + history.wear_strip.max("x_strip")).values
+    course = depth if depth[-1] > depth[0] else np.arange(len(depth), dtype=float)
+    return sorted({int(np.abs(course - target).argmin()) for target in np.linspace(course[0], course[-1], count)})
+
+
+def loops(history: xarray.Dataset) -> Figure:
+    """Draw the fretting loops: tangential force over displacement, and over what is more than full stick's."""
+    figure, (whole, beyond) = panels(2, 3.0, share_x=False)
+    first = history.isel(cycle=0)
+    slopes = np.diff(first.tangential_force) / np.where(
+        np.diff(first.displacement) == 0, np.inf, np.diff(first.displacement)
+    )
+    stiffness = float(slopes.max(initial=0.0)) or np.inf
+    for colour, place in shades(chosen(history)):
+        cycle = history.isel(cycle=place)
+        closed = np.arange(cycle.sizes["step"] + 1) % cycle.sizes["step"]
+        x, y = 1e3 * cycle.displacement.values[closed], cycle.tangential_force.values[closed]
+        whole.plot(x, y, color=colour, label=f"{int(cycle.cycle):,}")
+        beyond.plot(x - 1e3 * y / stiffness, y, color=colour)
+    whole.set_xlabel("displacement of the strip (µm)")
+    beyond.set_xlabel("displacement less that of full stick at the same force (µm)")
+    for ax in (whole, beyond):
+        ax.set_ylabel("tangential force (N)")
+    legend_beside(whole, "cycle")
+    return figure
+
+
+def energy(history: xarray.Dataset) -> Figure:
+    """Draw friction's work and the energy ratio over the cycles."""
+    figure, (upper, lower) = panels(2, 2.2)
+    cycles = np.maximum(history.cycle.values, 1)
+    upper.plot(cycles, 1e3 * history.dissipated_energy, color=BLUE, marker=".", markersize=3)
+    upper.set_ylabel("work of friction\nin a cycle (µJ)")
+    lower.plot(cycles, history.energy_ratio, color=RED, marker=".", markersize=3)
+    reference_line(lower, GROSS, "gross sliding above, partial slip below")
+    lower.set_ylabel("energy ratio")
+    lower.set_ylim(0, max(0.3, 1.1 * float(history.energy_ratio.max())))
+    lower.set_xlabel("cycle")
+    if cycles[-1] > 20:
+        lower.set_xscale("log")
+    return figure
+
+
+def zones(history: xarray.Dataset) -> Figure:
+    """Draw where the surfaces stick, slip and are open over the first and the last cycle."""
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    places = sorted({0, history.sizes["cycle"] - 1})
+    figure, axes = panels(len(places), 2.4)
+    colours = ("white", RED, BLUE)
+    x = history.x.values
+    for ax, place in zip(axes, places, strict=True):
+        cycle = history.isel(cycle=place)
+        state = np.where(cycle.stick.values == 1, 2, np.where(cycle.pressure.values > 0, 1, 0))
+        steps = np.arange(1, cycle.sizes["step"] + 1)
+        ax.pcolormesh(x, steps, state, cmap=ListedColormap(colours), vmin=0, vmax=2, shading="nearest", rasterized=True)
+        ax.set_ylabel("time step")
+        ax.set_title(f"cycle {int(cycle.cycle):,}")
+        ax.legend(
+            handles=[Patch(color=BLUE, label="stick"), Patch(color=RED, label="slip")],
+            loc="center left",
+            bbox_to_anchor=(1.0, 0.5),
+            frameon=False,
+        )
+    touched = x[(history.pressure.values > 0).any(axis=(0, 1))]
+    if len(touched):
+        margin = 0.15 * float(np.ptp(touched)) + 1e-9
+        axes[-1].set_xlim(touched.min() - margin, touched.max() + margin)
+    axes[-1].set_xlabel("position along the contact x (mm)")
+    return figure
+
+
+def tractions(history: xarray.Dataset) -> Figure:
+    """Draw the tangential traction between its bounds in the first and the last cycle."""
+    places = sorted({0, history.sizes["cycle"] - 1})
+    figure, axes = panels(len(places), 2.8)
+    mu = float(history.attrs["friction"])
+    for ax, place in zip(axes, places, strict=True):
+        cycle = history.isel(cycle=place)
+        steps = cycle.sizes["step"]
+        half = int((history.half_cycle_of_step == 1).sum())
+        for colour, step in shades([half // 4 - 1, half // 2 - 1, 3 * half // 4 - 1, half - 1, steps - 1]):
+            now = cycle.isel(step=max(step, 0))
+            ax.plot(history.x, now.traction, color=colour, label=f"{float(now.fraction):.3g}")
+        bound = mu * cycle.pressure.max("step")
+        ax.fill_between(history.x, -bound, bound, color=GREY, alpha=0.15, linewidth=0, label="µ p")
+        ax.set_ylabel("traction (MPa)")
+        ax.set_title(f"cycle {int(cycle.cycle):,}")
+        legend_beside(ax, "part of the cycle")
+    _to_contact(axes[-1], history)
+    return figure
+
+
+def stresses(history: xarray.Dataset) -> Figure:
+    """Draw the stress along x in the strip's surface, its range over the cycle."""
+    figure, (ax,) = panels(1, 3.0)
+    for colour, place in shades(chosen(history, 3)):
+        cycle = history.isel(cycle=place)
+        low, high = cycle.surface_stress.min("step"), cycle.surface_stress.max("step")
+        ax.plot(history.x, high, color=colour, label=f"{int(cycle.cycle):,}")
+        ax.plot(history.x, low, color=colour, linestyle=":")
+    ax.set_ylabel("stress along x in the strip's surface:\nlargest, and dotted smallest (MPa)")
+    legend_beside(ax, "cycle")
+    _to_contact(ax, history)
+    return figure
+
+
+def shapes(history: xarray.Dataset) -> Figure:
+    """Draw the worn depths and the pressure of chosen cycles."""
+    figure, (depth, pressure) = panels(2, 2.4)
+    for colour, place in shades(chosen(history)):
+        cycle = history.isel(cycle=place)
+        depth.plot(history.x, -1e3 * cycle.wear, color=colour, label=f"{int(cycle.cycle):,}")
+        depth.plot(history.x_strip, -1e3 * cycle.wear_strip, color=colour, linestyle=":")
+        pressure.plot(history.x, cycle.pressure.isel(step=-1), color=colour, label=f"{int(cycle.cycle):,}")
+    depth.set_ylabel("worn depth (µm):\npunch, dotted strip")
+    pressure.set_ylabel("pressure at the end\nof the cycle (MPa)")
+    legend_beside(depth, "cycle")
+    _to_contact(pressure, history)
+    return figure
+
+
+def sliding_map(history: xarray.Dataset) -> Figure:
+    """Draw where each node slips: its slip in a cycle and its share of friction's work."""
+    figure, (slip, work) = panels(2, 2.2)
+    for colour, place in shades(chosen(history, 3)):
+        cycle = history.isel(cycle=place)
+        slid, label = np.abs(cycle.slip), f"{int(cycle.cycle):,}"
+        slip.plot(history.x, 1e3 * slid.where(cycle.pressure > 0, 0).sum("step"), color=colour, label=label)
+        work.plot(history.x, 1e3 * (np.abs(cycle.traction) * slid).sum("step"), color=colour, label=label)
+    slip.set_ylabel("slip in a cycle (µm)")
+    work.set_ylabel("work of friction\nin a cycle (µJ/mm²)")
+    legend_beside(slip, "cycle")
+    _to_contact(work, history)
+    return figure
+
+
+def _to_contact(ax: Any, history: xarray.Dataset) -> None:
+    x = history.x.values
+    touched = x[(history.pressure.values > 0).any(axis=(0, 1))]
+    contact_axis(ax)
+    if len(touched):
+        margin = 0.2 * float(np.ptp(touched)) + 1e-9
+        ax.set_xlim(max(touched.min() - margin, x[0]), min(touched.max() + margin, x[-1]))
+
+
+# name: (drawing, caption, what it shows)
+FIGURES: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
+    "loops": (loops, "Fretting loops", "Tangential force over the displacement of the strip, a loop for each cycle."),
+    "zones": (zones, "Stick and slip over the cycle", "Where nodes stick and slip, along x and over the time steps."),
+    "tractions": (tractions, "Tangential traction", "Traction along x at five times, between plus and minus mu p."),
+    "sliding": (sliding_map, "Slip and work of friction", "Slip and work of friction of a cycle along x."),
+    "energy": (energy, "Work of friction and energy ratio", "Both over the cycles, with the border of gross sliding."),
+    "surface_stress": (stresses, "Stress in the strip's surface", "Its largest and smallest value along x."),
+    "shape": (shapes, "Worn depth and pressure", "Worn depths of both bodies and pressure along x, a line a cycle."),
+}
+
+
+def write_stick_report(directory: Path) -> list[Path]:
+    """Draw the figures of a run with stick and write its report.html; return the files.
+
+    Raises:
+        CaseError: the folder holds no run.
+        OutputError: a figure or the page cannot be written.
+    """
+    with open_history(directory) as opened:
+        history = opened.load()
+    folder = directory / FOLDER
+    paths, pictures = [], []
+    with writing(directory):
+        folder.mkdir(exist_ok=True)
+        for name, (draw, caption, alt) in FIGURES.items():
+            path = folder / f"{name}.png"
+            draw(history).savefig(path, dpi=150)
+            paths.append(path)
+            pictures.append(picture(path.read_bytes(), "png", caption, alt))
+    report = directory / REPORT
+    write_text(report, _page(directory, history, pictures))
+    return [*paths, report]
+
+
+def _page(directory: Path, history: xarray.Dataset, pictures: list[Any]) -> str:
+    summary = read_summary(directory)
+    numbers = [
+        (label, f"{summary[key]:.5g}" if isinstance(summary[key], float) else f"{summary[key]:,}", unit)
+        for key, (label, unit) in LABELS.items()
+        if key in summary
+    ]
+    return render(
+        "stick.html",
+        title=str(history.attrs.get("title", "")) or "fenwear run",
+        name=directory.resolve().name,
+        cycles=int(history.cycle[-1]),
+        written=datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone(),
+        stop=summary.get("stop", "no summary yet"),
+        warnings=summary.get("warnings", ()),
+        numbers=numbers,
+        figures=pictures,
+        case=(directory / CASE).read_text("utf-8"),
+        versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
+    )

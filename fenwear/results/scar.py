@@ -1,0 +1,91 @@
+"""The geometry of scars: how deep, how long and how wide what is worn off a contact surface is.
+
+A scar is where the depth is more than a share of the largest one, by default a hundredth. Its edge is put between two
+nodes by linear interpolation, and so is right to an element, of which it takes rather too much. Length is along the
+sliding and width across it; on rings and on closed tracks the scar goes all the way round, and has a width alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.assembly import Placed
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.interface import ContactPair
+from fenwear.results.surfaces import surface_cells
+from fenwear.sliding.chart import sliding_chart
+
+EDGE = 0.01  # of the largest depth: where a scar ends
+CONFORMING = 1e-4  # of the contact's size: gap of unworn surfaces that lie on each other
+
+
+@dataclass(frozen=True)
+class ScarGeometry:
+    """Where the nodes of a contact surface lie along and across the sliding.
+
+    Attributes:
+        coordinates: Along and across the sliding (n, 2), or across it alone (n, 1), mm.
+        edges: Pairs of neighbouring nodes (m, 2).
+        names: Of the extents: ("length", "width"), or ("width",) of what is worn all the way round.
+    """
+
+    coordinates: Array
+    edges: NDArray[np.int64]
+    names: tuple[str, ...]
+
+    def extents(self, depth: Array, share: float = EDGE) -> dict[str, Array]:
+        """Return the extents of scars (k,), mm, by their names; 0 where nothing is worn.
+
+        Args:
+            depth: Worn depths of k half-cycles (k, n), mm.
+            share: Of the largest depth, where a scar ends.
+        """
+        return dict(zip(self.names, extents(depth, self.coordinates, self.edges, share).T, strict=True))
+
+
+def extents(depth: Array, coordinates: Array, edges: NDArray[np.int64], share: float = EDGE) -> Array:
+    """Return how far scars reach along each coordinate (k, c), mm.
+
+    Args:
+        depth: Worn depths of k half-cycles (k, n), mm.
+        coordinates: Of the nodes (n, c), mm.
+        edges: Pairs of neighbouring nodes (m, 2).
+        share: Of the largest depth, where a scar ends.
+    """
+    level = share * depth.max(axis=1, initial=0.0)[:, None]
+    inside = depth > level
+    first, second = edges.T
+    a, b = depth[:, first] - level, depth[:, second] - level
+    crossed = inside[:, first] != inside[:, second]
+    fraction = np.where(crossed, a / np.where(crossed, a - b, 1.0), 0.0)
+    found = []
+    for s in coordinates.T:
+        at_edges = s[first] + fraction * (s[second] - s[first])
+        values = np.concatenate([np.where(inside, s, np.nan), np.where(crossed, at_edges, np.nan)], axis=1)
+        worn = inside.any(axis=1)
+        reach = np.zeros(len(depth))
+        reach[worn] = np.nanmax(values[worn], axis=1) - np.nanmin(values[worn], axis=1)
+        found.append(reach)
+    return np.stack(found, axis=1)
+
+
+def scar_geometry(placed: Placed, surface: ContactSurface) -> ScarGeometry:
+    """Return where the nodes of the punch's or the strip's surface lie along and across the sliding."""
+    cells = surface_cells(surface)
+    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    edges = np.unique(edges, axis=0)
+    if surface.dim == 2:
+        return ScarGeometry(surface.x[:, :1], edges, ("width",))
+    coordinates = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x)
+    if surface is placed.pair.strip and placed.sliding.track is not None:  # worn all along it
+        return ScarGeometry(coordinates[:, 1:], edges, ("width",))
+    return ScarGeometry(coordinates, edges, ("length", "width"))
+
+
+def conforming(pair: ContactPair) -> bool:
+    """Return whether the unworn surfaces lie on each other, so that the load over their area is a pressure."""
+    return bool(np.ptp(pair.initial_gap) < CONFORMING * pair.punch.extent())

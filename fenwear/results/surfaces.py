@@ -1,0 +1,124 @@
+"""The contact surfaces of solids and rings in history.nc: nodes, their coordinates, and the facets between them.
+
+Values live on the dimension `node` (`node_strip` for the strip's own material). Coordinates and facets follow the UGRID
+conventions (ugrid-conventions.github.io), which programs for maps on meshes read.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.assembly import Placed
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.results.subcells import linear_cells
+from fenwear.sliding.chart import sliding_chart
+
+Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
+
+
+class Column(NamedTuple):
+    """A variable that does not change in a run.
+
+    Attributes:
+        dimensions: Their names.
+        values: Of these sizes.
+        attributes: Units, long name and what else is to be known.
+    """
+
+    dimensions: tuple[str, ...]
+    values: NDArray[Any]
+    attributes: dict[str, Any]
+
+
+# name in a plane model: name and meaning in a solid
+RENAMED = {
+    "contact_width": ("contact_area", "mm2", "area in contact"),
+    "worn_area": ("worn_volume", "mm3", "volume worn off the punch in the half-cycle"),
+    "worn_area_strip": ("worn_volume_strip", "mm3", "volume worn off the strip in the half-cycle"),
+    "weight": ("weight", "mm2", "area that each contact node stands for, on the mesh of the half-cycle"),
+    "weight_strip": ("weight_strip", "mm2", "area that each node stands for, on the mesh of the half-cycle"),
+    "direction": ("direction", "1", "sliding direction of the strip: 1 forward, along or around; -1 backward"),
+}
+DIMENSIONS = {"x": "node", "x_strip": "node_strip"}
+
+
+def on_surfaces(variables: dict[str, Variable]) -> dict[str, Variable]:
+    """Return the variables of plane models as those of solids and rings have them."""
+    found: dict[str, Variable] = {}
+    for name, (dimensions, units, text) in variables.items():
+        over = tuple(DIMENSIONS.get(d, d) for d in dimensions)
+        new, unit, meaning = RENAMED.get(name, (name, units, text))
+        found[new] = (over, unit, meaning)
+    return found
+
+
+def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
+    """Return the pressure nodes around each linear facet (f, 2, 3 or 4)."""
+    number = np.full(len(surface.trace), -1)
+    number[surface.nodes] = np.arange(len(surface.nodes))
+    if surface.cell == "triangle":  # the pressure lives on the vertices
+        return number[surface.facets[:, :3]]
+    cells = number[surface.facets[:, linear_cells(surface.cell, surface.degree)]]
+    cells = cells.reshape(-1, cells.shape[-1])
+    return cells[(cells >= 0).all(axis=1)]
+
+
+def surface_columns(placed: Placed) -> dict[str, Column]:
+    """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
+    pair = placed.pair
+    columns = _columns(placed, pair.punch, "")
+    if placed.strip_wears:
+        columns |= _columns(placed, pair.strip, "_strip")
+    return columns
+
+
+def coordinate_names(end: str, dim: int) -> tuple[str, ...]:
+    """Return the names of the nodes' coordinates, such as x_strip: r and z of rings, x, y and z of a solid."""
+    return tuple(f"{axis}{end}" for axis in (("r", "z") if dim == 2 else ("x", "y", "z")))
+
+
+def _columns(placed: Placed, surface: ContactSurface, end: str) -> dict[str, Column]:
+    node, facet, corner = f"node{end}", f"facet{end}", f"corner{end}"
+    names = coordinate_names(end, surface.dim)
+    columns = {
+        name: Column((node,), surface.x[:, k], {"units": "mm", "long_name": f"{name[0]} of the {surface.body}'s nodes"})
+        for k, name in enumerate(names)
+    }
+    if surface.dim == 3:
+        along, across = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x).T
+        columns[f"along{end}"] = Column((node,), along, _mm("place along the sliding"))
+        columns[f"across{end}"] = Column((node,), across, _mm("place across the sliding"))
+    cells, kind = surface_cells(surface), "edge" if surface.dim == 2 else "face"
+    facets, mesh = f"facets{end}", f"{surface.body}_surface"
+    role = f"{kind}_node_connectivity"
+    attributes = {"cf_role": role, "start_index": 0, "units": "1", "long_name": "nodes around each linear facet"}
+    columns[facets] = Column((facet, corner), cells, attributes)
+    columns[mesh] = Column(
+        (),
+        np.array(0),
+        {
+            "cf_role": "mesh_topology",
+            "topology_dimension": surface.dim - 1,
+            "node_coordinates": " ".join(names),
+            role: facets,
+            "units": "1",
+            "long_name": f"contact surface of the {surface.body}",
+        },
+    )
+    return columns
+
+
+def _mm(text: str) -> dict[str, Any]:
+    return {"units": "mm", "long_name": text}
+
+
+def on_mesh(dimensions: tuple[str, ...], dim: int) -> dict[str, str]:
+    """Return the attributes that tell on which surface a variable lives; none for a series."""
+    for end, body in (("", "punch"), ("_strip", "strip")):
+        if f"node{end}" in dimensions:
+            names = [*coordinate_names(end, dim), *([f"along{end}", f"across{end}"] if dim == 3 else [])]
+            return {"mesh": f"{body}_surface", "location": "node", "coordinates": " ".join(names)}
+    return {}

@@ -1,0 +1,118 @@
+"""A time series of fields as one VTKHDF file, which ParaView and pyvista open as such.
+
+The format is VTK's own, of its version 2.0 (docs.vtk.org, "VTKHDF File Format"): an unstructured grid whose points,
+cells and values of all steps stand one after the other, with the offsets of each step. A step is appended to a
+copy that takes the place of the file: a reader always finds a whole one.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.results.disk import check_room, writing
+
+ROOT, GROWS = "VTKHDF", 65536
+HEADER = 65536  # bytes of HDF5's own, generously
+
+
+@dataclass(frozen=True)
+class Step:
+    """The fields of one time on one grid.
+
+    Attributes:
+        time: s.
+        points: (n, 3), mm.
+        cells: Corners of the cells (m, k) of each kind, with the kind's number in VTK.
+        values: Of each field at the points, (n,) or (n, components).
+    """
+
+    time: float
+    points: Array
+    cells: Sequence[tuple[int, NDArray[np.int64]]]
+    values: Mapping[str, Array]
+
+
+def append(path: Path, step: Step) -> None:
+    """Append a step to a series; steps that are not before it are dropped, as those of a run that was killed.
+
+    Raises:
+        OutputError: the file cannot be written; the old one stays.
+    """
+    part = path.with_name(f"{path.name}.part")
+    size = step.points.nbytes + sum(10 * c.nbytes for _, c in step.cells) + sum(v.nbytes for v in step.values.values())
+    with writing(path):
+        check_room(path.parent, 2 * size + HEADER * (8 + len(step.values)) + _size(path))
+        try:
+            if path.exists():
+                shutil.copyfile(path, part)
+            with h5py.File(part, "a") as file:
+                _append(file.require_group(ROOT), step)
+            part.replace(path)
+        except (OSError, RuntimeError):
+            part.unlink(missing_ok=True)
+            raise
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+def _append(root: Any, step: Step) -> None:
+    if "Steps" not in root:
+        root.attrs["Version"] = [2, 0]
+        root.attrs["Type"] = np.bytes_("UnstructuredGrid")
+        root.create_group("Steps").attrs["NSteps"] = 0
+    steps = root["Steps"]
+    count = int(steps.attrs["NSteps"])
+    if count:
+        count = int(np.searchsorted(steps["Values"][:count], step.time, side="left"))
+    _set(steps, "Values", count, np.array([step.time]))
+    corners = np.concatenate([np.full(len(cells), cells.shape[1]) for _, cells in step.cells])
+    connectivity = np.concatenate([cells.ravel() for _, cells in step.cells])
+    parts = {
+        "NumberOfPoints": np.array([len(step.points)]),
+        "NumberOfCells": np.array([len(corners)]),
+        "NumberOfConnectivityIds": np.array([len(connectivity)]),
+        "Points": step.points,
+        "Connectivity": connectivity,
+        "Offsets": np.concatenate([[0], np.cumsum(corners)]),
+        "Types": np.concatenate([np.full(len(cells), kind, dtype=np.uint8) for kind, cells in step.cells]),
+    }
+    begins = {name: _extend(root, name, values) for name, values in parts.items()}
+    _set(steps, "PartOffsets", count, np.array([begins["NumberOfPoints"]]))
+    _set(steps, "NumberOfParts", count, np.array([1]))
+    _set(steps, "PointOffsets", count, np.array([[begins["Points"]]]))
+    _set(steps, "CellOffsets", count, np.array([[begins["Types"]]]))
+    _set(steps, "ConnectivityIdOffsets", count, np.array([[begins["Connectivity"]]]))
+    data, offsets = root.require_group("PointData"), steps.require_group("PointDataOffsets")
+    for name, values in step.values.items():
+        _set(offsets, name, count, np.array([_extend(data, name, values)]))
+    steps.attrs["NSteps"] = count + 1
+
+
+def _extend(group: Any, name: str, values: NDArray[Any]) -> int:
+    """Put rows behind those of a dataset; return where they begin."""
+    if name not in group:
+        rest = values.shape[1:]
+        chunks = (max(1, min(GROWS, len(values))), *rest)
+        group.create_dataset(name, (0, *rest), values.dtype, maxshape=(None, *rest), chunks=chunks)
+    begin = len(group[name])
+    group[name].resize(begin + len(values), axis=0)
+    group[name][begin:] = values
+    return begin
+
+
+def _set(group: Any, name: str, row: int, values: NDArray[Any]) -> None:
+    """Make a row the last one of a dataset."""
+    if name in group:
+        group[name].resize(row, axis=0)
+    _extend(group, name, values)

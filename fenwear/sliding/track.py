@@ -1,0 +1,171 @@
+"""The closed track of a counter-body: what is worn off it spreads along the whole of it.
+
+The track is made of rings: circles about the axis of a rotation, or lines along a translation, told apart by a
+coordinate s across them. The ring between s and s + ds has an area, 2 pi r dr on a flat disc. What a node wears
+off its own area w_i goes to the rings that this area crosses, by shares, and all along each of them:
+
+    depth of ring k = sum over i of (share of node i's area in ring k) w_i d_i / area of ring k.
+
+A node of the counter-body takes the mean of the rings that its own area crosses; the track ends where the contact
+does. The volume of all rings is the volume worn, and no entry is negative. In the plane there is one ring.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.interface import ContactPair
+from fenwear.interface.overlap import ChartedSurface, Indices, node_triangles
+from fenwear.interface.placement import ZERO
+from fenwear.sliding.field import SlidingField
+
+RINGS = 2000  # at most
+FINER = 2  # rings over the width of a node's area
+THIN = 1e-12  # of a surface's width across the track
+LEVEL = 0.7  # cosine between a surface and the plane of rotation, above which s is the radius
+
+
+def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> ContactPair:
+    """Return the pair whose deposit spreads what is worn off the strip along a closed track.
+
+    Args:
+        pair: The surfaces opposite each other.
+        field: The motion of the strip for a unit of the stroke.
+        track: What closes the track: its length, mm, or 2 pi rad.
+    """
+    rate = field.rate(pair.strip.x, pair.strip.outward)
+    if pair.punch.dim == 2:
+        spread = np.broadcast_to(pair.weights / (track * rate.mean()), (len(pair.strip.weights), len(pair.weights)))
+        return replace(pair, deposit=csr_array(spread))
+    across = _across(field, pair.strip)
+    punch, strip = _Crossing.of(pair.punch, across), _Crossing.of(pair.strip, across)
+    count = int(np.clip(np.ceil(FINER * punch.span / punch.width), 1, RINGS))
+    edges = np.linspace(punch.low.min(), punch.high.max(), count + 1)
+    # A ring's area: as long as the motion is there, and as wide as the surface goes while s goes on by one.
+    s = across(pair.strip.x)
+    order = np.argsort(s)
+    along = np.interp(edges, s[order], (track * rate / across.advance(pair.strip))[order])
+    areas = np.diff(edges) * (along[1:] + along[:-1]) / 2
+    depths = diags_array(1 / areas) @ punch.shares(edges).T @ diags_array(pair.weights)
+    shares = strip.shares(edges)
+    inside = shares.sum(axis=1)  # of the areas on the track's edge a part alone is worn, as deep as beside it
+    means = diags_array(1 / np.where(inside > 0, inside, 1.0)) @ shares
+    return replace(pair, deposit=csr_array(means @ depths))
+
+
+@dataclass(frozen=True)
+class _Across:
+    """The coordinate s across the track: the radius from an axis, or the distance along a direction.
+
+    Attributes:
+        origin: A point (3,), mm.
+        direction: Unit vector, the axis or the direction (3,).
+        radial: Which of the two.
+    """
+
+    origin: Array
+    direction: Array
+    radial: bool
+
+    def __call__(self, x: Array) -> Array:
+        """Return s of points (..., 3), mm."""
+        arm = x - self.origin
+        along = arm @ self.direction
+        if not self.radial:
+            return np.asarray(along)
+        return np.linalg.norm(arm - along[..., None] * self.direction, axis=-1)
+
+    def advance(self, surface: ContactSurface) -> Array:
+        """Return by how much s changes along a surface across the track, at its pressure nodes (n,)."""
+        normal = surface.outward @ self.direction
+        return np.abs(normal) if self.radial else np.sqrt(1 - np.minimum(normal**2, 1.0))
+
+
+def _across(field: SlidingField, strip: ContactSurface) -> _Across:
+    normal = strip.weights @ strip.outward
+    normal /= np.linalg.norm(normal)
+    if field.turn != ZERO:
+        axis = np.array(field.turn)
+        return _Across(np.array(field.centre), axis, bool(abs(normal @ axis) > LEVEL))
+    side = np.cross(normal, field.shift)
+    return _Across(np.zeros(3), side / np.linalg.norm(side), radial=False)
+
+
+@dataclass(frozen=True)
+class _Crossing:
+    """How the areas of a surface's pressure nodes lie across the track, in triangles.
+
+    Attributes:
+        s: Of the triangles' corners (m, 3), ascending, mm.
+        size: Share of each in the area of its node (m,).
+        node: That node (m,).
+        nodes: Number of nodes.
+    """
+
+    s: Array
+    size: Array
+    node: Indices
+    nodes: int
+
+    @classmethod
+    def of(cls, surface: ContactSurface, across: _Across) -> _Crossing:
+        """Take the areas of a surface's nodes."""
+        charted = ChartedSurface(surface.trace, surface.facets, surface.cell, surface.degree, surface.nodes)
+        triangles, node = node_triangles(charted)
+        edges = triangles[:, 1:] - triangles[:, :1]
+        area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        nodes = len(surface.nodes)
+        s = np.sort(across(triangles), axis=1)
+        s[:, [0, 2]] += THIN * np.ptp(s) * np.array([-1, 1])  # none lies on one ring's edge as a whole
+        return cls(s, area / np.bincount(node, area, nodes)[node], node, nodes)
+
+    @property
+    def low(self) -> Array:
+        """Least s of each triangle (m,), mm."""
+        return np.asarray(self.s[:, 0])
+
+    @property
+    def high(self) -> Array:
+        """Largest s of each triangle (m,), mm."""
+        return np.asarray(self.s[:, 2])
+
+    @property
+    def span(self) -> float:
+        """Width of the whole surface across the track, mm."""
+        return float(self.high.max() - self.low.min())
+
+    @property
+    def width(self) -> float:
+        """Width of a node's part in the middle of all, mm."""
+        return float(np.median(self.high - self.low))
+
+    def shares(self, edges: Array) -> csr_array:
+        """Return the share of each node's area in each ring (n, rings), s being linear in each triangle.
+
+        Args:
+            edges: Of the rings (rings + 1,), ascending, mm.
+        """
+        rings = len(edges) - 1
+        first = np.clip(np.searchsorted(edges, self.low, side="right") - 1, 0, rings - 1)
+        last = np.clip(np.searchsorted(edges, self.high, side="left"), first + 1, rings)
+        count = last - first
+        triangle = np.repeat(np.arange(len(count)), count)
+        ring = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count - first, count)
+        below, above = (_part_below(self.s[triangle], edges[ring + k]) for k in (0, 1))
+        share = (above - below) * self.size[triangle]
+        crosses = share > 0
+        return csr_array((share[crosses], (self.node[triangle][crosses], ring[crosses])), shape=(self.nodes, rings))
+
+
+def _part_below(s: Array, edge: Array) -> Array:
+    """Return the part of triangles that lies below s = edge (m,), s linear between its corners' (m, 3), ascending."""
+    low, middle, high = s.T
+    at = np.clip(edge, low, high)
+    rising = (at - low) ** 2 / ((high - low) * np.maximum(middle - low, 1e-300))
+    falling = 1 - (high - at) ** 2 / ((high - low) * np.maximum(high - middle, 1e-300))
+    return np.where(at < middle, rising, falling)

@@ -1,0 +1,203 @@
+"""One time step of contact with stick, by a semismooth Newton method.
+
+Unknown are the pressure p and the tangential traction t of each node, the rigid modes a, and the displacement
+delta of the rig where its force is imposed. With the gap g and the slip s of the step, both linear in them,
+
+    p = max(0, p - c g),        t = P(t - c s),        P: projection on abs(t) <= mu p,
+
+are Signorini's conditions and Coulomb's law (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Engrg. 92,
+1991), together with the balance of the rigid modes. Each Newton step solves the linear piece that its
+iterate lies in: open nodes carry nothing, sticking ones do not slip, slipping ones in the plane carry +-mu p.
+Both laws stand in one system, so that the coupling of unlike bodies needs no outer iteration.
+
+Coulomb's law with large friction has pieces of opposite orientation: then the step has no or several
+answers (A. Klarbring, Ing.-Archiv 60, 1990). The sign of the determinant of the piece shows it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array, Mask
+from fenwear.errors import ConvergenceError
+from fenwear.stick.cone import derivative, project
+from fenwear.stick.interface import Position, StickInterface
+from fenwear.stick.state import Imposed, StickState
+
+ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
+
+
+class Guess(NamedTuple):
+    """The piece that a Newton step takes: closed (n,), slipping (n,), their trial (n, m) and mu p there (n,)."""
+
+    closed: Mask
+    slipping: Mask
+    trial: Array
+    radius: Array
+
+
+class Found(NamedTuple):
+    """The solution of a piece: all tractions (d n,), a, delta, and the sign of its determinant."""
+
+    f: Array
+    rigid: Array
+    displacement: float
+    sign: int
+
+
+class Step:
+    """The equations of one time step.
+
+    Args:
+        interface: The bodies.
+        position: The place of the strip.
+        before: The state at the start.
+        imposed: At the end.
+        friction: mu (n,).
+    """
+
+    def __init__(
+        self, interface: StickInterface, position: Position, before: StickState, imposed: Imposed, friction: Array
+    ) -> None:
+        self.interface, self.position, self.before, self.imposed = interface, position, before, imposed
+        self.mu = friction
+        self.n, self.d = position.pair.normal.shape
+        self.m = self.d - 1
+        strain = np.zeros_like(before.on_strip)
+        strain[:, 0] = imposed.strain * interface.strip_abscissae
+        self.free_punch = imposed.loaded.on_punch
+        self.free_strip = imposed.loaded.on_strip + strain
+        read, turn = position.reading, position.pair.placement.vectors
+        now = position.in_frame(self.free_punch - turn(read @ self.free_strip))
+        old = position.in_frame(before.on_punch - turn(read @ before.on_strip))
+        old += position.modes @ before.rigid - position.drive * before.displacement
+        self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
+        self.approached = now[: self.n] - old[: self.n] - self.free[: self.n]
+        # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area.
+        self.scale = np.abs(np.diag(position.compliance)).reshape(self.d, self.n)
+        self.length = float(np.median(self.scale[0]))
+        self.units = self.length / np.maximum(np.abs(position.modes).max(axis=0, initial=0.0), 1e-300)
+        self.area = float(position.pair.weights.sum())
+
+    def jumps(self, found: Found) -> tuple[Array, Array]:
+        """Return the gap (n,) and the slip of the step (n, m)."""
+        position = self.position
+        j = position.compliance @ found.f + position.modes @ found.rigid - position.drive * found.displacement
+        j += self.free
+        return j[: self.n], j[self.n :].reshape(self.m, self.n).T
+
+    def solve(self, guess: Guess) -> Found:
+        """Return the solution of a piece.
+
+        Raises:
+            ConvergenceError: the piece is singular.
+        """
+        n, m, r, mu = self.n, self.m, self.position.modes.shape[1], self.mu
+        closed = np.flatnonzero(guess.closed)
+        tied = guess.slipping[closed] if m == 1 else np.zeros(len(closed), dtype=bool)  # t = +-mu p
+        own = closed[~tied]
+        columns = np.concatenate([closed, (n * (1 + np.arange(m)) + own[:, None]).ravel()])
+        ratio = np.sign(guess.trial[closed[tied], 0]) * mu[closed[tied]]
+        k, loose = len(columns), self.imposed.force is not None
+        A, b = np.zeros((k + r + loose, k + r + loose)), np.zeros(k + r + loose)
+
+        def fill(rows: slice, matrix: NDArray[Any]) -> None:
+            A[rows, :k] = matrix[:, columns]
+            A[rows, : len(closed)][:, tied] += matrix[:, n + closed[tied]] * ratio
+
+        unit = 1 / self.scale.ravel()[columns][:, None]
+        fill(slice(0, k), self.position.compliance[columns] * unit)
+        A[:k, k : k + r] = self.position.modes[columns] * (unit * self.units)
+        b[:k] = -unit[:, 0] * self.free[columns]
+        if loose:
+            A[:k, -1] = -self.position.drive[columns] * unit[:, 0] * self.length
+            fill(slice(k + r, None), (self.position.pull / self.area)[None])
+            b[-1] = (self.imposed.force or 0.0) / self.area
+        else:
+            b[:k] += self.position.drive[columns] * unit[:, 0] * (self.imposed.displacement or 0.0)
+        if m > 1:
+            self._slide(A, b, guess, own, len(closed))
+        balance = self.units / (self.length * self.area)
+        fill(slice(k, k + r), self.position.balance * balance[:, None])
+        b[k : k + r] = -self.imposed.loaded.resultant * balance
+        x, sign = _solved(A, b)
+        f = np.zeros(self.d * n)
+        f[columns] = x[:k]
+        f[n + closed[tied]] = ratio * f[closed[tied]]
+        moved = float(x[-1] * self.length) if loose else float(self.imposed.displacement or 0.0)
+        return Found(f, x[k : k + r] * self.units, moved, sign * (-1) ** r)
+
+    def _slide(self, A: Array, b: Array, guess: Guess, own: NDArray[np.int64], k: int) -> None:
+        """Turn the rows c s = 0 of nodes that slip in two directions into t - P(t - c s) = 0, linearised."""
+        m, places = self.m, np.flatnonzero(guess.slipping[own])
+        nodes = own[places]
+        K, direction = derivative(guess.trial[nodes], guess.radius[nodes])
+        rows = k + m * places[:, None] + np.arange(m)
+        A[rows] = K @ A[rows]
+        b[rows] = (K @ b[rows][:, :, None])[:, :, 0]
+        A[rows[:, :, None], rows[:, None, :]] += np.eye(m) - K
+        pressures = np.searchsorted(np.flatnonzero(guess.closed), nodes)
+        A[rows, pressures[:, None]] -= self.mu[nodes, None] * direction
+
+    def look(self, found: Found) -> tuple[Guess, float]:
+        """Return the piece that a solution lies in, and the residual of the laws there over the largest pressure."""
+        n = self.n
+        gap, slip = self.jumps(found)
+        pressure, traction = found.f[:n], found.f[n:].reshape(self.m, n).T
+        pushed = pressure - gap / self.scale[0]
+        trial = traction - slip / self.scale[1:].T
+        kept = np.maximum(pushed, 0.0)
+        radius = self.mu * kept
+        wrong = max(np.abs(pressure - kept).max(), np.abs(traction - project(trial, radius)).max())
+        slipping = (np.linalg.norm(trial, axis=1) > radius) & (pushed > 0)
+        return Guess(pushed > 0, slipping, trial, radius), float(wrong / max(pressure.max(), 1e-300))
+
+    def state(self, found: Found, iterations: int, *, unique: bool) -> StickState:
+        """Return the state at the end of the step, free of what rounding leaves in the laws."""
+        n, position = self.n, self.position
+        guess, _ = self.look(found)
+        gap, slip = self.jumps(found)
+        pressure = np.where(guess.closed, np.maximum(found.f[:n], 0.0), 0.0)
+        traction = project(found.f[n:].reshape(self.m, n).T, self.mu * pressure)
+        gap = np.where(guess.closed, 0.0, gap)
+        rounding = ROUNDING * pressure.max() * self.scale[1:].T
+        stuck = guess.closed & (~guess.slipping | (np.abs(slip) <= rounding).all(axis=1))
+        slip = np.where(stuck[:, None], 0.0, slip)
+        f = np.concatenate([pressure, traction.T.ravel()])
+        force = position.in_space(f * position.weights)
+        interface = self.interface
+        back = position.reading.T @ position.pair.placement.back(force)
+        return StickState(
+            pressure,
+            traction,
+            gap,
+            slip,
+            self.approached + gap,
+            found.rigid,
+            found.displacement,
+            float(position.pull @ f),
+            self.free_punch + np.tensordot(interface.punch.response, force, 2),
+            self.free_strip - np.tensordot(interface.strip.response, back, 2),
+            guess.trial,
+            iterations,
+            unique,
+        )
+
+
+def _solved(A: Array, b: Array) -> tuple[Array, int]:
+    """Return the solution of A x = b and the sign of det A.
+
+    Raises:
+        ConvergenceError: A is singular.
+    """
+    factor, pivots, info = scipy.linalg.lapack.dgetrf(A)
+    diagonal = np.diag(factor)
+    if info or not np.isfinite(diagonal).all() or np.abs(diagonal).min(initial=1.0) < 1e-14 * np.abs(diagonal).max():
+        raise ConvergenceError("the contact with stick has a singular step: nothing holds the bodies as they slip")
+    x = scipy.linalg.lapack.dgetrs(factor, pivots, b)[0]
+    swaps = int((pivots != np.arange(len(pivots))).sum())
+    return x, (-1) ** (swaps + int((diagonal < 0).sum()))

@@ -1,0 +1,194 @@
+"""One time step of contact with stick: Newton's method on its equations, and what to do where it fails."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.optimize
+
+from fenwear.arrays import Array
+from fenwear.errors import ConvergenceError
+from fenwear.stick.equations import Found, Guess, Step
+from fenwear.stick.interface import Position, StickInterface
+from fenwear.stick.state import Imposed, StickState
+
+MOST = 60  # Newton steps
+CLOSE = 1e-10  # residual of the laws over the largest pressure
+HALVINGS = 6  # of a step that does not converge
+
+
+def advance(
+    interface: StickInterface,
+    before: StickState,
+    start: Imposed,
+    end: Imposed,
+    friction: Array,
+    position: Position | None = None,
+) -> StickState:
+    """Return the state after a time step.
+
+    Newton starts from the piece of the step before, then from full stick; where both fail the step is halved.
+
+    Args:
+        interface: The bodies.
+        before: The state at the start.
+        start, end: What is imposed at the start and at the end.
+        friction: mu (n,).
+        position: The place of the strip; by default its middle one.
+
+    Raises:
+        ConvergenceError: no way converged.
+    """
+    position = position or interface.middle
+    try:
+        return _advance(interface, position, before, start, end, friction, HALVINGS)
+    except ConvergenceError:
+        if end.force is not None:
+            _check_force(interface, position, before, start, end, friction)
+        raise
+
+
+def _check_force(
+    interface: StickInterface, position: Position, before: StickState, start: Imposed, end: Imposed, friction: Array
+) -> None:
+    """Raise where an imposed force is more than the contact in gross sliding carries.
+
+    Raises:
+        ConvergenceError: gross sliding starts.
+    """
+    force = end.force or 0.0
+    far = 1e3 * float(np.median(position.compliance.diagonal())) * float(before.pressure.max(initial=1.0))
+    held, pushed = (
+        replace(start, displacement=before.displacement, force=None),
+        replace(end, displacement=before.displacement + np.copysign(far, force), force=None),
+    )
+    try:
+        most = abs(_advance(interface, position, before, held, pushed, friction, HALVINGS).force)
+    except ConvergenceError:
+        return
+    if abs(force) >= most * (1 - 1e-9):
+        raise ConvergenceError(
+            f"gross sliding starts: the tangential force {force:.6g} reaches mu P = {most:.6g}, and nothing else holds "
+            "the bodies; expected less force, or an imposed displacement"
+        )
+
+
+def _advance(
+    interface: StickInterface,
+    position: Position,
+    before: StickState,
+    start: Imposed,
+    end: Imposed,
+    friction: Array,
+    halvings: int,
+) -> StickState:
+    step = Step(interface, position, before, end, friction)
+    try:
+        return _newton(step)
+    except ConvergenceError:
+        if halvings == 0:
+            raise
+    middle = start.towards(end, 0.5)
+    first = _advance(interface, position, before, start, middle, friction, halvings - 1)
+    second = _advance(interface, position, first, middle, end, friction, halvings - 1)
+    return replace(
+        second,
+        slip=first.slip + second.slip,
+        approach=first.approach + second.approach,
+        iterations=first.iterations + second.iterations,
+        unique=first.unique and second.unique,
+        parts=first.parts + second.parts,
+    )
+
+
+def _newton(step: Step) -> StickState:
+    """Return the state after a step, from the first start that leads to it.
+
+    Raises:
+        ConvergenceError: none does.
+    """
+    before, mu = step.before, step.mu
+    closed = before.closed if before.closed.any() else np.ones_like(before.closed)
+    limit = mu * before.pressure
+    pushed = np.linalg.norm(before.trial, axis=1) > limit
+    none = np.zeros_like(closed)
+    starts = [
+        Guess(closed, pushed & closed, before.trial, limit),
+        Guess(closed, none, before.trial, limit),
+        Guess(np.ones_like(closed), none, before.trial, limit),
+    ]
+    failure = ConvergenceError("the contact with stick did not converge")
+    for guess in starts:
+        try:
+            return _from(step, guess)
+        except ConvergenceError as error:
+            failure = error
+    if step.imposed.force is not None:
+        found = _by_displacement(step, starts[1], step.imposed.force)
+        if found is not None:
+            return _from(step, found)
+    raise failure
+
+
+def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
+    """Return the piece in which the rig's displacement gives an imposed force, found by bisection; None for none."""
+    held = Step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
+    last = guess
+
+    def missing(displacement: float) -> float:
+        nonlocal last
+        held.imposed = replace(held.imposed, displacement=displacement)
+        found = _iterate(held, last)[0]
+        last = held.look(found)[0]
+        return float(step.position.pull @ found.f) - force
+
+    begin = step.before.displacement
+    reach = float(step.scale[1].max() * max(abs(force), 1.0) / step.position.pair.weights.sum())
+    try:
+        first = missing(begin)
+        for _ in range(30):
+            end = begin - np.copysign(reach, first)
+            if missing(end) * first <= 0:
+                scipy.optimize.brentq(missing, begin, end, xtol=1e-14 * reach, rtol=1e-14)
+                return last
+            reach *= 2
+    except ConvergenceError:
+        pass
+    return None
+
+
+def _from(step: Step, guess: Guess) -> StickState:
+    """Return the state after a step, by Newton's method from a piece.
+
+    Raises:
+        ConvergenceError: it does not converge.
+    """
+    found, iterations, unique = _iterate(step, guess)
+    return step.state(found, iterations, unique=unique)
+
+
+def _iterate(step: Step, guess: Guess) -> tuple[Found, int, bool]:
+    wrong = np.inf
+    for iteration in range(1, MOST + 1):
+        if step.imposed.force is not None and not (guess.closed & ~guess.slipping).any():
+            guess = _one_stuck(guess)
+        found = step.solve(guess)
+        guess, wrong = step.look(found)
+        if wrong < CLOSE:
+            return found, iteration, found.sign > 0
+        if not guess.closed.any():
+            guess = guess._replace(closed=np.ones_like(guess.closed))
+    raise ConvergenceError(
+        f"the contact with stick did not converge in {MOST} Newton steps, residual {wrong:.3g} of the largest "
+        "pressure: take more steps, or less friction"
+    )
+
+
+def _one_stuck(guess: Guess) -> Guess:
+    """Return the piece with the node stuck that is nearest to it: under an imposed force something must hold."""
+    excess = np.linalg.norm(guess.trial, axis=1) - guess.radius
+    nearest = np.argmin(np.where(guess.closed, excess, np.inf))
+    slipping = guess.slipping.copy()
+    slipping[nearest] = False
+    return guess._replace(slipping=slipping)

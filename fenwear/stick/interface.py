@@ -1,0 +1,199 @@
+"""Two bodies in contact with stick: what tractions in every direction do to the relative displacement.
+
+In the contact frame of each node, its normal e_n first and then the d - 1 tangents, tractions f = (p, t) on
+the punch and their reactions on the strip move the punch's surface against the strip's by
+
+    j = C f + H a + l - V delta,
+
+C the compliance of both bodies, H the rigid modes, l the loads and the bulk strain, and V delta what the rig
+moves the strip by. The first component opens the gap, the others are the slip.
+
+Arrays of all components have d n entries, one component after the other: p of all nodes, then t of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.assembly import Bodies, Sliding
+from fenwear.bodies.condensation import CondensedBody, condense, respond_to_load
+from fenwear.case import Case
+from fenwear.interface import ContactPair, RigidEquilibrium, check_distance, pair, rigid_equilibrium
+from fenwear.interface.placement import in_model
+from fenwear.sliding.field import SlidingField
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """What the loads do at one time of the cycle.
+
+    Attributes:
+        resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
+        on_punch: Displacement of the punch's contact nodes (n, d), mm.
+        on_strip: Of what the strip was condensed onto (q, d), mm.
+    """
+
+    resultant: Array
+    on_punch: Array
+    on_strip: Array
+
+    def times(self, factor: float) -> Loaded:
+        """Return the same of loads times a factor."""
+        return Loaded(factor * self.resultant, factor * self.on_punch, factor * self.on_strip)
+
+
+@dataclass(frozen=True)
+class Position:
+    """Both bodies opposite each other in one place of the strip.
+
+    Attributes:
+        rigid: The rigid modes and the pair of surfaces there.
+        frame: e_n and the tangents of each node (n, d, d), by rows.
+        reading: Takes what the strip was condensed onto to the contact nodes (n, q).
+        compliance: C (d n, d n), mm/MPa.
+        modes: H (d n, r).
+        drive: V (d n,), tangential, for a unit of the motion.
+    """
+
+    rigid: RigidEquilibrium
+    frame: Array
+    reading: csr_array
+    compliance: Array
+    modes: Array
+    drive: Array
+
+    @property
+    def pair(self) -> ContactPair:
+        """The surfaces."""
+        return self.rigid.pair
+
+    @cached_property
+    def weights(self) -> Array:
+        """Areas of the nodes for each component (d n,)."""
+        return np.tile(self.pair.weights, self.frame.shape[2])
+
+    @cached_property
+    def balance(self) -> Array:
+        """What each traction adds to the load of each rigid mode (r, d n)."""
+        return self.modes.T * self.weights
+
+    @cached_property
+    def pull(self) -> Array:
+        """What each traction adds to the tangential force, positive where the strip is pulled to +x (d n,)."""
+        return self.drive * self.weights
+
+    def in_frame(self, vectors: Array) -> Array:
+        """Return the components (d n,) of vectors (n, d)."""
+        return np.einsum("nac,nc->an", self.frame, vectors).ravel()
+
+    def in_space(self, components: Array) -> Array:
+        """Return vectors (n, d) of components (d n,)."""
+        return np.einsum("nac,an->nc", self.frame, components.reshape(self.frame.shape[2], -1))
+
+
+class StickInterface:
+    """Two bodies condensed along all axes, and the places of the strip under the punch.
+
+    Args:
+        bodies: Both, under the mean of their loads.
+        sliding: What the strip does, friction and wear.
+        case: Where it was made from one: gives the loads of each time.
+        moves: Whether the strip's surface passes under the punch; otherwise the surfaces stay opposite each other,
+            as for slip that is small against the contact.
+    """
+
+    def __init__(self, bodies: Bodies, sliding: Sliding, case: Case | None = None, *, moves: bool = False) -> None:
+        self.bodies, self.sliding, self.case, self.moves = bodies, sliding, case, moves
+        self.dim = bodies.punch.dim
+        middle = pair(bodies.punch.surface, bodies.strip.surface)
+        if bodies.followed is None:
+            check_distance(middle)
+        self.punch = condense(bodies.punch, middle.punch.spread)
+        onto = _identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
+        self.strip = condense(bodies.strip, onto)
+        self._positions: dict[float, Position] = {0.0: self._position(middle)}
+        self._loaded: dict[float, Loaded] = {}
+
+    @property
+    def middle(self) -> Position:
+        """The middle position of the strip."""
+        return self._positions[0.0]
+
+    @cached_property
+    def strip_abscissae(self) -> Array:
+        """X of what the strip was condensed onto (q,), mm, in the strip's own place."""
+        trace = self.middle.pair.strip.trace[:, 0]
+        return trace if self.moves else self.middle.pair.transfer @ trace
+
+    def position(self, offset: float) -> Position:
+        """Return the place of the strip moved by this amount of its motion; collective where it is new."""
+        offset = round(offset, 12) if self.moves else 0.0
+        if offset not in self._positions:
+            middle, field = self.middle.pair, self.sliding.field
+            self._positions[offset] = self._position(pair(middle.punch, middle.strip, field.placement(offset)))
+        return self._positions[offset]
+
+    def loaded(self, fraction: float | None) -> Loaded:
+        """Return what the loads do at a fraction of the cycle, or their mean; collective where it is new."""
+        loads = [] if self.case is None else [*self.case.punch.loads, *self.case.strip.loads]
+        if fraction is None or self.case is None or all(load.over_cycle is None for load in loads):
+            key, bodies = -1.0, self.bodies
+        else:
+            key = fraction = round(fraction, 12)
+            bodies = self.bodies if key in self._loaded else self.bodies.under(self.case, fraction)
+        if key not in self._loaded:
+            self._loaded[key] = Loaded(
+                np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant]),
+                respond_to_load(bodies.punch, self.punch.patterns),
+                respond_to_load(bodies.strip, self.strip.patterns),
+            )
+        return self._loaded[key]
+
+    def _position(self, pair: ContactPair) -> Position:
+        rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
+        frame = contact_frame(pair)
+        reading = pair.transfer if self.moves else _identity(len(pair.weights))
+        n, d = pair.normal.shape
+        response = self.punch.response + _read(self.strip, pair, reading)
+        turned = np.einsum("iac,icjb,jeb->aiej", frame, response, frame, optimize=True).reshape(d * n, d * n)
+        modes = np.einsum("iac,icm->aim", frame, rigid.motion).reshape(d * n, -1)
+        weights = np.tile(pair.weights, d)
+        return Position(rigid, frame, reading, turned * weights, modes, _drive(pair, frame, self.sliding.field))
+
+
+def contact_frame(pair: ContactPair) -> Array:
+    """Return e_n and the tangents of each node (n, d, d), by rows; the first tangent lies along x."""
+    normal = pair.normal
+    n, d = normal.shape
+    along = np.zeros((n, d))
+    along[:, 0] = 1.0
+    first = along - normal[:, :1] * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    if d == 2:
+        return np.stack([normal, first], axis=1)
+    return np.stack([normal, first, np.cross(normal, first)], axis=1)
+
+
+def _drive(pair: ContactPair, frame: Array, field: SlidingField) -> Array:
+    moved = np.einsum("nac,nc->an", frame, in_model(field.velocity(pair.punch.x), frame.shape[2]))
+    moved[0] = 0.0  # along e_n the place of the strip says it
+    return moved.ravel()
+
+
+def _read(strip: CondensedBody, pair: ContactPair, reading: csr_array) -> Array:
+    """Return the strip's answer (n, d, n, d) to forces at the contact nodes, in space."""
+    q, d = strip.by_load.shape
+    n = len(pair.weights)
+    seen = (reading @ strip.response.reshape(q, -1)).reshape(n * d, q, d)
+    both = (reading @ seen.transpose(1, 0, 2).reshape(q, -1)).reshape(n, n, d, d)  # [j, i, c, b]
+    return both.transpose(1, 2, 0, 3)
+
+
+def _identity(size: int) -> csr_array:
+    every = np.arange(size)
+    return csr_array((np.ones(size), (every, every)), shape=(size, size))

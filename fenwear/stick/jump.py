@@ -1,0 +1,186 @@
+"""Cycle jumps in partial slip: many cycles in one linearly implicit step.
+
+A cycle at a fixed shape y, after half a cycle that makes it forget the shape before, wears F(y) off both
+bodies, so that dy/dn = F(y) over the number n of cycles. One jump of N cycles is a step of the two-stage
+Rosenbrock method of second order (J. G. Verwer et al., SIAM J. Sci. Comput. 20, 1999)
+
+    (1 - g N A) k1 = F(y),    (1 - g N A) k2 = F(y + N k1) - 2 k1,    y + N (3 k1 + k2) / 2,
+
+which is of second order for any matrix A, and stable for jumps far beyond the explicit limit where A is
+near dF/dy: the slip of each node, times its pressure's answer to depth while the contact stays as it is.
+The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.errors import ConvergenceError
+from fenwear.sliding.wear import Worn
+from fenwear.stick.cycle import Records, Rig, RigState
+from fenwear.stick.interface import Position
+
+GAMMA = 1 + np.sqrt(0.5)
+REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
+SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A cycle at the shape that so many cycles have worn.
+
+    Attributes:
+        number: Of cycles done before it.
+        worn: Depths at its shape.
+        half_cycles: Records of its half-cycles.
+        rate: Depths that a cycle wears there.
+        error: Estimated error of the depths of the jump that led there, over what it wore; 0 where there was none.
+        first_step: Number of the time step that its records begin with.
+    """
+
+    number: int
+    worn: Worn
+    half_cycles: list[Records]
+    rate: Worn
+    error: float
+    first_step: int
+
+    @property
+    def records(self) -> Records:
+        """All time steps."""
+        return Records.joined(self.half_cycles)
+
+
+def march(rig: Rig, cycles: int, start: RigState | None = None) -> Iterator[Cycle]:
+    """Yield every cycle; the wear of each half-cycle is taken off at its end; collective.
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    at = start or rig.beginning()
+    for number in range(cycles):
+        parts, begin = [], at.worn
+        for _ in range(rig.program.half_cycles):
+            first = at.next_step
+            at, records = rig.half_cycle(at)
+            at = replace(at, worn=at.worn + rig.worn_in(records, first))
+            parts.append(records)
+        yield Cycle(number, begin, parts, at.worn - begin, 0.0, 0)
+
+
+def jump(rig: Rig, cycles: int, tolerance: float, watch: Callable[[int], None] = lambda _: None) -> Iterator[Cycle]:
+    """Yield the cycle at the end of every jump, the unworn one first; collective.
+
+    Args:
+        rig: The bodies and what is done to them.
+        cycles: How many in all.
+        tolerance: Largest estimated error of the depths of one jump over what it wears.
+        watch: Called with the number of cycles done before every evaluation.
+
+    Raises:
+        ConvergenceError: the shortest jump did not converge.
+    """
+    at, now = _rate(rig, rig.beginning(), rig.unworn(), 0, 0.0)
+    yield now
+    length = 1
+    while now.number < cycles:
+        tried = min(length, cycles - now.number)
+        watch(now.number)
+        try:
+            after, then = _attempt(rig, at, now, tried)
+        except ConvergenceError:
+            if tried == 1:
+                raise
+            length = max(1, tried // 4)
+            continue
+        factor = SAFETY * np.sqrt(tolerance / max(then.error, 1e-300))
+        if then.error > tolerance and tried > 1:
+            length = max(1, int(tried * min(0.5, max(LEAST, factor))))
+            continue
+        if tried == length or factor < 1:
+            length = max(1, int(np.ceil(tried * min(MOST, max(LEAST, factor)))))
+        at, now = after, then
+        yield now
+
+
+def _rate(rig: Rig, at: RigState, worn: Worn, number: int, error: float) -> tuple[RigState, Cycle]:
+    """Return the cycle at a shape, after half a cycle that leads to it."""
+    at = replace(at, worn=worn)
+    for _ in range(1 if rig.program.half_cycles == 2 else rig.program.half_cycles):
+        at, _ = rig.half_cycle(at)
+    first = at.next_step
+    at, parts = rig.cycle(at)
+    records = Records.joined(parts)
+    return at, Cycle(number, worn, parts, rig.worn_in(records, first), error, first)
+
+
+def _attempt(rig: Rig, at: RigState, now: Cycle, cycles: int) -> tuple[RigState, Cycle]:
+    """Return the cycle after a jump."""
+    n = len(now.worn.punch)
+
+    def parted(y: Array) -> Worn:
+        return Worn(y[:n], y[n:])
+
+    def whole(worn: Worn) -> Array:
+        return np.concatenate([worn.punch, worn.strip])
+
+    matrix = np.eye(n + len(now.worn.strip)) - GAMMA * cycles * _derivative(rig, now)
+    factor = scipy.linalg.lu_factor(matrix)
+    begin, rate = whole(now.worn), whole(now.rate)
+    first = scipy.linalg.lu_solve(factor, rate)
+    at, middle = _rate(rig, at, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, 0.0)
+    second = scipy.linalg.lu_solve(factor, whole(middle.rate) - 2 * first)
+    end = np.maximum(begin + cycles * (1.5 * first + 0.5 * second), begin)
+    at, then = _rate(rig, at, parted(end), now.number + cycles, 0.0)
+    missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
+    pair = rig.interface.middle.pair
+    area = np.concatenate([pair.weights, pair.strip.weights])
+    scale = area @ (end - begin) + REST * (area @ end)
+    error = float(area @ np.abs(missing) / max(scale, 1e-300))
+    return at, replace(then, error=error)
+
+
+def _derivative(rig: Rig, now: Cycle) -> Array:
+    """Return A, the derivative of a cycle's wear to the depths while contact zone and slip stay (n + n_s, n + n_s)."""
+    records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
+    total = n + len(now.worn.strip)
+    A = np.zeros((total, total))
+    slid, groups = records.slid, dict[tuple[float, bytes], list[int]]()
+    for k in range(len(records)):
+        place = steps[(now.first_step + k) % len(steps)].offset if rig.interface.moves else 0.0
+        groups.setdefault((place, (records.pressure[k] > 0).tobytes()), []).append(k)
+    for (place, _), members in groups.items():
+        position = rig.interface.position(place)
+        closed = np.flatnonzero(records.pressure[members[0]] > 0)
+        answer = _stiffness(position, closed)  # of pressure to depth
+        left = np.zeros((total, len(closed)))
+        slopes = np.zeros((2, n))
+        for row, law in enumerate((rig.wear.punch, rig.wear.strip)):
+            if law is not None:
+                for k in members:
+                    step = steps[(now.first_step + k) % len(steps)]
+                    slopes[row] += law.slope(records.pressure[k], slid[k], step.duration)
+        left[closed, np.arange(len(closed))] = slopes[0, closed]
+        left[n:] = position.pair.deposit[:, closed].toarray() * slopes[1, closed]
+        right = np.concatenate([np.eye(n)[closed], position.pair.material[closed].toarray()], axis=1)
+        A -= left @ (answer @ right)
+    return A
+
+
+def _stiffness(position: Position, closed: NDArray[np.int64]) -> Array:
+    """Return how the pressures of closed nodes fall by a depth at each, under a constant load (k, k), MPa/mm."""
+    k, r = len(closed), position.modes.shape[1]
+    n = len(position.pair.weights)
+    unit = float(np.median(position.compliance.diagonal()[:n]))
+    system = np.zeros((k + r, k + r))
+    system[:k, :k] = position.compliance[np.ix_(closed, closed)] / unit
+    system[:k, k:] = position.modes[closed]
+    system[k:, :k] = position.balance[:, closed]
+    right = np.eye(k + r)[:, :k]
+    return np.asarray(scipy.linalg.solve(system, right)[:k] / unit)

@@ -1,0 +1,103 @@
+"""From a case to bodies with stick that are ready to be driven, with as many time steps as they need."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.assembly import build_bodies, make_sliding
+from fenwear.case import Case, Oscillation
+from fenwear.errors import CaseError, InputError
+from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.interface import StickInterface
+from fenwear.stick.program import make_program
+from fenwear.stick.wear import local_wear
+
+DOUBLINGS = 4  # of the steps at most
+SPACINGS = 1.0  # contact nodes that the strip moves to each side before its place matters
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How fine the time steps are.
+
+    Attributes:
+        steps: Of a half-cycle.
+        change: Of the largest force and of friction's work in the first cycle by the last doubling.
+        enough: Whether that is within the case's tolerance.
+    """
+
+    steps: int
+    change: float
+    enough: bool
+
+
+def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None = None) -> Rig:
+    """Return the bodies of a case with what is done to them; collective.
+
+    Args:
+        case: With contact.law = "coulomb".
+        comm: The ranks.
+        steps: Of a half-cycle, in place of the case's.
+
+    Raises:
+        CaseError: it is a case of gross sliding, or what only the geometry can tell is wrong.
+    """
+    if case.contact.law != "coulomb":
+        raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
+    bodies, sliding = build_bodies(case, comm), make_sliding(case)
+    interface = StickInterface(bodies, sliding, case, moves=_moves(case, bodies.punch.surface.x[:, 0]))
+    middle = interface.middle
+    wear = local_wear(sliding.wear, sliding.friction, middle.pair, middle.rigid.mean_pressure)
+    mu = case.contact.friction
+    if not isinstance(mu, float):
+        raise CaseError(InputError("contact.friction", "expected a constant with contact.law = 'coulomb'"))
+    return Rig(interface, make_program(case, steps), wear, np.full(len(middle.pair.weights), mu))
+
+
+def with_steps(rig: Rig, case: Case, steps: int) -> Rig:
+    """Return the same with other time steps."""
+    return Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction)
+
+
+def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
+    """Return the rig with the time steps doubled until the first cycle changes little; collective.
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    steps, limit = case.stick.steps, case.stick.step_tolerance
+    coarse = _measures(rig)
+    change = np.inf
+    for _ in range(DOUBLINGS):
+        finer = with_steps(rig, case, 2 * steps)
+        fine = _measures(finer)
+        change = float(np.max(np.abs(fine - coarse) / np.maximum(np.abs(fine), 1e-300), initial=0.0))
+        if change <= limit:
+            return rig, Fineness(steps, change, enough=True)
+        rig, coarse, steps = finer, fine, 2 * steps
+    return rig, Fineness(steps, change, enough=False)
+
+
+def _measures(rig: Rig) -> Array:
+    """Return the largest force and friction's work of the first cycle."""
+    records = Records.joined(rig.cycle(rig.beginning())[1])
+    measures = [float(np.abs(records.force).max()), records.energy(rig.weights)]
+    scale = measures[0] * float(np.ptp(records.displacement)) * 1e-6  # full stick: no work but rounding
+    return np.array([measures[0], max(measures[1], scale)])
+
+
+def _moves(case: Case, x: Array) -> bool:
+    """Return whether the strip's surface passes under the punch: by default where it wears, and moves far enough."""
+    motion = case.motion
+    positions = getattr(motion, "positions", None)
+    if case.stick.force is not None or isinstance(motion, Oscillation) or positions == 1:
+        return False
+    if positions is not None:
+        return True
+    reach = make_program(case, 2)
+    far = max(abs(step.displacement or 0.0) for step in reach.steps)
+    return case.wear.strip is not None and far > SPACINGS * float(np.median(np.diff(np.unique(x.round(12)))))

@@ -1,0 +1,116 @@
+"""What is imposed on a time step of contact with stick, and the state at its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array, Mask
+from fenwear.stick.interface import Loaded, StickInterface
+
+
+@dataclass(frozen=True)
+class Imposed:
+    """What is imposed at the end of a time step.
+
+    Attributes:
+        loaded: The loads.
+        opening: Initial gap and worn depths (n,), mm.
+        displacement: delta of the strip's supports along the motion, mm or rad; None where the force is imposed.
+        force: Tangential force on the strip along the motion, N/mm or N; None where the displacement is.
+        strain: Bulk strain eps_xx of the strip's surface.
+    """
+
+    loaded: Loaded
+    opening: Array
+    displacement: float | None = 0.0
+    force: float | None = None
+    strain: float = 0.0
+
+    def towards(self, other: Imposed, share: float) -> Imposed:
+        """Return what is imposed a share of the way to the other."""
+
+        def between(a: float | None, b: float | None) -> float | None:
+            return b if a is None or b is None else a + share * (b - a)
+
+        one, two = self.loaded.times(1 - share), other.loaded.times(share)
+        loaded = Loaded(one.resultant + two.resultant, one.on_punch + two.on_punch, one.on_strip + two.on_strip)
+        return Imposed(
+            loaded,
+            self.opening + share * (other.opening - self.opening),
+            between(self.displacement, other.displacement),
+            between(self.force, other.force),
+            self.strain + share * (other.strain - self.strain),
+        )
+
+
+@dataclass(frozen=True)
+class StickState:
+    """The contact at the end of a time step, and what the next one must remember.
+
+    Attributes:
+        pressure: p (n,), MPa.
+        traction: t on the punch along the tangents (n, m), MPa.
+        gap: (n,), mm.
+        slip: Of the punch against the strip in the step (n, m), mm; exactly zero where it sticks.
+        approach: Relative displacement along e_n in the step (n,), mm.
+        rigid: a (r,).
+        displacement: delta.
+        force: Q, the tangential force on the strip along the motion, N/mm, in a solid N.
+        on_punch: Displacement of the punch's contact nodes but for rigid modes (n, d), mm.
+        on_strip: Of what the strip was condensed onto (q, d), mm.
+        trial: t - c s (n, m), MPa: where Newton starts from in the next step.
+        iterations: Newton steps.
+        unique: Whether the answer of the step is the only one near, as far as the signs of determinants tell.
+        parts: Of the step: more than one where it did not converge as a whole; `slip` and `approach` are their sums.
+    """
+
+    pressure: Array
+    traction: Array
+    gap: Array
+    slip: Array
+    approach: Array
+    rigid: Array
+    displacement: float
+    force: float
+    on_punch: Array
+    on_strip: Array
+    trial: Array
+    iterations: int = 0
+    unique: bool = True
+    parts: int = 1
+
+    @property
+    def closed(self) -> Mask:
+        """Which nodes carry pressure (n,)."""
+        return self.pressure > 0
+
+    @property
+    def slipping(self) -> Mask:
+        """Which nodes have slipped in the step (n,)."""
+        return self.closed & (np.abs(self.slip) > 0).any(axis=1)
+
+    @property
+    def sticking(self) -> Mask:
+        """Which nodes carry pressure and have not slipped (n,)."""
+        return self.closed & ~self.slipping
+
+
+def untouched(interface: StickInterface) -> StickState:
+    """Return the unloaded bodies before they touch."""
+    n, d = interface.middle.pair.normal.shape
+    none = np.zeros((n, d - 1))
+    return StickState(
+        np.zeros(n),
+        none,
+        np.zeros(n),
+        none,
+        np.zeros(n),
+        np.zeros(interface.middle.modes.shape[1]),
+        0.0,
+        0.0,
+        np.zeros((n, d)),
+        np.zeros(interface.strip.by_load.shape),
+        none,
+    )

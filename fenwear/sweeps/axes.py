@@ -1,0 +1,235 @@
+"""Keys of a case and the values that a sweep gives them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fenwear.case import Case
+from fenwear.errors import CaseError, InputError
+from fenwear.life.keys import numeric_keys, settings_of, value_of
+
+OPTION = "--over"
+MOST_OF_RANGE = 100_000
+Value = float | int | bool | str
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A key and its values.
+
+    Attributes:
+        key: Path, such as contact.friction.
+        values: Numbers in the internal unit of the key, or texts as in a case file.
+    """
+
+    key: str
+    values: tuple[Value, ...]
+
+    def setting(self, value: Value) -> str:
+        """Return the override `key.path=value`."""
+        return f"{self.key}={str(value).lower() if isinstance(value, bool) else value}"
+
+
+def make_axis(case: Case, key: str, values: object) -> Axis:
+    """Return a key with its values.
+
+    Args:
+        case: The case that is varied.
+        key: Its path.
+        values: A text as behind --over; or numbers, in the internal unit of the key, and texts.
+
+    Raises:
+        CaseError: there are no values, or a range is none.
+    """
+    if isinstance(values, str):
+        return parse_axis(case, f"{key}={values}")
+    given = list(np.atleast_1d(values)) if isinstance(values, np.ndarray) else _listed(key, values)
+    found: list[Value] = []
+    for value in given:
+        plain = value.item() if isinstance(value, np.generic) else value
+        if isinstance(plain, list | tuple):
+            found.append(_toml_list(plain))
+        elif isinstance(plain, bool | int | float | str):
+            found.append(plain)
+        else:
+            raise CaseError(InputError(f"over {key}", "expected numbers or texts"))
+    return _axis(key, found)
+
+
+def _listed(key: str, values: object) -> list[Any]:
+    if isinstance(values, Sequence | range):
+        return list(values)
+    if isinstance(values, bool | int | float):
+        return [values]
+    raise CaseError(InputError(f"over {key}", "expected a list of values or a text such as '0.1:0.3:9'"))
+
+
+def _toml_list(values: Sequence[Any]) -> str:
+    return "[" + ", ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in values) + "]"
+
+
+def parse_axis(case: Case, text: str) -> Axis:
+    """Return a key with its values from a text.
+
+    Args:
+        case: The case that is varied.
+        text: KEY=VALUES; values with commas between them, each a value as in a case file or a range
+            FIRST:LAST:NUMBER, with :log behind it where their ratio is to be the same.
+
+    Raises:
+        CaseError: it is not of this form, or a range is empty.
+    """
+    key, equals, listed = (part.strip() for part in text.partition("="))
+    if not equals or not key:
+        raise CaseError(InputError(OPTION, f"expected KEY=VALUES such as contact.friction=0.1:0.3:9, got {text!r}"))
+    values: list[Value] = []
+    for item in _split(listed):
+        if not item:
+            raise CaseError(InputError(f"{OPTION} {key}", f"expected values with commas between them, got {listed!r}"))
+        values += _range(case, key, item) if ":" in item and item[0] not in "\"'[{" else [item]
+    return _axis(key, values)
+
+
+def _split(text: str) -> list[str]:
+    """Return what stands between commas that are in no bracket and no quotation."""
+    return [part.strip() for part in re.split(r",(?![^\[{(]*[\]})])(?=(?:[^\"]*\"[^\"]*\")*[^\"]*$)", text)]
+
+
+def _range(case: Case, key: str, text: str) -> list[Value]:
+    """Return the values of FIRST:LAST:NUMBER[:log]."""
+    about = f"{OPTION} {key}"
+    parts = [part.strip() for part in text.split(":")]
+    wrong = InputError(about, f"expected a range FIRST:LAST:NUMBER such as 0.1:0.3:9, or with :log, got {text!r}")
+    if len(parts) not in (3, 4) or not all(parts) or parts[3:] not in ([], ["log"]) or not parts[2].isdigit():
+        raise CaseError(wrong)
+    number = int(parts[2])
+    if not 1 <= number <= MOST_OF_RANGE:
+        raise CaseError(InputError(about, f"expected 1 to {MOST_OF_RANGE:,} values, got {number:,} in {text!r}"))
+    first, last = (_end(case, key, part) for part in parts[:2])
+    if (number == 1) != (first == last):
+        raise CaseError(InputError(about, f"expected a range that is not empty, got {number} values in {text!r}"))
+    if len(parts) == 4 and not (first > 0 and last > 0):
+        raise CaseError(InputError(about, f"expected ends above 0 for a range of equal ratios, got {text!r}"))
+    values = np.geomspace(first, last, number) if len(parts) == 4 else np.linspace(first, last, number)
+    if not isinstance(first, int) or not isinstance(last, int):
+        return list(map(float, values))
+    if np.abs(values - np.round(values)).max() > 1e-9 * max(abs(first), abs(last)):
+        shown = ", ".join(f"{value:g}" for value in values[:4])
+        raise CaseError(InputError(about, f"expected a range of whole numbers, got {shown}, ... of {text!r}"))
+    return [round(value) for value in values]
+
+
+def _end(case: Case, key: str, text: str) -> float:
+    """Return an end of a range: a whole number where the case has one, else in the key's internal unit."""
+    try:
+        number = float(text)
+    except ValueError:
+        return value_of(case, key, text, OPTION)
+    if key in numeric_keys(case) or not isinstance(value_at(case, key)[0], int):
+        return number
+    return int(number) if number.is_integer() else number
+
+
+def _axis(key: str, values: Sequence[Value]) -> Axis:
+    if not values:
+        raise CaseError(InputError(f"{OPTION} {key}", "expected one value or more"))
+    return Axis(key, tuple(values))
+
+
+def check_keys(axes: Sequence[Axis]) -> None:
+    """Check that no key has two axes.
+
+    Raises:
+        CaseError: there is none, or one key has two or holds another one.
+    """
+    if not axes:
+        raise CaseError(InputError(OPTION, "expected one key or more with its values"))
+    keys = [axis.key for axis in axes]
+    for at, key in enumerate(keys):
+        for other in keys[:at]:
+            if key == other:
+                raise CaseError(InputError(f"{OPTION} {key}", "is given twice; expected all its values in one"))
+            if f"{key}.".startswith(f"{other}.") or f"{other}.".startswith(f"{key}."):
+                raise CaseError(InputError(f"{OPTION} {key}", f"is given together with {other}, one inside the other"))
+
+
+def read_table(path: Path) -> list[Axis]:
+    """Return the keys and values of a table: a heading of keys, then a variant in each row.
+
+    Args:
+        path: A CSV file; values as in a case file.
+
+    Raises:
+        CaseError: it cannot be read, or rows have another length than the heading.
+    """
+    try:
+        rows = [row for row in csv.reader(path.read_text("utf-8-sig").splitlines()) if any(map(str.strip, row))]
+    except OSError as error:
+        raise CaseError(InputError(str(path), f"cannot be read: {error.strerror}")) from None
+    except (UnicodeDecodeError, csv.Error):
+        raise CaseError(InputError(str(path), "not a table with commas between its values, in UTF-8")) from None
+    if len(rows) < 2:
+        raise CaseError(InputError(str(path), "expected a heading of keys and a row for each variant"))
+    heading = [name.strip() for name in rows[0]]
+    for number, row in enumerate(rows[1:], 2):
+        if len(row) != len(heading):
+            expected = f"expected {len(heading)} values as in the heading, got {len(row)}"
+            raise CaseError(InputError(str(path), f"row {number}: {expected}"))
+    return [Axis(key, tuple(row[k].strip() for row in rows[1:])) for k, key in enumerate(heading)]
+
+
+def settings(case: Case, given: Mapping[str, tuple[Axis, Value]]) -> list[str]:
+    """Return the overrides that give keys their values; a wear coefficient keeps its number where an exponent changes.
+
+    Args:
+        case: The case that is varied.
+        given: Axis and value of each key.
+    """
+    known = numeric_keys(case)
+    numbers = {key: number for key, (_, v) in given.items() if key in known and (number := _number(v)) is not None}
+    texts = [axis.setting(value) for key, (axis, value) in given.items() if key not in numbers]
+    return [*settings_of(case, numbers), *texts]
+
+
+def _number(value: Value) -> float | None:
+    """Return a value that is a number without a unit."""
+    try:
+        return None if isinstance(value, bool) else float(value)
+    except ValueError:
+        return None
+
+
+def value_at(case: Case, key: str) -> tuple[Value, str]:
+    """Return what a case has at a key, and its unit; "" where it has nothing."""
+    place: Any = case.resolved()
+    for name in key.split("."):
+        if isinstance(place, list) and name.isdigit() and int(name) < len(place):
+            place = place[int(name)]
+        elif isinstance(place, dict) and name in place:
+            place = place[name]
+        else:
+            return "", ""
+    if isinstance(place, str):
+        number, _, unit = place.partition(" ")
+        try:
+            return float(number), unit
+        except ValueError:
+            return place, ""
+    if isinstance(place, bool):
+        return str(place).lower(), ""
+    return (place, "") if isinstance(place, int | float) else (_words(place), "")
+
+
+def _words(place: Any) -> str:
+    if isinstance(place, list):
+        return "[" + ", ".join(map(_words, place)) + "]"
+    if isinstance(place, dict):
+        return "{" + ", ".join(f"{name} = {_words(value)}" for name, value in place.items()) + "}"
+    return str(place)

@@ -1,0 +1,147 @@
+"""Kept results of variants, and all of them as one dataset."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from fenwear.case import Case
+from fenwear.results.disk import writing
+from fenwear.sweeps.evaluate import MEANINGS, Values, meaning
+from fenwear.sweeps.plan import Plan
+
+if TYPE_CHECKING:
+    from fenwear.sweeps.engines import Outcome
+
+VARIANTS, DATASET, TABLE = "variants", "sweep.nc", "sweep.csv"
+SECONDS = "seconds"
+NODES = ("x", "y", "weight", "direction")  # coordinates where they are the same in all variants
+SAME = 1e-9  # of their range
+Place = tuple[int, ...]
+
+
+def keep(folder: Path, name: str, values: Values, seconds: float) -> None:
+    """Write the results of a variant; a file is there whole or not at all.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    path = folder / VARIANTS / f"{name}.npz"
+    part = path.with_suffix(f".{os.getpid()}.part")
+    with writing(path):
+        try:
+            with part.open("wb") as file:
+                np.savez(file, allow_pickle=False, **{**values, SECONDS: np.array(seconds)})
+            part.replace(path)
+        except OSError:
+            part.unlink(missing_ok=True)
+            raise
+
+
+def kept(folder: Path, name: str) -> tuple[Values, float] | None:
+    """Return the results of a variant and the time they took; None where there are none that can be read."""
+    try:
+        with np.load(folder / VARIANTS / f"{name}.npz", allow_pickle=False) as file:
+            values = {key: file[key] for key in file.files}
+            return values, float(values.pop(SECONDS))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+
+
+def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarray.Dataset:
+    """Return all outcomes as one dataset, NaN where a variant failed.
+
+    Nodes and directions are coordinates where all variants have the same. Else they are variables of the
+    variants too, and arrays end with NaN where another variant has more of them.
+    """
+    sizes = plan.dimensions
+    dims, shape = tuple(sizes), tuple(sizes.values())
+    good = {place: one.values for place, one in outcomes.items() if one.values is not None}
+    names = list(dict.fromkeys(name for values in good.values() for name in values))
+    order = [name for name in MEANINGS if name in names] + [name for name in names if name not in MEANINGS]
+    data, coordinates = {}, _coordinates(plan)
+    for name in order:
+        what = meaning(name, plan.of, case)
+        attributes = {"units": what.unit, "long_name": what.name}
+        arrays = {place: np.asarray(values[name]) for place, values in good.items() if name in values}
+        if name in NODES and len(arrays) == len(good) and _same(list(arrays.values())):
+            coordinates[name] = (what.dims, next(iter(arrays.values())), attributes)
+        else:
+            data[name] = ((*dims, *what.dims), _filled(arrays, shape, len(what.dims)), attributes)
+    trouble, seconds = np.full(shape, "", dtype=object), np.full(shape, np.nan)
+    for place, one in outcomes.items():
+        trouble[place], seconds[place] = one.trouble, one.seconds
+    data["trouble"] = (dims, trouble.astype(str), {"units": "", "long_name": "why a variant failed"})
+    data[SECONDS] = (dims, seconds, {"units": "s", "long_name": "time to compute a variant, with its set-up if any"})
+    about = {"title": case.title or "fenwear sweep", "Conventions": "CF-1.11", "of": plan.of, "case": case.to_toml()}
+    return xarray.Dataset(data, coordinates, about)
+
+
+def _coordinates(plan: Plan) -> dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]]:
+    found: dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, str]]] = {}
+    for axis, (values, unit) in zip(plan.axes, plan.coordinates, strict=True):
+        dimension = "variant" if plan.zipped else axis.key
+        found[axis.key] = ((dimension,), np.array(values), {"units": unit, "long_name": axis.key})
+    return found
+
+
+def _same(arrays: Sequence[NDArray[np.generic]]) -> bool:
+    first = arrays[0]
+    size = float(np.ptp(first)) if first.size else 0.0
+    return all(one.shape == first.shape and np.allclose(one, first, rtol=0, atol=SAME * size) for one in arrays[1:])
+
+
+def _filled(arrays: Mapping[Place, NDArray[np.generic]], shape: Place, own: int) -> NDArray[np.float64]:
+    most = np.max([array.shape for array in arrays.values()], axis=0) if own else ()
+    result = np.full((*shape, *map(int, most)), np.nan)
+    for place, array in arrays.items():
+        at: tuple[Any, ...] = (*place, *(slice(length) for length in array.shape))
+        result[at] = array
+    return result
+
+
+def write(folder: Path, dataset: xarray.Dataset) -> None:
+    """Write the dataset and the table of its numbers, each in place of an older one as a whole.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    path, part = folder / DATASET, folder / f"{DATASET}.part"
+    with writing(path):
+        dataset.to_netcdf(part, engine="h5netcdf")
+        part.replace(path)
+    path, part = folder / TABLE, folder / f"{TABLE}.part"
+    with writing(path):
+        table(dataset).to_dataframe().reset_index().to_csv(part, index=False)
+        part.replace(path)
+
+
+def table(dataset: xarray.Dataset) -> xarray.Dataset:
+    """Return the single numbers of each variant; those of half-cycles under a name for each, with the unit behind."""
+    columns = {}
+    for name, values in dataset.data_vars.items():
+        if "node" in values.dims:
+            continue
+        unit = values.attrs["units"]
+        behind = f" ({unit})" if unit else ""
+        if "half_cycle" not in values.dims:
+            columns[f"{name}{behind}"] = values
+            continue
+        for k in range(values.sizes["half_cycle"]):
+            columns[f"{name} {_way(dataset, k)}{behind}"] = values.isel(half_cycle=k, drop=True)
+    return xarray.Dataset({name: values.drop_vars(NODES, errors="ignore") for name, values in columns.items()})
+
+
+def _way(dataset: xarray.Dataset, k: int) -> str:
+    """Return the name of a half-cycle: by its direction where that tells them apart."""
+    directions = dataset.coords.get("direction")
+    if directions is None or len(set(directions.values)) < directions.size:
+        return str(k + 1)
+    return "rightward" if float(directions[k]) > 0 else "leftward"

@@ -1,0 +1,148 @@
+"""A sweep from the case and its keys to the dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import xarray
+from mpi4py import MPI
+
+from fenwear.case import Case, load_case
+from fenwear.errors import CaseError, InputError, InterruptedRunError
+from fenwear.parallel import on_root
+from fenwear.results.disk import writing
+from fenwear.results.history import make_directory, write_case
+from fenwear.sweeps.axes import Axis, make_axis
+from fenwear.sweeps.engines import Outcome, outcomes
+from fenwear.sweeps.plan import Plan, make_plan
+from fenwear.sweeps.store import VARIANTS, gathered, kept, write
+
+Progress = Callable[[int, int], None]
+
+
+def sweep(
+    case: Case | str | Path,
+    over: Mapping[str, object] | Sequence[Axis],
+    *,
+    of: str = "steady",
+    zipped: bool = False,
+    folder: Path | str | None = None,
+    resume: bool = False,
+    processes: int | None = 1,
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    progress: Progress = lambda done, total: None,
+) -> xarray.Dataset:
+    """Return the results of a case for many values of its keys; collective.
+
+    Args:
+        case: The case that is varied, a case file or the name of a built-in case.
+        over: Values of each key: numbers in its internal unit, texts as in a case file, or one text as
+            behind `fenwear sweep --over`, such as "0.1:0.3:9".
+        of: "steady" for the cyclic steady state, "optimum" for the optimal pressures, "run" for the end of the run.
+        zipped: Whether the first values go together, the second ones, and so on; else each with each.
+        folder: New folder of sweep.nc and sweep.csv, where each variant is kept as soon as it is done.
+        resume: Go on in the folder: what it has is not computed again.
+        processes: Local processes; None for as many as there are cores, where that is worth their start.
+        comm: The ranks; from two on, all but the first compute.
+        progress: Told of the variants done and of all, on rank 0.
+
+    Returns:
+        The dataset, whose dimensions are the keys, or "variant" where `zipped`; NaN where a variant failed,
+        whose `trouble` says why.
+
+    Raises:
+        CaseError: what is asked for makes no sense; nothing is computed.
+        InterruptedRunError: interrupted; what is in the folder stays.
+        OutputError: the folder takes no file.
+    """
+    folder = None if folder is None else Path(folder)
+    if processes is not None and processes < 1:
+        raise CaseError(InputError("--processes", f"expected one or more, got {processes}"))
+    if resume and folder is None:
+        raise CaseError(InputError("--resume", "expected the folder of the sweep to go on with, as -o DIR"))
+    begun: list[tuple[Case, Plan, dict[tuple[int, ...], Outcome]]] = []
+    on_root(comm, lambda: begun.append(_begin(case, over, of, folder, zipped=zipped, resume=resume)))
+    failure: Exception | None = None
+    if not begun:
+        for _ in outcomes([], "steady", folder, processes, comm):  # works for rank 0
+            pass
+    else:
+        try:
+            _compute(begun[0][1], begun[0][2], folder, processes, comm, progress)
+        except (Exception, KeyboardInterrupt) as error:  # raised below, on all ranks
+            failure = _told(error, begun[0][1], folder)
+    return on_root(comm, lambda: _end(*begun[0], folder, failure))
+
+
+def _begin(
+    given: Case | str | Path,
+    over: Mapping[str, object] | Sequence[Axis],
+    of: str,
+    folder: Path | None,
+    *,
+    zipped: bool,
+    resume: bool,
+) -> tuple[Case, Plan, dict[tuple[int, ...], Outcome]]:
+    """Return the case, the plan and what is known of it before any computation."""
+    case = given if isinstance(given, Case) else load_case(given)
+    axes = [make_axis(case, key, values) for key, values in over.items()] if isinstance(over, Mapping) else list(over)
+    plan = make_plan(case, axes, of, zipped=zipped)
+    known: dict[tuple[int, ...], Outcome] = {}
+    for variant in plan.variants:
+        if variant.error is not None:
+            known[variant.place] = Outcome(variant.place, None, " ".join(str(variant.error).split()), 0.0)
+    if folder is None:
+        return case, plan, known
+    if not resume:
+        make_directory(folder)
+    elif not (folder / VARIANTS).is_dir():
+        raise CaseError(InputError("--resume", f"{folder} holds no sweep to go on with"))
+    with writing(folder):
+        (folder / VARIANTS).mkdir(exist_ok=True)
+    write_case(folder, case)
+    for variant in plan.variants:
+        if variant.case is not None and (found := kept(folder, variant.name)) is not None:
+            known[variant.place] = Outcome(variant.place, found[0], "", found[1])
+    return case, plan, known
+
+
+def _compute(
+    plan: Plan,
+    known: dict[tuple[int, ...], Outcome],
+    folder: Path | None,
+    processes: int | None,
+    comm: MPI.Intracomm,
+    progress: Progress,
+) -> None:
+    left = [variant for variant in plan.variants if variant.place not in known]
+    progress(len(known), len(plan.variants))
+    for done in outcomes(left, plan.of, folder, processes, comm):
+        known |= {one.place: one for one in done}
+        progress(len(known), len(plan.variants))
+
+
+def _told(error: BaseException, plan: Plan, folder: Path | None) -> Exception:
+    """Return what ended the sweep, with how to go on."""
+    if isinstance(error, Exception) and not isinstance(error, InterruptedRunError):
+        return error
+    what = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
+    if folder is None:
+        return InterruptedRunError(what)
+    count = sum(kept(folder, variant.name) is not None for variant in plan.variants if variant.case is not None)
+    return InterruptedRunError(f"{what}\n{count} of {len(plan.variants)} variants are in {folder}, to go on: --resume")
+
+
+def _end(
+    case: Case,
+    plan: Plan,
+    known: Mapping[tuple[int, ...], Outcome],
+    folder: Path | None,
+    failure: Exception | None,
+) -> xarray.Dataset:
+    if failure is not None:
+        raise failure
+    dataset = gathered(case, plan, known)
+    if folder is not None:
+        write(folder, dataset)
+    return dataset

@@ -1,0 +1,98 @@
+// A shaft in a bushing, a conformal contact: the upper part of the shaft, and the shell of the bushing above it.
+// Structured quadrilaterals along the circles, even over the contact.
+//
+// Lengths in mm, angles in degrees; the shaft's axis lies at x = z = 0, z up. Shaft and bushing touch at the top.
+// Physical groups: every name starts with the body it belongs to, punch_ (the bushing) or strip_ (the shaft).
+// The case file gives each parameter below a value of its own by name. Its geometry.order = 2 makes the
+// elements follow the circles.
+
+DefineConstant[
+  radius = 10,                  // of the shaft
+  clearance = 0.02,             // the bushing's bore has the radius + clearance
+  wall = 3,                     // of the bushing
+  shaft_wall = 6,               // of the part of the shaft that is meshed, below radius
+  contact_angle = 45,           // to both sides in which the surfaces may touch: the arc must stay within it
+  overlap_angle = 3,            // by which the shaft's contact reaches beyond
+  margin_angle = 20,            // by which both bodies go on beyond; at most 80 degrees in all
+  elements_along_contact = 60,  // even, so that a node lies at x = 0
+  margin_elements = 6,
+  growth = 0.5                  // growth of the element size per length away from the contact
+];
+
+If(radius <= 0 || clearance <= 0 || wall <= 0 || shaft_wall <= 0 || shaft_wall >= radius)
+  Error("radius, clearance, wall and shaft_wall must be positive, shaft_wall smaller than radius");
+EndIf
+If(contact_angle <= 0 || overlap_angle <= 0 || margin_angle <= 0 || contact_angle + overlap_angle + margin_angle > 80)
+  Error("contact_angle, overlap_angle and margin_angle must be positive and at most 80 degrees in all");
+EndIf
+If(clearance >= 0.2 * radius)
+  Error("clearance must be small against the radius");
+EndIf
+If(elements_along_contact < 2 || elements_along_contact % 2 != 0 || margin_elements < 1 || growth <= 0)
+  Error("elements_along_contact must be even, margin_elements at least 1 and growth positive");
+EndIf
+
+degree = Pi / 180;
+half_count = elements_along_contact / 2;
+size = radius * contact_angle * degree / half_count;
+overlap_count = Ceil(overlap_angle / contact_angle * half_count);
+angles[] = {contact_angle, contact_angle + overlap_angle, contact_angle + overlap_angle + margin_angle};
+counts[] = {half_count, overlap_count, margin_elements};
+
+// Both bodies: sectors between the circle of the contact and another one about the same centre.
+near[] = {radius + clearance, radius};
+far[] = {radius + clearance + wall, radius - shaft_wall};
+centres[] = {-clearance, 0};    // the bushing rests on the shaft's top
+For body In {0 : 1}
+  z = centres[body];
+  span = Fabs(far[body] - near[body]);
+  Ratio = 1 + growth * span / size;
+  Count = Ceil(Log(Ratio) / Log(1 + growth));
+  Ratio = Ratio ^ (1 / Count);
+  o = newp; Point(o) = {0, z, 0};
+  p = newp; Point(p) = {0, z + near[body], 0}; near_middle = p;
+  p = newp; Point(p) = {0, z + far[body], 0}; far_middle = p;
+  l = newl; Line(l) = {near_middle, far_middle}; middle = l;
+  Transfinite Curve{l} = Count + 1 Using Progression Ratio;
+  faces~{body}[] = {}; contact~{body}[] = {}; free~{body}[] = {}; outer~{body}[] = {}; ends~{body}[] = {};
+  For side In {0 : 1}
+    a0 = near_middle; b0 = far_middle; inner = middle;
+    For i In {0 : 2}
+      angle = (2 * side - 1) * angles[i] * degree;
+      p = newp; Point(p) = {near[body] * Sin(angle), z + near[body] * Cos(angle), 0}; a1 = p;
+      p = newp; Point(p) = {far[body] * Sin(angle), z + far[body] * Cos(angle), 0}; b1 = p;
+      a = newl; Circle(a) = {a0, o, a1};
+      b = newl; Circle(b) = {b0, o, b1};
+      l = newl; Line(l) = {a1, b1};
+      Transfinite Curve{l} = Count + 1 Using Progression Ratio;
+      Transfinite Curve{a, b} = counts[i] + 1;
+      If(i <= body)    // the shaft's contact reaches farther than the bushing's
+        contact~{body}[] += a;
+      Else
+        free~{body}[] += a;
+      EndIf
+      outer~{body}[] += b;
+      If(i == 2)
+        ends~{body}[] += l;
+      EndIf
+      k = newll; Curve Loop(k) = {a, l, -b, -inner};
+      s = news; Plane Surface(s) = {k}; faces~{body}[] += s;
+      a0 = a1; b0 = b1; inner = l;
+    EndFor
+  EndFor
+EndFor
+
+Transfinite Surface{:};
+Recombine Surface{:};
+
+// ---- The contract: named physical groups ------------------------------------------------------
+Physical Surface("punch_body") = faces_0[];
+Physical Curve("punch_contact") = contact_0[];
+Physical Curve("punch_free") = free_0[];
+Physical Curve("punch_top") = outer_0[];              // the outer side, which the housing presses
+Physical Curve("punch_sides") = ends_0[];
+Physical Surface("strip_body") = faces_1[];
+Physical Curve("strip_contact") = contact_1[];
+Physical Curve("strip_free") = free_1[];
+Physical Curve("strip_bottom") = outer_1[];           // inside the shaft
+Physical Curve("strip_ends") = ends_1[];

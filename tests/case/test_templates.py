@@ -1,0 +1,112 @@
+"""Templates: commented cases of the usual tests that read, mesh and wear as they say."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fenwear import assemble, jump, make_case, steady
+from fenwear.case.templates import fill_in, find_template, template_names, write_case_of
+from fenwear.errors import CaseError
+
+USUAL = ["ball-on-flat", "block-on-ring", "brake-pad", "bushing", "cylinder-on-flat", "fretting", "pin-on-disc"]
+
+
+def case_of(name: str, *settings: str) -> object:
+    return make_case(tomllib.loads(fill_in(find_template(name), settings)))
+
+
+def test_names() -> None:
+    assert template_names() == USUAL
+
+
+@pytest.mark.parametrize("name", USUAL)
+def test_reads_and_explains(name: str) -> None:
+    """Each is a valid case whose first words say which body is the punch, and whose every line fits."""
+    template = find_template(name)
+    text = fill_in(template)
+    case = make_case(tomllib.loads(text))
+    assert case.title
+    first = text.partition("\n\n")[0]
+    assert " is the punch" in first
+    assert " is the strip: the body" in first
+    assert all(len(line) <= 120 for line in text.splitlines()), max(text.splitlines(), key=len)
+    assert "{{" not in text
+    assert all(dimension.about for dimension in template.dimensions.values())
+
+
+@pytest.mark.parametrize(("name", "setting"), [(n, d) for n in USUAL for d in find_template(n).dimensions])
+def test_every_dimension_counts(name: str, setting: str) -> None:
+    """Another value makes another case."""
+    usual = find_template(name).dimensions[setting]
+    value = str(usual.value)
+    number, _, unit = value.partition(" ")
+    other = f"{float(number) * 0.9:g} {unit}".strip() if setting not in ("revolutions", "turns", "cycles") else "777"
+    assert case_of(name, f"{setting}={other}") != case_of(name)
+
+
+def test_usual_values() -> None:
+    """ASTM G133, procedure A: 25 N, strokes of 10 mm at 5 Hz, 100 m; G77's ring of 34.99 mm; G99's 0.1 m/s, 1,000 m."""
+    ball = case_of("ball-on-flat")
+    assert (ball.motion.amplitude, ball.motion.period, ball.run.half_cycles) == (5.0, 0.2, 10_000)
+    assert ball.punch.loads[0].force == (0.0, 0.0, -25.0)
+    ring = case_of("block-on-ring")
+    assert ring.geometry.parameters["radius"] == 17.495
+    pin = case_of("pin-on-disc")
+    distance = pin.run.half_cycles * pin.motion.duration * pin.motion.angular_speed * 16.0
+    assert distance == pytest.approx(1e6, rel=1e-4)
+
+
+def test_what_is_wrong(tmp_path: Path) -> None:
+    """Names the nearest template and dimension, what was expected of a value, and a file that is there."""
+    with pytest.raises(CaseError, match="did you mean 'block-on-ring'"):
+        find_template("blok-on-ring")
+    with pytest.raises(CaseError, match=r"There are ball-on-flat, .*pin-on-disc"):
+        find_template("")
+    template = find_template("fretting")
+    with pytest.raises(CaseError) as error:
+        fill_in(template, ["lod=3", "load=-2 N", "load=3 mm", "radius", "cycles=many"])
+    said = str(error.value)
+    assert "did you mean 'load'? It has radius, length" in said
+    assert "--set load: expected more than zero, got '-2 N'" in said
+    assert "got '3 mm', which is of another kind" in said
+    assert "expected dimension=value, got 'radius'" in said
+    assert "--set cycles: expected a number, got 'many'" in said
+    path = tmp_path / "mine.toml"
+    write_case_of("fretting", path)
+    with pytest.raises(CaseError, match="exists already"):
+        write_case_of("fretting", path)
+    with pytest.raises(CaseError, match=r"expected a file ending in \.toml"):
+        write_case_of("fretting", tmp_path / "mine")
+    with pytest.raises(CaseError, match="cannot be written"):
+        write_case_of("fretting", tmp_path / "no folder" / "mine.toml")
+
+
+def test_bushing_steady_state() -> None:
+    """A translating bushing wears evenly along the load where p = p0 cos theta; F / t = integral of p cos theta.
+
+    So p0 = F / (t R (alpha + sin alpha cos alpha)), where all of +-alpha touches; friction adds nothing, p being even.
+    """
+    case = case_of("bushing", "load=20 kN", "clearance=0.002 mm")
+    state = steady(assemble(case))
+    pair = assemble(case, heat="none").pair
+    radius, alpha = 10.0, np.radians(50.0)
+    theta = np.arctan2(pair.normal[:, 0], pair.normal[:, 1])
+    scale = 20e3 / (20.0 * radius * (alpha + np.sin(alpha) * np.cos(alpha)))
+    np.testing.assert_allclose(state.pressure[0], scale * np.cos(theta), rtol=2e-3)
+
+
+def test_ring_wears_over_its_circumference() -> None:
+    """What a block-on-ring wears off both bodies: k F s and its tenth; the ring's spreads over 2 pi R."""
+    case = case_of("block-on-ring", "revolutions=200")
+    system = assemble(case, heat="none")
+    *_, last = jump(system, 200, tolerance=0.1)
+    radius, width = 17.495, 6.35
+    worn = 1e-8 * 134 / width * 2 * np.pi * radius * 200
+    assert system.pair.weights @ last.wear[-1] == pytest.approx(worn, rel=2e-3)  # the scar is curved
+    depth = last.wear_strip[-1]
+    assert np.ptp(depth) < 1e-12 * depth.max()
+    assert 2 * np.pi * radius * depth.max() == pytest.approx(0.1 * (system.pair.weights @ last.wear[-1]), rel=1e-9)

@@ -1,0 +1,198 @@
+"""What a tribometer measures, against sums by hand: volumes, masses, rates, distances, forces, work."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+from fenwear import Tribosystem, jump, load_case, march
+from fenwear.cycle import Block, follow
+from fenwear.results.sheet import sheet, sheet_text, values, variables
+from fenwear.run import run_case
+
+Assemble = Callable[..., Tribosystem]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+K, FORCE, STROKE, MU = 4e-7, 1e4, 3.0, 0.25
+FRETTING = (
+    *("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=1.6", "geometry.degree=2"),
+    *("geometry.follow_wear=0.1", "wear.punch.coefficient=2e-5", "wear.strip.coefficient=3e-5", "contact.friction=0"),
+    *("motion.positions=3",),
+)
+
+
+def last(blocks: Any) -> dict[str, Any]:
+    """Return the sheet of the last half-cycle, with the block as "block"."""
+    block: Block = list(blocks)[-1]
+    return {"block": block, **{name: value[-1] for name, value in values(block).items()}}
+
+
+@pytest.mark.parametrize("every", ["explicit", "implicit", "jump"])
+@pytest.mark.mpi
+def test_volume_is_k_f_s(assembled: Assemble, every: str) -> None:
+    """Each number of the sheet of Example 1 by hand, to rounding, of marches and of jumps."""
+    system = assembled("example1", *SMALL, f"wear.punch.coefficient={K}", "materials.composite.density='846 kg/m^3'")
+    count = 240
+    if every == "jump":
+        blocks = list(jump(system, count, tolerance=0.05))
+        assert sum(map(len, blocks)) < count / 2
+    else:
+        blocks = list(march(system, count, implicit=every == "implicit", block=50))
+    found, s = last(blocks), count * STROKE
+    assert found["cycles"] == count / 2
+    assert found["sliding_distance"] == pytest.approx(s, rel=1e-12)
+    assert found["normal_force"] == pytest.approx(FORCE, rel=1e-10)
+    assert found["friction_force"] == pytest.approx(MU * FORCE, rel=1e-10)
+    assert found["friction_work"] == pytest.approx(MU * FORCE * s, rel=1e-10)
+    assert found["total_volume"] == pytest.approx(K * FORCE * s, rel=1e-10)
+    assert found["total_area"] == pytest.approx(K * FORCE * s / 10, rel=1e-10)
+    assert found["total_mass"] == pytest.approx(0.846 * K * FORCE * s, rel=1e-10)  # 846 kg/m³ = 0.846 mg/mm³
+    for name in ("wear_rate", "mean_wear_rate"):
+        assert found[name] == pytest.approx(1e3 * K, rel=1e-10)  # mm³/(N mm) in mm³/(N m)
+    weights, block = system.pair.weights, found["block"]
+    assert weights @ block.wear[-1] == pytest.approx(found["total_area"], rel=1e-10)
+    assert 10 * weights @ found["dissipated_energy"] == pytest.approx(found["friction_work"], rel=1e-10)
+    # beta~ p ds is worn where mu p ds is dissipated.
+    np.testing.assert_allclose(found["dissipated_energy"], MU / K * block.wear[-1], rtol=1e-9)
+    deepest = int(np.argmax(block.wear[-1]))
+    assert found["max_wear"] == block.wear[-1].max()
+    assert found["max_wear_x"] == pytest.approx(system.pair.x[deepest], abs=1e-9)
+    assert found["scar_width"] == pytest.approx(60, rel=1e-12)
+
+
+def test_half_cycles_of_changing_load_and_square_law(assembled: Assemble) -> None:
+    """b = 2 and a load that swings: sums over all half-cycles of what their pressures do."""
+    loads = "punch.loads=[{on='punch_load', traction=[0, -16.666], over_cycle=[[0, 1.2], [0.4, 0.3], [1, 1.2]]}]"
+    system = assembled("example1", *SMALL, "wear.punch.coefficient=1e-9", "wear.punch.pressure_exponent=2", loads)
+    blocks = list(march(system, 30, block=7))
+    pressure = np.concatenate([block.pressure for block in blocks])
+    found, weights = last(blocks), 10 * system.pair.weights
+    volume = 1e-9 * STROKE * (pressure**2 @ weights)
+    path = STROKE * (pressure @ weights)
+    assert np.ptp(path) > 0.1 * path.mean()
+    assert found["total_volume"] == pytest.approx(volume.sum(), rel=1e-12)
+    assert found["mean_wear_rate"] == pytest.approx(1e3 * volume.sum() / path.sum(), rel=1e-12)
+    assert found["wear_rate"] == pytest.approx(1e3 * volume[-1] / path[-1], rel=1e-12)
+    assert found["friction_work"] == pytest.approx(MU * path.sum(), rel=1e-12)
+    np.testing.assert_allclose(found["dissipated_energy"], MU * STROKE * pressure.sum(axis=0), rtol=1e-12)
+
+
+def test_work_is_the_heat_that_friction_makes(assembled: Assemble) -> None:
+    """Both are computed apart, from the same pressures."""
+    system = assembled("example1-heat", *SMALL)
+    (block,) = march(system, 12)
+    assert block.heat is not None
+    np.testing.assert_allclose(values(block)["friction_work"], np.cumsum(block.heat.terms[:, 0]), rtol=1e-9)
+
+
+@pytest.mark.parametrize("how", ["march", "jump"])
+def test_both_bodies_after_their_meshes_have_followed(assembled: Assemble, how: str) -> None:
+    """k F s of punch and strip to rounding, where depths times the weights of any one mesh are off."""
+    system = assembled("fretting", *FRETTING)
+    count = 400 if how == "march" else 800
+
+    def integrate(on: Tribosystem, start: Any, leave: Any) -> Any:
+        if how == "march":
+            return march(on, count, implicit=True, start=start, leave=leave)
+        return jump(on, count, tolerance=0.2, start=start, leave=leave)
+
+    blocks = list(follow(system, integrate))
+    assert blocks[-1].system is not system
+    found, block = last(blocks), blocks[-1]
+    path = float(block.totals.of("load_path")[-1])
+    for end, k in (("", 2e-5), ("_strip", 3e-5)):
+        assert found[f"total_volume{end}"] == pytest.approx(k * path, rel=1e-12)
+        assert found[f"mean_wear_rate{end}"] == pytest.approx(1e3 * k, rel=1e-12)
+    assert path == pytest.approx(18.5 * 0.05 * count, rel=1e-9)  # the load, as it has no friction
+    assert found["normal_force"] == pytest.approx(18.5, rel=1e-9)
+    assert found["sliding_distance"] == pytest.approx(0.05 * count, rel=1e-12)
+    by_depth = block.system.pair.strip.weights @ block.wear_strip[-1]
+    assert by_depth == pytest.approx(found["total_area_strip"], rel=0.02)
+    if how == "march":
+        pressures = np.concatenate([b.adds.of("load_path") for b in blocks])
+        assert path == pytest.approx(pressures.sum(), rel=1e-12)
+
+
+def test_what_is_jumped_over_is_counted(assembled: Assemble) -> None:
+    """The energy of each place after jumps nears that of a march as their tolerance falls."""
+    settings = (*SMALL, f"wear.punch.coefficient={K}")
+    system, count = assembled("example1", *settings), 400
+    exact = last(march(system, count, implicit=True))["dissipated_energy"]
+    errors = []
+    for tolerance in (0.1, 0.01):
+        found = last(jump(system, count, tolerance=tolerance))["dissipated_energy"]
+        errors.append(np.abs(found - exact).max() / exact.max())
+    assert errors[1] < min(0.01, errors[0])
+
+
+def test_turning_strip(assembled: Assemble) -> None:
+    """A disc under a pin: the arc at the pin's mean radius is slid, and beta~ times the load path worn."""
+    system = assembled("pin-on-disc", "geometry.degree=1", "geometry.order=1")
+    (block,) = march(system, 3)
+    found, case, pair = values(block), system.case, system.pair
+    radius = np.linalg.norm(pair.punch.x[:, :2], axis=1)
+    angle = sum(phase.distance for phase in system.motion.phases) * 3 / len(system.motion.phases)
+    mean = (radius @ pair.weights) / pair.weights.sum()
+    assert found["sliding_distance"][-1] == pytest.approx(angle * mean, rel=1e-12)
+    path = angle / 3 * (block.pressure @ (pair.weights * radius)).sum()
+    law, mu = case.wear.punch, case.contact.friction
+    assert law is not None
+    assert isinstance(law.coefficient, float)
+    assert found["total_volume"][-1] == pytest.approx(law.coefficient * path, rel=1e-12)
+    assert found["friction_work"][-1] == pytest.approx(mu * path, rel=1e-12)
+    assert "total_area" not in variables(system)
+    assert {"scar_width", "scar_length_5", "max_wear_y"} <= set(variables(system))
+
+
+@pytest.mark.mpi
+def test_density_of_what_is_worn(assembled: Assemble) -> None:
+    """That of the region at the contact, not of the body's other ones."""
+    punch, strip = assembled("example1-heat", *SMALL).bodies.densities
+    assert punch is not None
+    assert strip is not None
+    np.testing.assert_allclose(punch, 846e-12, rtol=1e-14)
+    np.testing.assert_allclose(strip, 7800e-12, rtol=1e-14)
+    assert assembled("example1", *SMALL).bodies.densities == (None, None)
+
+
+def run(folder: Path, *settings: str, name: str = "example1", resume: bool = False) -> tuple[xarray.Dataset, Any]:
+    case = load_case(
+        name, [*SMALL, f"wear.punch.coefficient={K}", "output.report=false", "output.fields_at=[]", *settings]
+    )
+    summary, _ = run_case(case, "test", folder, lambda message: None, resume=resume)
+    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
+        return history.load(), summary
+
+
+def test_half_cycles_that_are_not_kept_and_a_restart(tmp_path: Path) -> None:
+    """The sums of all, whichever are in the file; a run in two parts ends with those of one."""
+    all_kept, _ = run(tmp_path / "all", "run.half_cycles=60")
+    few, _ = run(tmp_path / "few", "run.half_cycles=60", "output.every=7")
+    run(tmp_path / "parts", "run.half_cycles=24")
+    parts, summary = run(tmp_path / "parts", "run.half_cycles=60", resume=True)
+    names = [name for name in all_kept.data_vars if str(name).startswith(("total", "friction", "dissip", "mean_wear"))]
+    assert len(names) > 5
+    for name in names:
+        kept = all_kept[name].sel(half_cycle=few.half_cycle)
+        np.testing.assert_array_equal(few[name], kept)
+        np.testing.assert_allclose(parts[name], all_kept[name], rtol=1e-13)
+    assert summary["punch"]["worn_volume_mm3"] == float(parts.total_volume[-1])
+    assert np.trapezoid(np.gradient(all_kept.total_volume)) > 0
+    assert json.loads((tmp_path / "parts" / "summary.json").read_text())["sliding"] == summary["sliding"]
+
+
+def test_sheet_for_people(assembled: Assemble) -> None:
+    """Labels, units, a column for each body; no mass without a density."""
+    (block,) = march(assembled("fretting", *SMALL), 4)
+    text = sheet_text(sheet(block))
+    lines = {line.partition("  ")[0]: line.split()[-2:] for line in text.splitlines()}
+    assert lines["sliding distance (m)"][1] == "0.0002"
+    assert [float(v) for v in lines["specific wear rate, mean (mm³/(N m))"]] == pytest.approx([1.9e-5, 2.9e-5])
+    assert "mass" not in text
+    assert "punch" in text
+    assert "strip" in text

@@ -1,0 +1,110 @@
+"""Wear spread along a closed track: circles on a disc, lines along a translation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import Tribosystem
+from fenwear.arrays import Array
+from fenwear.assembly import place_case
+from fenwear.case import make_case
+from fenwear.cycle import march, steady
+from fenwear.sliding.track import _part_below
+
+DISC = ("geometry.degree=2", "wear.strip.coefficient=2e-8", "geometry.parameters.disc_layers=2",
+        "geometry.parameters.pin_layers=2")  # fmt: skip
+
+
+def blocks(motion: dict[str, Any], **sizes: float) -> Tribosystem | Any:
+    """Return a block of 1 mm on a larger one, placed; both wear."""
+    wide = {"margin_x": 0.5, "margin_y": 0.5, "margin_elements": 2, "across_x": 4, "across_y": 4}
+    return place_case(make_case({
+        "geometry": {"file": "solid_blocks.geo", "degree": 1, "parameters": {**wide, **sizes}},
+        "model": {"kind": "solid"},
+        "materials": {"steel": {"young": 2e5, "poisson": 0.3}},
+        "punch": {"regions": {"punch_body": "steel"}, "supports": [{"on": "punch_sides", "fix": ["x", "y"]}],
+                  "loads": [{"on": "punch_far", "force": [0, 0, -10]}]},
+        "strip": {"regions": {"strip_body": "steel"}, "supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        "wear": {"punch": {"coefficient": 1e-8}, "strip": {"coefficient": 2e-8}},
+        "motion": motion,
+        "run": {"half_cycles": 1},
+    }))  # fmt: skip
+
+
+def line(**motion: Any) -> dict[str, Any]:
+    return {"kind": "one-way", "direction": "rightward", "speed": 1.0, "duration": 1.0, "track": 50.0, **motion}
+
+
+@pytest.mark.parametrize("along", [[1, 0, 0], [0, 1, 0]])
+@pytest.mark.parametrize("cells", [{}, {"strip_tetrahedra": 1, "strip_across_x": 3}])
+def test_uniform_wear_along_a_line(along: list[float], cells: dict[str, float]) -> None:
+    """A block of 1 mm that loses a depth of 1 everywhere lowers a track of 50 mm by 1 / 50 over its own width."""
+    placed = blocks(line(along=along), **cells)
+    depth = placed.pair.deposit @ np.ones(len(placed.pair.weights))
+    across = np.abs(placed.pair.strip.x[:, along.index(0)])
+    np.testing.assert_allclose(depth[across < 0.5 + 1e-9], 0.02, rtol=1e-9)
+    assert depth[across > 0.75 - 1e-9].max() == 0
+    np.testing.assert_allclose(placed.pair.opening(0 * placed.pair.weights, depth), 0.02, rtol=1e-9)
+
+
+def test_a_turn_about_a_far_axis_is_a_line() -> None:
+    """About an axis along y 1,000 mm below, the track is 2 pi 1,000 mm long; s is the distance along the axis."""
+    depth: dict[str, Array] = {}
+    turn = {"kind": "rotation", "axis": [0, 1, 0], "centre": [0, 0, -1000], "angular_speed": 1.0, "duration": 1.0}
+    for name, motion in (("turn", turn), ("line", line(track=2000 * np.pi))):
+        placed = blocks(motion)
+        pressure = 1 + placed.pair.punch.x[:, 1] ** 2
+        depth[name] = placed.pair.deposit @ pressure
+    np.testing.assert_allclose(depth["turn"], depth["line"], rtol=1e-6)
+
+
+def test_pin_on_a_disc(assembled: Callable[..., Tribosystem]) -> None:
+    """A round pin is 2 r arccos((r² + d² - a²) / 2 r d) long on the circle of radius r: nodes have that mean."""
+    system = assembled("pin-on-disc", *DISC)
+    x = system.pair.strip.x
+    r, a, d = np.hypot(x[:, 0], x[:, 1]), 3.0, 15.0
+    found = system.pair.deposit @ np.ones(len(system.pair.weights))
+    chord = np.arccos(np.clip((r**2 + d**2 - a**2) / (2 * r * d), -1, 1)) / np.pi
+    inside = np.abs(r - d) < 0.7 * a
+    np.testing.assert_allclose(found[inside], chord[inside], rtol=0.03)
+    assert system.pair.deposit.min() >= 0
+    # All around: the volume of the profile is that of the layer worn off under the pin, 9 pi.
+    order = np.argsort(r)
+    volume = np.trapezoid(2 * np.pi * r[order] * found[order], r[order])
+    assert volume == pytest.approx(9 * np.pi, rel=0.02)
+
+
+def test_volume_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> None:
+    """beta~ phi times the integral of p r, exactly, on the disc as on the pin; all of a ring is worn alike."""
+    system = assembled("pin-on-disc", *DISC)
+    *_, block = march(system, 3, implicit=True)
+    x, xs = system.pair.punch.x, system.pair.strip.x
+    torque = block.pressure @ (system.pair.weights * np.hypot(x[:, 0], x[:, 1]))
+    np.testing.assert_allclose(block.worn_area_strip, 2e-8 * 2 * np.pi * torque, rtol=1e-12)
+    np.testing.assert_allclose(block.worn_area, 1e-8 * 2 * np.pi * torque, rtol=1e-12)
+    r, depth = np.hypot(xs[:, 0], xs[:, 1]), block.wear_strip[-1]
+    below, above = np.abs(xs[:, 1]) < 0.3, np.abs(r - 15) < 2
+    middle = np.interp(r[above], *np.array(sorted(zip(r[below], depth[below], strict=True))).T)
+    np.testing.assert_allclose(depth[above], middle, rtol=0.05)
+
+
+def test_steady_state_is_the_optimum(assembled: Callable[..., Tribosystem]) -> None:
+    """The punch's wear and the track's together are a rigid motion, in both."""
+    system = assembled("pin-on-disc", *DISC)
+    optimum, state = system.optimum(1), steady(system)
+    np.testing.assert_allclose(state.pressure[0], optimum.pressure, rtol=1e-7, atol=1e-9)
+    rigid = system.rigid.rigid_normal @ [state.velocity[name] for name in system.rigid.mode_names]
+    np.testing.assert_allclose(state.wear_per_cycle, rigid, rtol=1e-8)
+    alone = assembled("pin-on-disc", *DISC[:1], *DISC[2:]).optimum(1)
+    assert np.abs(optimum.pressure - alone.pressure).max() > 0.01 * alone.pressure.max()
+
+
+def test_part_of_a_triangle() -> None:
+    """Below s = c the triangle (0, 0), (1, 0), (0, 1) with s = x + 2 y has the area of its clipped polygon."""
+    s = np.sort(np.array([[0.0, 1.0, 2.0]] * 5), axis=1)
+    found = _part_below(s, np.array([-1.0, 0.5, 1.0, 1.5, 3.0]))
+    np.testing.assert_allclose(found, [0, 0.125, 0.5, 0.875, 1], atol=1e-14)

@@ -1,0 +1,189 @@
+"""Cycles with stick: energy, loops, wear, jumps, gross sliding as the limit, time steps, bad input."""
+
+from __future__ import annotations
+
+import itertools
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, assemble, load_case
+from fenwear.errors import ConvergenceError
+from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.jump import Cycle, jump, march
+from fenwear.stick.program import make_program
+from fenwear.stick.setup import fine_enough, make_rig, with_steps
+
+COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
+SMALL = (*COARSE, "motion.amplitude='3 um'")
+
+
+@lru_cache
+def rig(*settings: str) -> Rig:
+    return make_rig(load_case("fretting-partial-slip", [*SMALL, *settings]))
+
+
+def first_cycle(of: Rig) -> Records:
+    return Records.joined(of.cycle(of.beginning())[1])
+
+
+@pytest.mark.parametrize("settings", [(), ("stick.force='60 N'",), ("stick.bulk_stress='200 MPa'",)])
+def test_energy_of_every_half_cycle(settings: tuple[str, ...]) -> None:
+    """What the rig puts in is stored or dissipated, to rounding; friction never gives energy back."""
+    driven = rig(*settings)
+    at, parts = driven.cycle(driven.beginning())
+    again = driven.cycle(at)[1]
+    for part in [*parts, *again]:
+        assert (part.dissipated >= 0).all()
+        assert part.energy(driven.weights) > 0
+        assert part.balance_error(driven.weights) < 1e-10
+    there, back = (part.energy(driven.weights) for part in again)
+    assert there == pytest.approx(back, rel=0.03 if "bulk" in str(settings) else 1e-6)
+
+
+def test_loop_area_is_the_work_of_friction() -> None:
+    """The area of the closed loop tends to it with the time steps."""
+    errors = []
+    for steps in (10, 20, 40):
+        driven = with_steps(rig(), load_case("fretting-partial-slip", list(SMALL)), steps)
+        at, _ = driven.cycle(driven.beginning())
+        records = Records.joined(driven.cycle(at)[1])
+        Q, d = records.force, records.displacement
+        area = 0.5 * np.abs(np.sum(Q * np.roll(d, -1) - np.roll(Q, -1) * d))
+        errors.append(abs(records.energy(driven.weights) / area - 1))
+    assert errors[2] < 0.35 * errors[1] < 0.2 * errors[0]
+    assert errors[2] < 0.01
+
+
+def test_force_and_displacement_drive_the_same_loop() -> None:
+    """The forces of a run by displacement, imposed, move the strip as it was moved."""
+    moved = first_cycle(rig())
+    largest = float(np.abs(moved.force).max())
+    pulled = first_cycle(rig(f"stick.force='{largest!r} N'"))
+    ends = slice(len(moved) // 2 - 1, None, len(moved) // 2)
+    assert pulled.force[ends] == pytest.approx(moved.force[ends], rel=1e-6)
+    assert pulled.displacement[ends] == pytest.approx(moved.displacement[ends], rel=2e-3)
+
+
+def depths(cycles: list[Cycle]) -> np.ndarray:
+    return np.concatenate([cycles[-1].worn.punch, cycles[-1].worn.strip])
+
+
+def test_jumps_tend_to_the_march() -> None:
+    """The difference to the march falls with the tolerance; no depth ever decreases."""
+    fast = ("wear.punch.coefficient='1e-6 1/MPa'", "wear.strip.coefficient='2e-6 1/MPa'")
+    driven, cycles = rig(*fast, "stick.steps=10"), 40
+    marched = list(march(driven, cycles + 1))  # the last begins with what the others have worn
+    exact = depths(marched)
+    differences, counts = [], []
+    for tolerance in (0.1, 1e-2):
+        found = list(jump(driven, cycles, tolerance))
+        assert found[-1].number == cycles
+        counts.append(len(found))
+        for before, after in itertools.pairwise(found):
+            assert (after.worn.punch >= before.worn.punch).all()
+            assert (after.worn.strip >= before.worn.strip).all()
+        differences.append(np.abs(depths(found) - exact).sum() / exact.sum())
+    assert counts[0] < counts[1] < cycles
+    assert differences[0] < 0.1
+    assert differences[1] < 0.02
+    assert differences[1] < differences[0]
+
+
+def test_worn_volume_goes_with_the_work_of_friction() -> None:
+    """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
+    driven = rig()
+    cycle = next(iter(march(driven, 1)))
+    energy = cycle.records.energy(driven.weights)
+    assert driven.weights @ cycle.rate.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
+    strip = driven.interface.middle.pair.strip.weights
+    assert strip @ cycle.rate.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
+
+
+def test_wear_begins_at_a_pressure_and_ends_to_grow_at_another() -> None:
+    """Threshold and cap count at each node in each time step; sqrt(p) and the square of the speed, too."""
+    law = "wear.punch={coefficient='1e-8 1/MPa', pressure_threshold='200 MPa', pressure_cap='500 MPa'}"
+    records = next(iter(march(rig(law), 1))).records
+    expected = 1e-8 * (np.clip(records.pressure, 200, 500) - 200) * records.slid
+    assert records.punch_depth == pytest.approx(expected, rel=1e-12)
+    law = "wear.punch={coefficient=1e-8, pressure_exponent=0.5, speed_exponent=2}"
+    records = next(iter(march(rig(law), 1))).records
+    duration = 0.2 / 40
+    assert records.punch_depth == pytest.approx(1e-8 * records.pressure**0.5 * records.slid**2 / duration, rel=1e-12)
+
+
+def test_large_strokes_slide_as_a_whole() -> None:
+    """Fretting of 25 um: pressures as of known direction; the bodies take 3 % of the stroke elastically."""
+    settings = ["geometry.parameters.elements_along_contact=24", "motion.positions=9"]
+    sliding = assemble(load_case("fretting", settings))
+    case = load_case("fretting", [*settings, "contact.law='coulomb'", "stick.steps=9"])
+    driven = make_rig(case)
+    at, _ = driven.cycle(driven.beginning())
+    _, parts = driven.cycle(at)
+    for half, part in enumerate(parts):
+        for k in range(3, 9):
+            phase = 9 * half + k
+            known = sliding.phase_contact((phase,)).solve(sliding.gap(phase, sliding.unworn()))
+            difference = np.abs(part.pressure[k] - known.pressure[0]).max()
+            assert difference < 1e-7 * known.pressure.max()
+            assert not part.sticking[k].any()
+            assert abs(part.force[k]) == pytest.approx(0.9 * 18.5, rel=1e-6)
+    energy = sum(part.energy(driven.weights) for part in parts)
+    assert energy / (0.9 * 18.5 * 0.1) == pytest.approx(0.97, abs=0.01)
+
+
+def test_steps_are_doubled_until_they_are_fine_enough() -> None:
+    """The stated change is that of the next doubling."""
+    load = (
+        "punch.loads=[{on='punch_top', force=['0 N', '-120 N'], over_cycle=[[0, 1], [0.3, 1.4], [0.7, 0.7], [1, 1]]}]"
+    )
+    case = load_case("fretting-partial-slip", [*SMALL, load, "stick.steps=2", "stick.step_tolerance=0.02"])
+    start = make_rig(case)
+    found, fineness = fine_enough(start, case)
+    assert fineness.enough
+    assert fineness.steps == len(found.program.steps) // 2 > 2
+    work = [
+        first_cycle(with_steps(start, case, steps)).energy(start.weights)
+        for steps in (fineness.steps, 2 * fineness.steps)
+    ]
+    assert abs(work[1] / work[0] - 1) <= 0.02
+
+
+def test_the_program_follows_the_motion() -> None:
+    """It leads from the middle to the start, to the other side and back; a table goes as it says."""
+    program = make_program(load_case("fretting-partial-slip"))
+    ends = [step.displacement for step in program.steps]
+    assert ends[19] == pytest.approx(3e-3)
+    assert ends[39] == pytest.approx(-3e-3)
+    assert program.lead_in[-1].displacement == pytest.approx(-3e-3)
+    table = "motion={kind='table', times=[0, 1, 3, 4], displacements=['0 um', '2 um', '-2 um', '0 um']}"
+    program = make_program(load_case("fretting-partial-slip", [table, "stick.steps=4"]))
+    assert program.half_cycles == 3
+    assert [step.displacement for step in program.steps][3::4] == pytest.approx([2e-3, -2e-3, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (["contact.law='gross-sliding'", "stick.force='1 N'"], "stick: expected with contact.law = 'coulomb' only"),
+        (["contact.law='viscous'"], "contact.law"),
+        (["stick.steps=1"], "stick.steps"),
+        (["stick.bulk_over_cycle=[[0, 1], [0.5, 0]]"], "stick.bulk_over_cycle: expected pairs"),
+        (["contact.transverse_friction=0.1"], "contact.transverse_friction: expected 0 with contact.law"),
+        (["run.integration='implicit'"], "run.integration: expected 'explicit' or 'jump' with contact.law"),
+        (["motion={kind='one-way', direction='rightward', speed=1, duration=1}"], "motion.kind: expected"),
+        (["contact.friction={table=[[0, 0.2], [100, 0.5]], of='p'}"], "contact.friction: expected a constant"),
+    ],
+)
+def test_bad_cases_name_the_key(settings: list[str], message: str) -> None:
+    """What does not go with stick is refused when the case is read."""
+    with pytest.raises(CaseError, match=message.replace(".", r"\.")):
+        load_case("fretting-partial-slip", settings)
+
+
+def test_more_force_than_friction_holds() -> None:
+    """The run ends with what the contact carries."""
+    driven = rig("stick.force='109 N'")
+    with pytest.raises(ConvergenceError, match=r"gross sliding starts: the tangential force .* reaches mu P = 108"):
+        driven.cycle(driven.beginning())

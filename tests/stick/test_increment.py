@@ -1,0 +1,172 @@
+"""One step of contact with stick: the laws, equilibrium, energy; other methods; bad input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from fenwear.contact import CondensedContact, SlidingContact
+from fenwear.errors import ConvergenceError
+from fenwear.interface import join
+from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
+from fenwear.stick.cone import project
+
+RADIUS, LOAD = 200.0, 100.0
+MU = 0.5
+
+
+def imposed(interface: StickInterface, **how: float | None) -> Imposed:
+    x = interface.middle.pair.x
+    return Imposed(interface.loaded(None), x**2 / (2 * RADIUS), **how)
+
+
+def pressed(interface: StickInterface, mu: float = MU) -> tuple[StickState, Imposed]:
+    end = imposed(interface)
+    start = replace(end, loaded=end.loaded.times(0))
+    return advance(interface, untouched(interface), start, end, np.full(len(end.opening), mu)), end
+
+
+def check(interface: StickInterface, before: StickState, state: StickState, end: Imposed, mu: float) -> None:
+    """All laws of a step, from the displacements of both bodies rather than the compliance that was solved with."""
+    position, n = interface.middle, len(end.opening)
+    p, t, s = state.pressure, state.traction[:, 0], state.slip[:, 0]
+    top = p.max()
+    assert (p >= 0).all()
+    assert (np.abs(t) <= mu * p * (1 + 1e-14)).all()
+    assert (state.gap >= -1e-10 * np.abs(state.gap).max()).all()
+    assert not (p * state.gap).any()
+    slipping = state.slipping if state.parts == 1 else np.zeros(n, dtype=bool)
+    assert np.abs(np.abs(t[slipping]) - mu * p[slipping]).max(initial=0) < 1e-9 * top
+    assert (t[slipping] * s[slipping] <= 0).all(), "slip goes against the traction"
+    jumps = []
+    for one in (before, state):
+        moved = position.in_frame(one.on_punch - position.reading @ one.on_strip)
+        jumps.append(moved + position.modes @ one.rigid - position.drive * one.displacement)
+    scale = np.abs(jumps[1]).max()
+    assert np.abs(jumps[1][:n] + end.opening - state.gap).max() < 1e-9 * scale
+    touched = state.closed
+    assert np.abs((jumps[1] - jumps[0])[n:][touched] - s[touched]).max() < 1e-9 * scale
+    f = np.concatenate([p, t])
+    assert np.abs(position.balance @ f + end.loaded.resultant).max() < 1e-9 * LOAD
+    assert state.force == pytest.approx(position.pair.weights @ t, abs=1e-9 * LOAD)
+
+
+def energy(interface: StickInterface, before: StickState, state: StickState, end: Imposed) -> None:
+    """Work of rig and load = what the bodies store + friction, all of the tractions at the end of the step."""
+    position = interface.middle
+    f = np.concatenate([state.pressure, state.traction[:, 0]])
+    force = position.in_space(f * position.weights)
+    back = position.reading.T @ force
+    stored = np.vdot(force, state.on_punch - before.on_punch) - np.vdot(back, state.on_strip - before.on_strip)
+    rubbed = -position.pair.weights @ (state.traction * state.slip)[:, 0]
+    closed = position.pair.weights @ (state.pressure * state.approach)
+    work = state.force * (state.displacement - before.displacement) + end.loaded.resultant @ (
+        state.rigid - before.rigid
+    )
+    scale = abs(work) + abs(stored) + rubbed + 1e-6 * LOAD * 1e-2
+    assert rubbed >= 0
+    assert abs(work - stored - rubbed + closed) < 1e-8 * scale
+
+
+paths = st.lists(st.tuples(st.floats(0.2, 1.5), st.floats(-0.9, 0.9), st.floats(-2e-4, 2e-4)), min_size=1, max_size=6)
+
+
+@given(path=paths, mu=st.sampled_from([0.05, 0.3, 0.7]), by_force=st.booleans())
+@example(path=[(1.0, 0.5, 0.0), (0.3, 0.1, 0.0)], mu=0.7, by_force=True)
+def test_random_paths(unlike: Callable[[], StickInterface], path: list, mu: float, by_force: bool) -> None:
+    """Whatever load, force or displacement, and strain: cone, slip against traction, stick inside, energy."""
+    interface = unlike()
+    before, start = pressed(interface, mu)
+    friction = np.full(len(start.opening), mu)
+    for load, drive, strain in path:
+        how = {"displacement": None, "force": drive * mu * load * LOAD} if by_force else {"displacement": drive * 2e-3}
+        end = imposed(interface, strain=strain, **how)
+        end = replace(end, loaded=end.loaded.times(load))
+        if by_force:
+            start = replace(start, displacement=None, force=before.force)
+        if by_force and abs(before.force) > 0.95 * mu * load * LOAD:
+            continue  # on the way the force would be more than friction can hold
+        state = advance(interface, before, start, end, friction)
+        check(interface, before, state, end, mu)
+        if state.parts == 1:
+            energy(interface, before, state, end)
+        before, start = state, end
+
+
+def test_alternation_finds_the_same(unlike: Callable[[], StickInterface]) -> None:
+    """Normal contact by PETSc's inequality, alternated with the projection of the tractions at its pressures."""
+    interface = unlike()
+    before, start = pressed(interface)
+    end = imposed(interface, displacement=1.2e-3)
+    friction = np.full(len(end.opening), MU)
+    state = advance(interface, before, start, end, friction)
+    position, n = interface.middle, len(end.opening)
+    assert 0 < state.sticking.sum() < state.closed.sum()
+    joined = join(position.rigid, interface.punch, interface.strip, strip_moves=False)
+    normal = CondensedContact([SlidingContact(joined, np.zeros((n, 2)))])
+    C, t = position.compliance, before.traction
+    pace = 0.9 / np.linalg.norm(C[n:, n:], 2)
+    free = end.loaded.on_punch - before.on_punch - position.reading @ (end.loaded.on_strip - before.on_strip)
+    moved = position.in_frame(free)[n:] - position.drive[n:] * 1.2e-3
+    for _ in range(400):
+        contact = normal.solve(end.opening + C[:n, n:] @ t[:, 0])
+        p = contact.pressure[0]
+        for _ in range(200):
+            slip = C[n:, :n] @ p + C[n:, n:] @ t[:, 0] + moved
+            t = project(t - pace * slip[:, None], MU * p)
+        if np.abs(t - state.traction).max() < 1e-8 * p.max():
+            break
+    assert np.abs(p - state.pressure).max() < 1e-7 * p.max()
+    assert np.abs(t - state.traction).max() < 1e-7 * p.max()
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_gross_sliding_is_the_limit(unlike: Callable[[], StickInterface], direction: int) -> None:
+    """After a long stroke every node slips, with the pressures of contact of known direction."""
+    interface = unlike()
+    state, start = pressed(interface)
+    end = imposed(interface, displacement=direction * 0.05)
+    state = advance(interface, state, start, end, np.full(len(end.opening), MU))
+    joined = join(interface.middle.rigid, interface.punch, interface.strip, strip_moves=False)
+    ratio = direction * MU * interface.middle.frame[:, 1]
+    sliding = CondensedContact([SlidingContact(joined, ratio)]).solve(end.opening)
+    assert not state.sticking.any()
+    assert np.abs(state.pressure - sliding.pressure[0]).max() < 1e-9 * state.pressure.max()
+    assert state.force == pytest.approx(direction * MU * LOAD, rel=1e-9)
+
+
+def test_more_force_than_friction_holds(unlike: Callable[[], StickInterface]) -> None:
+    """It is told what the contact can carry, and what starts there."""
+    interface = unlike()
+    state, start = pressed(interface)
+    start = replace(start, displacement=None, force=0.0)
+    end = imposed(interface, displacement=None, force=1.01 * MU * LOAD)
+    with pytest.raises(ConvergenceError, match=r"gross sliding starts: the tangential force .* reaches mu P = 50"):
+        advance(interface, state, start, end, np.full(len(end.opening), MU))
+    end = replace(end, force=0.99 * MU * LOAD)
+    assert advance(interface, state, start, end, np.full(len(end.opening), MU)).sticking.any()
+
+
+def test_friction_too_large_is_seen(unlike: Callable[[], StickInterface]) -> None:
+    """With mu = 6 between unlike bodies a piece of the step turns its orientation."""
+    interface = unlike()
+    seen = []
+    for mu in (0.5, 20.0):
+        friction = np.full(len(interface.middle.pair.x), mu)
+        state, start = pressed(interface, mu)
+        for displacement in np.linspace(0, 0.2, 5)[1:]:
+            end = imposed(interface, displacement=float(displacement))
+            try:
+                state = advance(interface, state, start, end, friction)
+            except ConvergenceError:
+                seen.append((mu, False))
+                break
+            seen.append((mu, state.unique))
+            start = end
+    assert all(unique for mu, unique in seen if mu == 0.5)
+    assert not all(unique for mu, unique in seen if mu == 20.0)

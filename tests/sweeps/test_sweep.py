@@ -1,0 +1,212 @@
+"""Sweeps: the numbers of single computations, whatever computes them; faults, kept variants, what is written."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+from mpi4py import MPI
+
+import fenwear as package
+from fenwear import CaseError, Tribosystem, load_case, march, steady
+from fenwear.errors import InterruptedRunError
+from fenwear.sweeps import engines
+from fenwear.sweeps.command import failures, text
+from fenwear.sweeps.picture import sweep_figure
+from fenwear.sweeps.store import kept
+
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+CASE = load_case("example1", SMALL)
+OVER = {"contact.friction": "0.1:0.3:3", "geometry.parameters.pin_height_1": ["20 mm", "40 mm"]}
+
+
+def single(*settings: str) -> Any:
+    return steady(package.assemble(load_case("example1", [*SMALL, *settings]), MPI.COMM_SELF))
+
+
+def test_steady_states_are_those_of_single_cases(tmp_path: Path) -> None:
+    """Each variant, whatever it shares with others, is what its case gives alone; the files hold the same."""
+    found = package.sweep(CASE, OVER, folder=tmp_path / "out")
+    assert dict(found.sizes) == {
+        "contact.friction": 3,
+        "geometry.parameters.pin_height_1": 2,
+        "half_cycle": 2,
+        "node": 17,
+    }
+    assert found["geometry.parameters.pin_height_1"].values.tolist() == [20.0, 40.0]
+    for mu, height in ((0.1, 40.0), (0.3, 20.0), (0.2, 40.0)):
+        state = single(f"contact.friction={mu}", f"geometry.parameters.pin_height_1={height}")
+        own = found.sel({"contact.friction": mu, "geometry.parameters.pin_height_1": height}, method="nearest")
+        np.testing.assert_allclose(own["pressure"], state.pressure, rtol=0, atol=1e-9 * state.pressure.max())
+        np.testing.assert_allclose(own["shape"], state.shape, rtol=0, atol=1e-9 * np.ptp(state.shape))
+        np.testing.assert_allclose(float(own["lambda_F"]), state.velocity["lambda_F"], rtol=1e-9)
+        assert own["direction"].values.tolist() == list(state.directions)
+    assert (found["trouble"] == "").all()
+    stored = xarray.open_dataset(tmp_path / "out" / "sweep.nc", engine="h5netcdf")
+    np.testing.assert_array_equal(stored["pressure"], found["pressure"])
+    assert stored["pressure"].attrs["units"] == "MPa"
+    assert len((tmp_path / "out" / "sweep.csv").read_text().splitlines()) == 7
+
+
+def test_runs_and_optima(assembled: Callable[..., Tribosystem]) -> None:
+    """`run` ends where march ends; the optimum of l_z = 20 is the paper's."""
+    over = {"wear.punch.coefficient": [1e-7, 2e-7], "run.half_cycles": [11]}
+    found = package.sweep(CASE, over, of="run").squeeze()
+    system = assembled("example1", *SMALL, "wear.punch.coefficient=2e-7")
+    *_, last = march(system, 11)
+    np.testing.assert_allclose(found["wear"][1], last.wear[-1], rtol=1e-9, atol=1e-12 * last.wear.max())
+    # 11 half-cycles end in a progressive one: phases are in the order of the cycle
+    np.testing.assert_allclose(found["pressure"][1, 0], last.pressure[-1], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found["pressure"][1, 1], last.pressure[-2], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found["worn_volume"], np.array([1e-7, 2e-7]) * 1e4 * 2 * 1.5 * 11, rtol=1e-9)
+    best = package.sweep("monotonic-lz20", {"motion.direction": ["rightward", "leftward"]}, of="optimum")
+    np.testing.assert_allclose(best["lambda_F"].values.ravel(), [0.05 / 3, 0.05], rtol=1e-9)
+    assert best["lambda_F"].attrs["units"] == "mm/s"
+
+
+def test_meshes_of_other_nodes() -> None:
+    """Where the nodes are not the same, each variant has its own, and arrays end with NaN."""
+    found = package.sweep(CASE, {"geometry.parameters.elements_along_contact": [4, 8]})
+    assert found["x"].dims == ("geometry.parameters.elements_along_contact", "node")
+    assert int(np.isfinite(found["x"][0]).sum()) == 9
+    assert int(np.isfinite(found["pressure"][0, 0]).sum()) == 9
+    assert np.isfinite(found["x"][1]).all()
+
+
+def test_failed_variants_are_told_and_not_fatal(tmp_path: Path) -> None:
+    """A punch that tips over at one friction: NaN there, with the reason; the others are there."""
+    found = package.sweep(CASE, {"contact.friction": [0.2, 1.9]}, folder=tmp_path / "out")
+    assert np.isnan(found["pressure"][1]).all()
+    assert np.isfinite(found["pressure"][0]).all()
+    assert "balances the loads" in str(found["trouble"][1].item())
+    assert failures(found)[0].startswith("failed: contact.friction = 1.9: punch.loads: no pressure")
+    assert "2 variants, 1 of them failed" in text(found)
+
+
+def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    """One variant that raises anything costs no other one."""
+
+    def broken(_self: object, case: package.Case, _of: str) -> dict[str, Any]:
+        if case.contact.friction > 0.15:
+            raise ZeroDivisionError("nothing to divide by")
+        return {"mean_pressure": np.array(1.0)}
+
+    monkeypatch.setattr(engines.Workshop, "values", broken)
+    found = package.sweep(CASE, {"contact.friction": [0.1, 0.2]})
+    assert found["mean_pressure"].values.tolist()[0] == 1.0
+    assert found["trouble"].values.tolist() == ["", "an error that was not foreseen: nothing to divide by"]
+    assert "contact.friction=0.2" in capfd.readouterr().err
+
+
+def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupted, or with values added, only what is not there is computed; a broken file is not there."""
+    folder, computed, real = tmp_path / "out", [], engines.Workshop.values
+
+    def counted(self: Any, case: package.Case, of: Any) -> Any:
+        if len(computed) == 2 and not (folder / "sweep.nc").exists():
+            raise KeyboardInterrupt
+        computed.append(case.contact.friction)
+        return real(self, case, of)
+
+    monkeypatch.setattr(engines.Workshop, "values", counted)
+    with pytest.raises(InterruptedRunError, match=r"2 of 3 variants are in .*, to go on: --resume"):
+        package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder)
+    (folder / "sweep.nc").touch()
+    computed.clear()
+    whole = package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder, resume=True)
+    assert computed == [0.3]
+    package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.25, 0.3]}, folder=folder, resume=True)
+    assert computed == [0.3, 0.25]
+    for file in (folder / "variants").iterdir():
+        file.write_bytes(file.read_bytes()[:100])
+        assert kept(folder, file.stem) is None
+    again = package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder, resume=True)
+    assert computed == [0.3, 0.25, 0.1, 0.2, 0.3]
+    np.testing.assert_allclose(again["pressure"], whole["pressure"], rtol=1e-9, atol=1e-9)
+    with pytest.raises(CaseError, match="exists already"):
+        package.sweep(CASE, {"contact.friction": [0.1]}, folder=folder)
+    with pytest.raises(CaseError, match="holds no sweep"):
+        package.sweep(CASE, {"contact.friction": [0.1]}, folder=tmp_path / "none", resume=True)
+    with pytest.raises(CaseError, match="--resume"):
+        package.sweep(CASE, {"contact.friction": [0.1]}, resume=True)
+
+
+def test_several_processes_start_where_that_pays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By default this process begins; what would take it long goes to as many as there are cores."""
+    begun: list[int] = []
+
+    class Here:
+        def __init__(self, count: int) -> None:
+            begun.append(count)
+
+        def __enter__(self) -> Here:
+            return self
+
+        def __exit__(self, *_: object) -> None:
+            pass
+
+        def submit(self, function: Callable[..., Any], *arguments: Any) -> Any:
+            future: Any = engines.Future()
+            future.set_result(function(*arguments))
+            return future
+
+    monkeypatch.setattr(engines, "_processes", Here)
+    monkeypatch.setattr(engines.os, "sched_getaffinity", lambda _: {0, 1})
+    quick = package.sweep(CASE, {"contact.friction": "0.1:0.3:4"}, processes=None)
+    assert begun == []
+    monkeypatch.setattr(engines, "WORTH", 0.0)
+    slow = package.sweep(CASE, {"contact.friction": "0.1:0.3:4"}, processes=None)
+    assert begun == [2]
+    np.testing.assert_allclose(slow["pressure"], quick["pressure"], rtol=1e-9, atol=1e-9)
+
+
+def test_pictures() -> None:
+    """Lines for few values of a second key, a map for many; further keys stay at their first value, and it says so."""
+    shape, dims = (9, 8, 2), ("contact.friction", "motion.amplitude", "model.plane")
+    values = np.random.default_rng(0).random(shape)
+    data = {
+        "largest_pressure": (dims, values, {"units": "MPa", "long_name": "largest contact pressure"}),
+        "trouble": (dims, np.full(shape, ""), {"units": ""}),
+    }
+    coordinates = {dims[0]: np.linspace(0.1, 0.3, 9), dims[1]: np.geomspace(1, 8, 8), dims[2]: ["stress", "strain"]}
+    dataset = xarray.Dataset(data, coordinates)
+    many = sweep_figure(dataset)
+    assert many.get_suptitle() == "at model.plane = stress"
+    drawn = many.axes[0].collections[0].get_array()
+    np.testing.assert_array_equal(drawn, values[:, :, 0].T)
+    assert many.axes[0].get_yscale() == "log"
+    few = sweep_figure(dataset.isel({dims[1]: slice(3)}))
+    assert len(few.axes[0].lines) == 3
+    np.testing.assert_array_equal(few.axes[0].lines[1].get_ydata(), values[:, 1, 0])
+    words = sweep_figure(dataset.isel({dims[0]: [0], dims[1]: [0]}))
+    assert [label.get_text() for label in words.axes[0].get_xticklabels()] == ["stress", "strain"]
+
+
+def test_command_on_processes_and_ranks(fenwear: Callable[..., Any], tmp_path: Path) -> None:
+    """The command writes the same numbers by local processes and on two ranks; 3 where a variant failed."""
+    words = [word for setting in SMALL for word in ("--set", setting)]
+    over = ["--over", "contact.friction=0.1,1.9", "--over", "geometry.parameters.pin_height_1=20,40"]
+    tables = []
+    for number, options in enumerate((["--processes", "2"], [])):
+        folder = tmp_path / str(number)
+        done = fenwear("sweep", "example1", *over, *words, *options, "-o", folder, "--json", ranks=2 if number else 1)
+        assert done.returncode == 3, done.stderr
+        assert "failed: contact.friction = 1.9" in done.stderr
+        tables.append(json.loads(done.stdout))
+        assert {p.name for p in folder.iterdir()} == {"case.toml", "sweep.nc", "sweep.csv", "sweep.png", "variants"}
+    assert [table["failed"] for table in tables] == [2, 2]
+    for one, other in zip(*(table["variants"] for table in tables), strict=True):
+        for name in one:
+            if not name.startswith("seconds"):
+                assert one[name] == pytest.approx(other[name], rel=1e-9, abs=1e-12, nan_ok=True), name
+    shutil.rmtree(tmp_path / "0")
+    wrong = fenwear("sweep", "example1", "--over", "contact.fricton=0.1:0.2:3", "-o", tmp_path / "0")
+    assert wrong.returncode == 2
+    assert "did you mean 'friction'" in wrong.stderr
+    assert not (tmp_path / "0").exists()

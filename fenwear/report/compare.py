@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import xarray
 
 from fenwear.errors import CaseError, InputError
-from fenwear.report.figures import directions_present, mark_few, read_history
+from fenwear.report.course import directions_present, mark_few
+from fenwear.report.figures import read_history
 from fenwear.report.key_numbers import flat, number_text, read_case, read_summary
 from fenwear.report.style import DIRECTIONS, contact_axis, legend_beside, panels, run_style
 from fenwear.results.disk import writing

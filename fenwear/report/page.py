@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -12,41 +12,30 @@ from typing import Any
 import xarray
 
 from fenwear.errors import CaseError, InputError, OutputError
+from fenwear.report.captions import caption
 from fenwear.report.figures import FOLDER, draw_figures, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
 from fenwear.report.stick import write_stick_report
+from fenwear.report.style import STANDARD, Look
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
-SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
-            "program": "Test program: what acted",
-            "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
-            "boundary_temperature": "Temperature along the boundaries"}  # fmt: skip
+SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "volume",
+            "scar", "friction", "surface_stress", "temperature", "boundary_temperature")  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
-ALT = {
-    "shape": "Worn depth of the punch, and of the strip where it wears, in micrometres along the contact, "
-    "a line for each chosen half-cycle.",
-    "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, "
-    "a line for each chosen half-cycle.",
-    "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
-    "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
-    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
-    "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
-    "half-cycles.",
-    "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
-    "half-cycle.",
-    "boundary_temperature": "Temperature round the punch from the middle of its contact on, and along the strip's "
-    "upper surface, at the last half-cycle with fields.",
-    "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
-}
 
 
 def write_report(
-    directory: Path, log: Callable[[str], None] = lambda message: None, *, complete: bool = False
+    directory: Path,
+    log: Callable[[str], None] = lambda message: None,
+    *,
+    complete: bool = False,
+    look: Look = STANDARD,
+    formats: Sequence[str] = ("png",),
 ) -> list[Path]:
     """Draw a run's figures and write its report.html; return the files.
 
@@ -54,22 +43,26 @@ def write_report(
         directory: The folder of the run.
         log: Called with a message where pictures of the bodies cannot be drawn.
         complete: Draw the animation and the pictures of the bodies, too, which takes longer.
+        look: Width and axis of the figures.
+        formats: Of the files, "png", "pdf" and "svg".
 
     Raises:
         CaseError: the folder holds no run.
         OutputError: a figure or the page cannot be written.
     """
     with writing(directory):
-        return _write_report(directory, log, complete)
+        return _write_report(directory, log, complete, look, formats)
 
 
-def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
+def _write_report(
+    directory: Path, log: Callable[[str], None], complete: bool, look: Look, formats: Sequence[str]
+) -> list[Path]:
     case = read_case(directory)
     if case.get("contact", {}).get("law") == "coulomb":
         return write_stick_report(directory)
     if case.get("model", {}).get("kind", "plane") != "plane":
         raise CaseError(InputError("model.kind", "figures are drawn of plane models so far"))
-    paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
+    paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()), look, formats)
     if complete:
         from fenwear.report.animation import draw_animation
 
@@ -79,7 +72,7 @@ def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -
         except DrawingError as error:
             log(f"warning: {error}")
     report = directory / REPORT
-    write_text(report, page(directory))
+    write_text(report, page(directory, look))
     return [*paths, report]
 
 
@@ -128,7 +121,7 @@ class Places:
     rows: list[Row]
 
 
-def page(directory: Path) -> str:
+def page(directory: Path, look: Look = STANDARD) -> str:
     """Return report.html of a run whose figures are drawn."""
     history, summary = read_history(directory), read_summary(directory)
     images = _images(directory)
@@ -143,16 +136,16 @@ def page(directory: Path) -> str:
         warnings=summary.get("warnings", ()),
         tables=_tables(summary, history),
         places=_places(summary),
-        figures=[_figure(images, name, text) for name, text in SECTIONS.items()],
+        figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS],
         bodies=_bodies(images),
         animations=_animations(images),
         change=_change(summary),
         retries=summary.get("retries", {}),
-        convergence=_figure(images, "convergence", "Periodicity and optimum"),
+        convergence=_figure(images, "convergence", caption("convergence", history, look)),
         equilibrium_error=summary.get("largest_equilibrium_error"),
         heat_error=_heat_error(summary, history),
         heat=_heat(summary),
-        heat_balance=_figure(images, "heat_balance", "Heat balance"),
+        heat_balance=_figure(images, "heat_balance", caption("heat_balance", history, look)),
         stability=_stability(summary, history),
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
@@ -257,11 +250,11 @@ def _images(directory: Path) -> dict[str, Path]:
     return {path.name.removesuffix(".png"): path for path in found if path.stat().st_mtime >= since}
 
 
-def _figure(images: dict[str, Path], name: str, caption: str, alt: str = "") -> Picture | None:
+def _figure(images: dict[str, Path], name: str, text: str, alt: str = "") -> Picture | None:
     if name not in images:
         return None
     path = images[name]
-    return picture(path.read_bytes(), path.suffix[1:], caption, alt or ALT[name])
+    return picture(path.read_bytes(), path.suffix[1:], text, alt or text)
 
 
 def _bodies(images: dict[str, Path]) -> list[Picture | None]:

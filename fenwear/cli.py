@@ -35,6 +35,7 @@ CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (
 SetOption = Annotated[
     list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
 ]
+FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
@@ -72,6 +73,7 @@ def run(
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    fresh: FreshOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
@@ -85,7 +87,9 @@ def run(
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
     progress: Progress = "none" if quiet else "lines" if verbose else "bar"
-    summary, directory = run_case(loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True)
+    summary, directory = run_case(
+        loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True, fresh=fresh
+    )
     if as_json:
         _print_json(summary)
     else:
@@ -95,7 +99,12 @@ def run(
 
 
 @app.command("steady")
-def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+def steady_command(
+    case: CaseArgument,
+    settings: SetOption = [],  # noqa: B006
+    fresh: FreshOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
@@ -103,10 +112,10 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
 
     begin = time.perf_counter()
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="reduced")
+    system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    warnings = [*doubts(loaded), *steady_warnings(system, state)]
+    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
@@ -121,14 +130,14 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     _print_json(
         {
-            "x": system.pair.x.tolist(),
+            **_coordinates(system),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
             "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
             "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
             "growth_rate": rate,
-            "contact_width": state.contact_width.tolist(),
+            "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
             "cycles_to_1_percent": cycles,
@@ -137,6 +146,15 @@ def steady_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOp
             "warnings": warnings,
         }
     )
+
+
+def _coordinates(system: Tribosystem) -> dict[str, Any]:
+    """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
+    if system.case.model.kind == "plane":
+        return {"x": system.pair.x.tolist()}
+    x = system.pair.punch.x
+    names = ("r", "z") if x.shape[1] == 2 else ("x", "y", "z")
+    return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
 def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
@@ -205,16 +223,19 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import assemble
+    from fenwear.assembly import elastic, needs_of, place_case
     from fenwear.cycle import stability_number
     from fenwear.run import position_warnings
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
-    system = assemble(loaded, heat="none")
+    placed = place_case(loaded)
+    log(needs_of(placed).text())
+    system = elastic(placed)
     number = stability_number(system)
     system.check_touching()
-    for warning in [*position_warnings(system), *doubts(loaded), *initial_warnings(system)]:
+    warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
+    for warning in warnings:
         log(f"warning: {warning}")
     print(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
@@ -477,6 +498,7 @@ def info_command(
     as_json: JsonOption = False,
 ) -> None:
     """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
+    from fenwear.bodies import kept
     from fenwear.case.keys import find_keys
     from fenwear.versions import versions
 
@@ -488,10 +510,14 @@ def info_command(
             print("\n".join(k.text() for k in found))
         return
     if as_json:
-        _print_json({"versions": versions(), "cases": builtin_cases()})
+        _print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})
         return
     for name, version in versions().items():
         print(f"{name:14} {version}")
+    state = kept.summary()
+    print(
+        f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}"
+    )
     print("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
         print(f"  {name:26} {title}")

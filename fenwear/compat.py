@@ -59,3 +59,15 @@ def geometry_degree(mesh: Mesh) -> int:
     """Return the degree of the elements' shape; from 0.11 on there is one for each cell type."""
     maps = getattr(mesh.geometry, "cmaps", None)
     return int((mesh.geometry.cmap if maps is None else maps[0]).degree)
+
+
+def petsc_library() -> str | None:
+    """Return the path of PETSc's library; None where it is not found. From 0.10 on dolfinx.fem.petsc tells it."""
+    import dolfinx.fem.petsc
+    import dolfinx.utils
+
+    find = getattr(dolfinx.utils, "get_petsc_lib", None) or getattr(dolfinx.fem.petsc, "get_petsc_lib", None)
+    try:
+        return None if find is None else str(find())
+    except RuntimeError:  # not where PETSc's own configuration says
+        return None

@@ -22,7 +22,6 @@ from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
-from fenwear.report.page import try_report
 from fenwear.results import checkpoint
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -56,6 +55,7 @@ def run_case(
     progress: Progress = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
     last: bool = False,
+    fresh: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case and write its results; collective.
 
@@ -68,6 +68,7 @@ def run_case(
         progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
         last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Returns:
         The summary and the folder.
@@ -86,7 +87,7 @@ def run_case(
             )
         return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
     begin = time.perf_counter()
-    system = assemble(case, comm, heat=preparation_of(case))
+    system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
     if not resume:
         system.check_touching()
     setup = time.perf_counter() - begin
@@ -172,7 +173,7 @@ class _Run:
         if self.case.run.integration == "explicit":
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
-        self.warnings += [*position_warnings(system), *doubts(self.case)]
+        self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
@@ -346,6 +347,8 @@ class _Run:
         summary = summarise(self.system, self.last, self.extremes, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
+            from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
+
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
+os.environ["FENWEAR_KEPT_GIB"] = "0"  # each test computes what it checks
 
 import pytest
 from hypothesis import HealthCheck, settings

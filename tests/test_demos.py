@@ -24,6 +24,7 @@ NAMES = [
     "06_the_paper",
     "07_fretting",
     "08_measurement_to_life",
+    "09_solids",
 ]
 SECONDS = 1800  # ends what hangs, however busy the machine
 

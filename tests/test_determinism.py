@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
-from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,20 +24,29 @@ CASES = {
 }
 
 
-# run(name, ranks, number): the history of a run, each of them made once.
-MakeRun = Callable[[str, int, int], xarray.Dataset]
+# All cases one after the other, in one process: what starts anew is its hash seed, memory and ranks.
+ALL = """
+import json, sys
+from pathlib import Path
+from fenwear import load_case
+from fenwear.run import run_case
+
+for name, (case, *settings) in json.loads(sys.argv[2]).items():
+    run_case(load_case(case, settings), name, Path(sys.argv[1]) / name, lambda message: None, progress="none")
+"""
+Histories = dict[str, xarray.Dataset]
 
 
-@pytest.fixture(scope="module")
-def run(fenwear: Run, tmp_path_factory: pytest.TempPathFactory) -> MakeRun:
-    @cache
-    def run(name: str, ranks: int, number: int) -> xarray.Dataset:
-        folder, (case, *settings) = tmp_path_factory.mktemp("run") / "run", CASES[name]
-        words = [word for setting in (*SMALL, *settings, "output.fields_at=[]") for word in ("--set", setting)]
-        done = fenwear("run", case, "-o", folder, *words, ranks=ranks)
+@pytest.fixture
+def run(run_python: Run, tmp_path: Path) -> Callable[[int], Histories]:
+    """Return run(ranks): the history of every case, each time from a process of its own."""
+    cases = {name: [case, *SMALL, "output.fields_at=[]", *settings] for name, (case, *settings) in CASES.items()}
+
+    def run(ranks: int) -> Histories:
+        folder = tmp_path / f"{ranks} {len(list(tmp_path.iterdir()))}"
+        done = run_python("-m", "mpi4py", "-c", ALL, folder, json.dumps(cases), ranks=ranks)
         assert done.returncode == 0, done.stderr
-        with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
-            return history.load()
+        return {name: xarray.load_dataset(folder / name / "history.nc", engine="h5netcdf") for name in CASES}
 
     return run
 
@@ -46,27 +56,34 @@ def give_way(history: xarray.Dataset) -> float:
     return float((history.pressure[-1] * history.weight[-1]).sum()) / 2e5
 
 
-@pytest.mark.parametrize("ranks", [1, 3])
-@pytest.mark.parametrize("name", CASES)
-def test_the_same_bits_again(run: MakeRun, name: str, ranks: int) -> None:
+def check_same_bits(one: xarray.Dataset, again: xarray.Dataset) -> None:
     """Every variable of history.nc, bit by bit."""
-    one, again = (run(name, ranks, number) for number in (1, 2))
     assert set(one.variables) == set(again.variables)
     for variable in one.variables:
         assert one[variable].values.tobytes() == again[variable].values.tobytes(), variable
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_other_ranks_give_the_same_numbers(run: MakeRun, name: str) -> None:
-    """1, 2 and 3 ranks to 1e-9 of each largest value; gaps of what the bodies give way by, heats of friction."""
-    one, *others = (run(name, ranks, 1) for ranks in (1, 2, 3))
+def check_same_numbers(one: xarray.Dataset, other: xarray.Dataset) -> None:
+    """To 1e-9 of each largest value; gaps of what the bodies give way by, heats of friction."""
     measures = ("equilibrium_error", "heat_balance_error", "coupling_iterations")  # of rounding itself
-    for other in others:
-        np.testing.assert_array_equal(other.half_cycle, one.half_cycle)
-        if "coupling_iterations" in one:  # one more where a change is as large as the tolerance
-            assert abs(other.coupling_iterations - one.coupling_iterations).max() <= 1
-        for variable in sorted(set(one.data_vars) - set(measures)):
-            # The heat that a sinusoidal motion carries away is a sum of rounding, and so is a gap closed everywhere.
-            measure = "heat_friction" if str(variable).startswith("heat_") else str(variable)
-            scale = float(np.abs(one[measure]).max()) if variable != "gap" else give_way(one)
-            np.testing.assert_allclose(other[variable], one[variable], rtol=0, atol=1e-9 * scale, err_msg=str(variable))
+    np.testing.assert_array_equal(other.half_cycle, one.half_cycle)
+    if "coupling_iterations" in one:  # one more where a change is as large as the tolerance
+        assert abs(other.coupling_iterations - one.coupling_iterations).max() <= 1
+    for variable in sorted(set(one.data_vars) - set(measures)):
+        # The heat that a sinusoidal motion carries away is a sum of rounding, and so is a gap closed everywhere.
+        measure = "heat_friction" if str(variable).startswith("heat_") else str(variable)
+        scale = float(np.abs(one[measure]).max()) if variable != "gap" else give_way(one)
+        np.testing.assert_allclose(other[variable], one[variable], rtol=0, atol=1e-9 * scale, err_msg=str(variable))
+
+
+@pytest.mark.slow
+def test_the_same_again_and_on_other_ranks(run: Callable[[int], Histories]) -> None:
+    """Each case: the same bits twice on one rank and twice on three, and the same numbers on one, two and three."""
+    one, two, three = run(1), run(2), run(3)
+    for first in (one, three):
+        again = run(1 if first is one else 3)
+        for name in CASES:
+            check_same_bits(first[name], again[name])
+    for name in CASES:
+        for other in (two, three):
+            check_same_numbers(one[name], other[name])

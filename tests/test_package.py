@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+import re
+import shutil
+import sys
+import tomllib
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -37,6 +42,55 @@ def test_wheel_is_complete(wheel: Path) -> None:
     assert expected <= names
     assert any(name.endswith("licenses/LICENSE") for name in names)
     assert not {n for n in names if not n.startswith(("fenwear/", "fenwear-"))}
+
+
+def test_source_distribution_makes_the_same_wheel(wheel: Path, run_python: Run, tmp_path: Path) -> None:
+    """What is published as source holds all that the wheel is made of; the metadata of both are as PyPI wants them."""
+    done = run_python("-m", "hatchling", "build", "-t", "sdist", "-d", tmp_path, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    (source,) = tmp_path.glob("fenwear-*.tar.gz")
+    again = tmp_path / "again"
+    done = run_python("-m", "pip", "wheel", source, "--no-deps", "--no-build-isolation", "--no-index", "-w", again)
+    assert done.returncode == 0, done.stderr
+    (other,) = again.glob("*.whl")
+    contents = [{i.filename: i.CRC for i in zipfile.ZipFile(path).infolist()} for path in (wheel, other)]
+    assert contents[0] == contents[1]
+    if not shutil.which("twine"):
+        pytest.skip("twine is missing")
+    done = run_python("-m", "twine", "check", "--strict", wheel, source)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_dependencies_are_declared() -> None:
+    """Every library that a module imports, but for what comes with the compiled stack or with a declared one."""
+    comes_along = {
+        "basix",
+        "dolfinx",
+        "ffcx",
+        "gmsh",
+        "petsc4py",
+        "ufl",
+        "h5py",
+        "markupsafe",
+        "click",
+        "pydantic_core",
+    }
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    given = [*project["dependencies"], *project["optional-dependencies"]["life"]]
+    names = {re.split(r"[<>=]", name)[0].replace("-", "_").replace("pillow", "PIL") for name in given}
+    for path in (ROOT / "fenwear").rglob("*.py"):
+        nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
+        found = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+        found |= {str(node.module) for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+        libraries = {name.partition(".")[0] for name in found} - {"fenwear"} - sys.stdlib_module_names
+        assert libraries <= names | comes_along, path
+
+
+def test_one_version_everywhere() -> None:
+    """Package, citation and changelog name the same."""
+    citation, changes = ((ROOT / name).read_text("utf-8") for name in ("CITATION.cff", "CHANGELOG.md"))
+    assert re.search(r"^version: (.*)$", citation, re.MULTILINE)[1] == fenwear.__version__  # type: ignore[index]
+    assert re.search(r"^## (\S+)", changes, re.MULTILINE)[1] == fenwear.__version__  # type: ignore[index]
 
 
 def test_installed_wheel_works_elsewhere(wheel: Path, run_python: Run, tmp_path: Path) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from mpi4py import MPI
@@ -12,6 +13,7 @@ from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import BodyMesh, build_meshes
+from fenwear.bodies.regions import contact_regions
 from fenwear.bodies.shape import follow_wear
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
@@ -29,6 +31,7 @@ class Bodies:
         heat: Conduction in both; None without heat.
         followed: Worn depths that the meshes follow; None where they are as they were made.
         moved: How far the contact nodes have moved for it.
+        regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
         densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
     """
 
@@ -37,6 +40,7 @@ class Bodies:
     heat: tuple[HeatBody, HeatBody] | None = None
     followed: Worn | None = None
     moved: Worn | None = None
+    regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     densities: tuple[Array | None, Array | None] = (None, None)
 
     @property
@@ -47,7 +51,17 @@ class Bodies:
     @property
     def unknowns(self) -> int:
         """Number of degrees of freedom of both displacements."""
-        return self.punch.stiffness.size[0] + self.strip.stiffness.size[0]
+        return self.punch.size + self.strip.size
+
+    @property
+    def last_resorts(self) -> list[str]:
+        """What is to be said of elements that had better be others."""
+        return [
+            f"geometry.degree: the {body.body.name} is of tetrahedra of degree 1, a last resort: they are too stiff, "
+            "and pressures of a small contact are wrong by a sixth; expected degree 2, or hexahedra"
+            for body in (self.punch, self.strip)
+            if body.surface.cell == "triangle" and body.surface.degree == 1
+        ]
 
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""
@@ -74,11 +88,13 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
     punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
+    regions = contact_regions(punch), contact_regions(strip)
     of_punch, of_strip = (
-        contact_density(body, {region: case.materials[name].density for region, name in description.regions.items()})
-        for body, description in ((punch, case.punch), (strip, case.strip))
+        contact_density(shares, {region: case.materials[name].density for region, name in description.regions.items()})
+        for shares, description in zip(regions, (case.punch, case.strip), strict=True)
     )
-    return Bodies(punch, strip, build_conduction(case, punch, strip), followed, moved, (of_punch, of_strip))
+    heat = build_conduction(case, punch, strip)
+    return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip))
 
 
 def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:

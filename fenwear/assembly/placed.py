@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.bodies.shape import element_height
-from fenwear.case import Case, Heat, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.case import Case, Dependence, Heat, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, InputError
 from fenwear.interface import (
     ContactPair,
@@ -96,10 +96,17 @@ def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Clock:
-    """When a motion began that is one of several: after how many half-cycles, and at what time, s."""
+    """When a motion began that is one of several.
+
+    Attributes:
+        half_cycles: Before it.
+        time: s.
+        slid: How far the motions before it went, mm or rad.
+    """
 
     half_cycles: int = 0
     time: float = 0.0
+    slid: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -215,8 +222,18 @@ class Placed:
         return self.strip_wears and self.sliding.to_and_fro
 
     @property
+    def passing_laws(self) -> list[str]:
+        """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
+        laws = zip(("punch", "strip"), self.sliding.wear, strict=True)
+        given: dict[str, object] = {
+            f"wear.{body}.coefficient": law.coefficient for body, law in laws if law is not None
+        }
+        given["contact.friction"] = self.friction.contact.friction
+        return [key for key, value in given.items() if isinstance(value, Dependence) and value.passes]
+
+    @property
     def constant_coefficients(self) -> bool:
-        """Whether friction and wear are the same at any temperature, pressure and speed."""
+        """Whether friction and wear are the same at any temperature, pressure and speed, depth and distance."""
         return self.friction.constant and self.wear.constant
 
     @cached_property
@@ -254,8 +271,34 @@ class Placed:
         """Height of the elements at the contact nodes of both bodies, mm."""
         return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
+    @cached_property
+    def _places(self) -> tuple[tuple[Array, Array], ...]:
+        """Where the nodes are on the punch and on the strip's material in each phase, and in the middle at last."""
+        found = []
+        for facing in (*self.pairs, self.pair):
+            x = facing.punch.x
+            found.append((in_space(x), in_space(facing.placement.points_back(x))))
+        return tuple(found)
+
+    @cached_property
+    def _regions(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """Shares of the regions of punch and strip at the contact nodes (n,); none where there is one region alone."""
+        punch, strip = self.bodies.regions
+        onto = self.pair.material
+        return punch, {name: onto @ share for name, share in strip.items()}
+
+    def slid_after(self, half_cycles: float) -> float:
+        """Return how far the motion has gone after half-cycles from the start of the run, mm or rad."""
+        strokes, each = self.motion.half_cycles, sum(phase.distance for phase in self.motion.phases)
+        return self.clock.slid + (half_cycles - self.clock.half_cycles) / strokes * each
+
     def conditions(
-        self, phase: int | None, pressure: Array | None = None, temperatures: tuple[Array, Array] | None = None
+        self,
+        phase: int | None,
+        pressure: Array | None = None,
+        temperatures: tuple[Array, Array] | None = None,
+        worn: Worn | None = None,
+        half_cycles: float | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
@@ -263,6 +306,8 @@ class Placed:
             phase: Its number; None for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
+            worn: Depths; by default none.
+            half_cycles: Done since the start of the run; by default those before its motion.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
@@ -270,10 +315,16 @@ class Placed:
             speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
         else:
             speed = self.motion.phases[phase].speed * self.slid[phase]
+        pair, slid = (self.pair, self.slid[0]) if phase is None else (self.pairs[phase], self.slid[phase])
+        none = np.zeros(n)
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
             speed,
             (initial, initial) if temperatures is None else temperatures,
+            self._places[-1 if phase is None else phase],
+            (none, none) if worn is None else (worn.punch, pair.material @ worn.strip),
+            slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
+            self._regions,
         )
 
     def friction_ratio(self, direction: int) -> Array:

@@ -12,8 +12,10 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.needs import Needs, check_memory, needs
 from fenwear.assembly.placed import Placed
-from fenwear.bodies.condensation import CondensedBody, condense, respond_to_load
+from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
+from fenwear.bodies.response import Request
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
 from fenwear.contact.full import FullContact
 from fenwear.errors import CaseError, InputError
@@ -107,13 +109,29 @@ class Tribosystem(Placed):
         )
 
 
-def elastic(placed: Placed) -> Tribosystem:
-    """Condense both bodies and join them in every phase: factors both stiffnesses; collective."""
-    condensed = condense_bodies(placed)
+def needs_of(placed: Placed) -> Needs:
+    """Return what the set-up of placed bodies will take; collective."""
+    return needs(placed, _frame(placed))
+
+
+def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
+    """Condense both bodies and join them in every phase; collective.
+
+    Factors both stiffnesses, unless the bodies are kept on disk.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
+
+    Raises:
+        CaseError: there is not memory enough.
+    """
+    check_memory(placed, needs_of(placed))
+    condensed = condense_bodies(placed, fresh=fresh)
     return joined(placed, condensed)
 
 
-def condense_bodies(placed: Placed) -> Condensed:
+def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
     """Condense both bodies onto what the phases of the motion ask for; collective."""
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
@@ -124,13 +142,18 @@ def condense_bodies(placed: Placed) -> Condensed:
         ]
     # In one frame, forces and displacements along its normals are all that is ever asked for.
     moves, fixed, flat = _frame(placed)
-    punch = condense(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
-    if not moves:
-        onto_contact = csr_array(middle.transfer.T)
-        return Condensed(punch, condense(bodies.strip, onto_contact, middle.normal_on_strip, couplings[1]), moves)
-    trace = middle.strip.trace
-    along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
-    return Condensed(punch, condense(bodies.strip, _identity(len(trace)), along, couplings[1]), moves)
+    onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
+    if moves:
+        trace = middle.strip.trace
+        along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
+        onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1])
+    else:
+        onto_strip = Request(bodies.strip, csr_array(middle.transfer.T), middle.normal_on_strip, couplings[1])
+    punch, strip = condense_together([onto_punch, onto_strip], keep=True, fresh=fresh)
+    for coupling in couplings:
+        if coupling is not None:
+            coupling.destroy()
+    return Condensed(punch, strip, moves)
 
 
 def _identity(size: int) -> csr_array:

@@ -26,7 +26,12 @@ from fenwear.sliding.wear import Worn
 
 
 def assemble(
-    case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None, *, heat: Preparation = "as set"
+    case: Case,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    followed: Worn | None = None,
+    *,
+    heat: Preparation = "as set",
+    fresh: bool = False,
 ) -> Tribosystem:
     """Return the system of a case: all steps; collective.
 
@@ -36,12 +41,13 @@ def assemble(
         followed: Worn depths that the meshes follow; by default they are as they were made.
         heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    system = elastic(place_case(case, comm, followed))
+    system = elastic(place_case(case, comm, followed), fresh=fresh)
     if heat == "none":
         return system
     return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)

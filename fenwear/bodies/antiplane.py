@@ -20,7 +20,7 @@ from petsc4py import PETSc
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled
 from fenwear.bodies.elasticity import PREFIX, ElasticBody
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import factored
 from fenwear.bodies.material import measure
 from fenwear.case import Kind
 
@@ -69,7 +69,7 @@ def shear_out_of_plane(elastic: ElasticBody, blocks: NDArray[np.int64], force: A
     load = given.x.array[2 * to_node[:owned]]
     load[supports[supports < owned]] = 0.0
 
-    factor = Factor(matrix, PREFIX, "cholesky")
+    factor = factored(matrix, PREFIX, "cholesky", comm=mesh.comm, dim=elastic.dim)
     solution.x.array[:owned] = factor.solve(load)
     factor.free()
     matrix.destroy()

@@ -10,6 +10,7 @@ Where the contact frame changes from place to place every pattern is solved for 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +18,10 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
+from fenwear.bodies import kept
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.parallel import total
-
-BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
+from fenwear.bodies.factor import make_together, solve_together
+from fenwear.bodies.response import Request, respond_together
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,11 @@ class CondensedBody:
     response: Array
     by_load: Array
     by_temperature: Array | None = None
+
+    def arrays(self) -> dict[str, Array]:
+        """Return what was solved for, by its name."""
+        found = {"response": self.response, "by_load": self.by_load}
+        return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
 
     def normal_response(self, normal: Array, reading: csr_array | None = None) -> Array:
         """Return the displacement along e_n at each contact node from unit forces along the axes at each (n, n, d).
@@ -75,9 +81,7 @@ def condense(
     directions: Array | None = None,
     thermal_coupling: PETSc.Mat | None = None,
 ) -> CondensedBody:
-    """Condense a body onto patterns of force: one solve for each and direction with one factorisation; collective.
-
-    With the coupling G of thermal expansion the same solves give B^T K^-1 G, as K is symmetric.
+    """Condense a body onto patterns of force; collective.
 
     Args:
         elastic: The body.
@@ -88,31 +92,59 @@ def condense(
     Raises:
         ValueError: a thermal coupling with all axes.
     """
-    if thermal_coupling is not None and directions is None:
+    return condense_together([Request(elastic, patterns, directions, thermal_coupling)])[0]
+
+
+def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh: bool = False) -> list[CondensedBody]:
+    """Condense bodies onto patterns of force, each on a rank of its own at once; collective.
+
+    One elimination gives the Schur complement of the surface, or one factor a solution for each pattern
+    and direction. With the coupling G of thermal expansion the solutions give B^T K^-1 G, as K is symmetric.
+
+    Args:
+        requests: Of the bodies, with their patterns.
+        keep: Whether the results are kept on disk, and taken from there where they are.
+        fresh: Compute them whatever is kept.
+
+    Raises:
+        CaseError: the limit of what is kept is no number.
+        ConvergenceError: a stiffness has no factor.
+        ValueError: a thermal coupling with all axes.
+    """
+    if any(one.thermal_coupling is not None and one.directions is None for one in requests):
         raise ValueError("the response to temperature needs one direction for each pattern")
-    q, d = patterns.shape[1], elastic.dim
-    along = np.broadcast_to(np.eye(d), (q, d, d)) if directions is None else directions[:, :, None]
-    count = along.shape[2]
-    response = np.empty((q, d, q * count))
-    rows: list[Array] = []
-    weighted = patterns.T.tocsr()
-    # The forces of column l a: pattern l along its direction a.
-    for start in range(0, q * count, BLOCK):
-        columns = np.arange(start, min(start + BLOCK, q * count))
-        forces = np.einsum(
-            "Nk,kd->Ndk", patterns[:, columns // count].toarray(), along[columns // count, :, columns % count]
-        )
-        displacement, by_temperature = _solve(elastic, forces, thermal_coupling)
-        if by_temperature is not None:
-            rows.append(by_temperature)
-        response[:, :, columns] = (weighted @ displacement.reshape(len(forces), -1)).reshape(q, d, -1)
-    return CondensedBody(
-        patterns,
-        along,
-        _symmetric(response.reshape(q, d, q, count), along),
-        respond_to_load(elastic, patterns),
-        np.concatenate(rows) if rows else None,
-    )
+    comm = requests[0].elastic.body.mesh.comm
+    if not keep or comm.bcast(kept.limit()) == 0:
+        return _condensed(requests)
+    keys = [kept.common_key(comm, [kept.surroundings(), *one.identity()]) for one in requests]
+    stored = [None if fresh else kept.load(comm, key) for key in keys]
+    computed = iter(_condensed([one for one, found in zip(requests, stored, strict=True) if found is None]))
+    condensed = []
+    for one, key, found in zip(requests, keys, stored, strict=True):
+        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found)
+        if found is None:
+            kept.save(comm, key, body.arrays())
+        condensed.append(body)
+    return condensed
+
+
+def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
+    """Factor and solve; collective."""
+    if not requests:
+        return []
+    factors = [
+        one.elastic.begin_factor(number, with_surface=one.by_surface) for number, one in enumerate(reversed(requests))
+    ][::-1]  # the first rank gets the last one
+    make_together(factors)
+    found = respond_together(requests)
+    loads = solve_together(factors, [one.elastic.load for one in requests])
+    condensed = []
+    for one, (response, by_temperature), load in zip(requests, found, loads, strict=True):
+        q, d, along = one.patterns.shape[1], one.elastic.dim, one.along
+        whole = _symmetric(response.reshape(q, d, q, -1), along)
+        by_load = one.patterns.T @ one.elastic.trace.pick(load[:, None])[:, :, 0]
+        condensed.append(CondensedBody(one.patterns, along, whole, by_load, by_temperature))
+    return condensed
 
 
 def _symmetric(response: Array, along: Array) -> Array:
@@ -126,19 +158,3 @@ def _symmetric(response: Array, along: Array) -> Array:
 def respond_to_load(elastic: ElasticBody, patterns: csr_array) -> Array:
     """Return the displacement at each pattern under the body's loads (q, d), mm; collective."""
     return patterns.T @ elastic.trace.pick(elastic.factor.solve(elastic.load)[:, None])[:, :, 0]
-
-
-def _solve(elastic: ElasticBody, forces: Array, thermal_coupling: PETSc.Mat | None) -> tuple[Array, Array | None]:
-    """Return the trace's displacements (N, d, k) from forces on it (N, d, k), and G^T of the whole; collective."""
-    right = elastic.trace.place(forces)
-    right[elastic.supported] = 0.0
-    found = elastic.factor.solve(right)
-    return elastic.trace.pick(found), None if thermal_coupling is None else _transposed_times(thermal_coupling, found)
-
-
-def _transposed_times(matrix: PETSc.Mat, fields: Array) -> Array:
-    """Return the transpose of matrix^T fields (k, owned columns), added up in the order of the ranks; collective."""
-    starts, columns, values = matrix.getValuesCSR()
-    part = csr_array((values, columns, starts), shape=(len(fields), matrix.getSize()[1])).T @ fields
-    first, last = matrix.getOwnershipRangeColumn()
-    return np.ascontiguousarray(total(matrix.comm.tompi4py(), part)[first:last].T)

@@ -20,7 +20,7 @@ from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector
 from fenwear.bodies.contact_surface import contact_surface
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
 from fenwear.case import Body, Kind, Load, Support
@@ -56,7 +56,6 @@ class ElasticBody:
 
     Attributes:
         space: Vector Lagrange space on Gauss-Lobatto nodes, mm.
-        stiffness: K with all supports eliminated, per thickness, MPa.
         supported: The owned degrees of freedom that are held at zero.
         load: f of this rank's own degrees of freedom (owned,), per thickness, N/mm, zero where supported.
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
@@ -91,16 +90,14 @@ class ElasticBody:
 
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         a = ufl.inner(law.stress(u), strain_of(v, law.kind)) * measure(mesh, law.kind) * ufl.dx
-        bcs = supports + self._regularise()
-        self.supported = self._owned_dofs(bcs)
+        self._bcs = supports + self._regularise()
+        self.supported = self._owned_dofs(self._bcs)
         self._set_loads(description.loads)
         try:
-            form = fem.form(a)
+            self._ufl, self._form = a, fem.form(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
-        self.stiffness = assembled(form, bcs)
-        self.stiffness.setOption(PETSc.Mat.Option.SPD, True)
-        self._factor: Factor | None = None
+        self._factors: list[Factor] = []  # none or one, of all bodies that differ by their loads
 
     def _set_loads(self, loads: Sequence[Load]) -> None:
         load = self._assemble_load(loads)
@@ -123,11 +120,57 @@ class ElasticBody:
         return self.trace.pick(np.array(self.rigid_modes).T)
 
     @property
+    def size(self) -> int:
+        """Number of degrees of freedom on all ranks."""
+        return int(self.dim * self.space.dofmap.index_map.size_global)
+
+    @cached_property
+    def stiffness(self) -> PETSc.Mat:
+        """K with all supports eliminated, per thickness, MPa; collective at first use."""
+        matrix = assembled(self._form, self._bcs)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        return matrix
+
+    def identity(self) -> list[object]:
+        """Return all that this rank's part of K and f follows from: the form, its values, the mesh, the supports."""
+        mesh, form = self.body.mesh, self._ufl
+        values = [constant.value for constant in form.constants()]
+        values += [function.x.array for function in form.coefficients()]
+        nodes = [mesh.geometry.x, compat.geometry_dofmap(mesh), self.space.dofmap.list]
+        return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs]
+
+    @property
     def factor(self) -> Factor:
         """The Cholesky factor of K, made once; collective at first use."""
-        if self._factor is None:
-            self._factor = Factor(self.stiffness, PREFIX, "cholesky")
-        return self._factor
+        factor = self.begin_factor()
+        if not factor.is_made:
+            make_together([factor])
+        return factor
+
+    def begin_factor(self, owner: int = 0, *, with_surface: bool = False) -> Factor:
+        """Return the factor of K, made or yet to be made; collective at first use.
+
+        Args:
+            owner: The rank that gets it at first use.
+            with_surface: Whether it keeps the Schur complement of the surface's degrees of freedom.
+        """
+        if not self._factors:
+            kept = "stiffness" in self.__dict__
+            matrix = self.stiffness
+            surface = self.surface_dofs if with_surface else None
+            comm = self.body.mesh.comm
+            factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface)
+            self._factors.append(factor)
+            if not kept:  # all that needs it has it now
+                del self.stiffness
+                if factor.is_moved:
+                    matrix.destroy()
+        return self._factors[0]
+
+    @cached_property
+    def surface_dofs(self) -> NDArray[np.int64]:
+        """Global numbers of the degrees of freedom of the contact surface's trace nodes (N d,)."""
+        return np.asarray((self.dim * self.trace.blocks[:, None] + np.arange(self.dim)).ravel())
 
     def _supports(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
         key = f"{self.body.name}.supports"

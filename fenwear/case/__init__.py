@@ -1,5 +1,6 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
+from fenwear.case.dependence import register_law
 from fenwear.case.plausible import doubts
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
 from fenwear.case.schema import (
@@ -57,4 +58,5 @@ __all__ = [
     "doubts",
     "load_case",
     "make_case",
+    "register_law",
 ]

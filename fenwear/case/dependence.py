@@ -1,8 +1,9 @@
-"""Coefficients that depend on the state of the contact: expressions and tables of a case file.
+"""Coefficients that depend on the state of the contact: expressions and tables of a case file, laws from Python.
 
-An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa) and v (sliding
-speed, mm/s). It is parsed, checked node by node and then computed with numpy: no other name, call or
-operation than those below exists for it, so that a case file cannot run code.
+An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa), v (sliding speed, mm/s), the
+position x, y, z (mm), the worn depth (mm) and s, what has been slid (mm). It is parsed, checked node by node and then
+computed with numpy: no other name, call or operation than those below exists for it, so that a case file cannot run
+code. Laws are functions that a program in Python has registered; a case file alone cannot.
 """
 
 from __future__ import annotations
@@ -10,15 +11,17 @@ from __future__ import annotations
 import ast
 import operator
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.errors import CaseError, InputError
 
-VARIABLES = ("T", "p", "v")
+VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s")
+UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm"}
 LONGEST = 500  # characters of an expression
 DEEPEST = 30  # levels of its operations
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -39,10 +42,73 @@ OPERATIONS: Mapping[type[ast.AST], Callable[..., Any]] = {
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-KNOWN = f"numbers, T, p, v, + - * / **, {', '.join(FUNCTIONS)}"
+KNOWN = f"numbers, {', '.join(VARIABLES)}, + - * / **, {', '.join(FUNCTIONS)}"
 
 State = Mapping[str, Array]
 Function = Callable[[State], Any]
+_LAWS: dict[str, tuple[Function, frozenset[str]]] = {}  # by their names, with their variables: those of this process
+
+
+def register_law(name: str, function: Function, of: Sequence[str] = ("T", "p", "v")) -> None:
+    """Make a law of one's own known by its name, as `law = "name"` in a case made in Python.
+
+    It is called with the values of its variables at the contact nodes (n,), by their names, and returns the
+    coefficient at each (n,), or one number. Derivatives are taken by differences, where any are needed.
+
+    Args:
+        name: A word; registered again, the new function takes its place.
+        function: Of the state.
+        of: Which of T, p, v, x, y, z, depth and s it depends on; with depth or s nothing ever repeats.
+
+    Raises:
+        CaseError: `name` is no word, or `function` cannot be called.
+    """
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise CaseError(InputError("law", f"expected a word as the name of a law, got {str(name)!r}"))
+    if not callable(function):
+        raise CaseError(InputError(f"law {name!r}", "expected a function of the state"))
+    unknown = [one for one in of if one not in VARIABLES]
+    if unknown or isinstance(of, str):
+        message = f"expected a list of some of {', '.join(VARIABLES)}, got {unknown[0] if unknown else of!r}"
+        raise CaseError(InputError(f"law {name!r}", message))
+    _LAWS[name] = function, frozenset(of)
+
+
+def variables_of_law(name: str) -> frozenset[str]:
+    """Return what a registered law depends on; nothing where there is none."""
+    return _LAWS[name][1] if name in _LAWS else frozenset()
+
+
+def check_law(name: str) -> None:
+    """Raise where no law of this name is registered.
+
+    Raises:
+        ValueError: says what is.
+    """
+    if name not in _LAWS:
+        known = f"known are {', '.join(sorted(_LAWS))}" if _LAWS else "there is none"
+        raise ValueError(
+            f"no law {name!r} is registered, {known}: laws of one's own are made known in Python, by "
+            "fenwear.register_law, and do not exist on the command line"
+        )
+
+
+def evaluate_law(name: str, state: State, shape: tuple[int, ...]) -> Array:
+    """Return the values (shape) of a registered law.
+
+    Raises:
+        ValueError: it fails, or gives what is no number for each node; says so.
+    """
+    check_law(name)
+    function, variables = _LAWS[name]
+    given = {key: np.array(np.broadcast_to(state[key], shape)) for key in variables}
+    try:
+        values = np.asarray(function(given), dtype=float)
+    except Exception as error:  # a user's own code may raise anything
+        raise ValueError(f"the law {name!r} fails: {error}") from error
+    if values.shape not in ((), shape):
+        raise ValueError(f"the law {name!r} gives {values.shape} values; expected one for each of {shape[0]} nodes")
+    return np.broadcast_to(values, shape).copy()
 
 
 @lru_cache(maxsize=100)
@@ -64,7 +130,7 @@ def parse_expression(text: str) -> Function:
 
 
 def variables_of(text: str) -> frozenset[str]:
-    """Return which of T, p and v a valid expression depends on."""
+    """Return which of the variables a valid expression depends on."""
     tree = ast.parse(text.strip(), mode="eval")
     return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id in VARIABLES)
 

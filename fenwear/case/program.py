@@ -43,6 +43,7 @@ class Stage:
         load: The normal force at its begin and end, N; None where it is not given.
         load_factor: All loads over those of the case, where `load` is None.
         time: At its begin, s.
+        slid: Before its begin, mm or rad.
         step: Number of the program's step.
     """
 
@@ -52,6 +53,7 @@ class Stage:
     load: tuple[float, float] | None
     load_factor: tuple[float, float]
     time: float
+    slid: float
     step: int
 
 
@@ -183,7 +185,7 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
     if program is None:
         return ()
     stages: list[Stage] = []
-    now, half_cycle, time = _Now(), 0, 0.0
+    now, half_cycle, time, slid = _Now(), 0, 0.0, 0.0
     for number, step in enumerate(program.steps):
         ramps = {key: _ends(getattr(step, key), now.values.get(key)) for key in (*MOTION, "ambient")}
         given = {key: ends for key, ends in ramps.items() if ends is not None}
@@ -195,7 +197,7 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
         for low, high in itertools.pairwise(edges):
             at = _at(case, given, (low + high) / 2 / cycles)
             part = (low / cycles, high / cycles)
-            period = cycle_of(at)[0]
+            period, distance, _ = cycle_of(at)
             stages.append(
                 Stage(
                     half_cycle + strokes * low,
@@ -204,10 +206,12 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
                     None if loads is None else _between(loads, part),
                     _between(factors, part),
                     time,
+                    slid,
                     number,
                 )
             )
             time += (high - low) * period
+            slid += (high - low) * distance
         half_cycle += strokes * cycles
         last = {key: ends[1] for key, ends in given.items()}
         now = _Now(None if loads is None else loads[1], factors[1], last)

@@ -27,7 +27,16 @@ from pydantic import (
 )
 
 from fenwear.arrays import Array
-from fenwear.case.dependence import evaluate, parse_expression, variables_of
+from fenwear.case.dependence import (
+    UNITS,
+    VARIABLES,
+    check_law,
+    evaluate,
+    evaluate_law,
+    parse_expression,
+    variables_of,
+    variables_of_law,
+)
 from fenwear.case.units import convert, quantity_text, shown
 from fenwear.errors import CaseError, InputError
 
@@ -239,19 +248,31 @@ class Body(_Part):
 
 
 class Dependence(_Part):
-    """A coefficient that depends on T (K), p (MPa) or v (mm/s): an expression, or a table with straight lines."""
+    """A coefficient that depends on the state: an expression, a table with straight lines, values of regions, a law."""
 
-    expression: str | None = Field(default=None, description="arithmetic on T (K), p (MPa) and v (mm/s)")
+    expression: str | None = Field(
+        default=None,
+        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn) and s (mm, slid)",
+    )
     table: tuple[tuple[Number, Number], ...] | None = Field(
         default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
-    of: Literal["T", "p", "v"] = Field(default="T", description="argument of the table")
+    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s"] = Field(default="T", description="argument of the table")
+    regions: dict[str, Annotated[Number, Field(ge=0)]] | None = Field(
+        default=None, description="value of each material region of the body, of the punch for friction"
+    )
+    law: str | None = Field(default=None, description="name of a law registered in Python")
     unit: str = Field(default="", description="unit of the values")
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
-        if (self.expression is None) == (self.table is None):
-            raise ValueError("give either expression or table")
+        if sum(form is not None for form in (self.expression, self.table, self.regions, self.law)) != 1:
+            raise ValueError("give one of expression, table, regions and law")
+        if self.law is not None:
+            try:
+                check_law(self.law)
+            except ValueError as error:
+                raise ValueError(f"law: {error}") from None
         if self.expression is not None:
             try:
                 parse_expression(self.expression)
@@ -264,24 +285,46 @@ class Dependence(_Part):
         return self
 
     def depends_on(self, name: str) -> bool:
-        """Return whether T, p or v is in it."""
-        return name == self.of if self.table is not None else name in variables_of(self.expression or "")
+        """Return whether a variable such as T, p or depth is in it."""
+        if self.expression is not None:
+            return name in variables_of(self.expression)
+        if self.law is not None:
+            return name in variables_of_law(self.law)
+        return self.table is not None and name == self.of
+
+    @property
+    def varies(self) -> bool:
+        """Whether it changes with more than the place."""
+        return any(self.depends_on(name) for name in ("T", "p", "v", "depth", "s"))
+
+    @property
+    def passes(self) -> bool:
+        """Whether it changes as long as a run goes on: with the worn depth, or with what has been slid."""
+        return self.depends_on("depth") or self.depends_on("s")
 
     def values(self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str) -> Array:
-        """Return the coefficient times `factor` at T, p, v of the `state` (shape).
+        """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
 
         Raises:
             CaseError: it is negative or not finite somewhere; `key` is the case's key.
         """
         if self.table is not None:
             values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
+        elif self.regions is not None:
+            values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
+        elif self.law is not None:
+            try:
+                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES}, shape)
+            except ValueError as error:
+                raise CaseError(InputError(key, str(error))) from error
         else:
             values = evaluate(parse_expression(self.expression or ""), state, shape)
         wrong = ~(np.isfinite(values) & (values >= 0))
         if wrong.any():
             node = int(np.flatnonzero(wrong)[0])
-            at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g}" for name in ("T", "p", "v"))
-            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at} (K, MPa, mm/s)"))
+            named = [name for name in VARIABLES if name in ("T", "p", "v") or self.depends_on(name)]
+            at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
+            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at}"))
         return values * factor
 
 
@@ -377,6 +420,12 @@ class WearLaw(_Part):
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )
     pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
+    pressure_threshold: Annotated[Stress, Field(ge=0)] = Field(
+        default=0.0, description="p_0: nothing wears below it, and above it (p - p_0)^b does"
+    )
+    pressure_cap: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None, description="such as the hardness: more pressure than it wears no more"
+    )
     speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
 
     @staticmethod
@@ -416,6 +465,8 @@ class WearLaw(_Part):
             value = getattr(self, key)
             if isinstance(value, float) and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{key}: expected a finite number, zero or larger")
+        if self.pressure_cap is not None and self.pressure_cap <= self.pressure_threshold:
+            raise ValueError("pressure_cap: expected more than pressure_threshold")
         if (self.archard is None) != (self.hardness is None):
             raise ValueError("hardness: expected together with archard, and only then")
         if (self.archard, self.energy) != (None, None) and (self.pressure_exponent, self.speed_exponent) != (1.0, 1.0):
@@ -896,12 +947,29 @@ class Case(_Part):
             problems += [
                 f"{key}: depends on the temperature T, which a case without the table heat does not know"
                 for key, value in given.items()
-                if isinstance(value, Dependence) and value.depends_on("T")
+                if isinstance(value, Dependence) and value.law is None and value.depends_on("T")
             ]
+        problems += self._region_problems()
         friction = self.contact.friction
         for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
             if law is not None and law.coefficient is None and law.archard is None and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
+        return problems
+
+    def _region_problems(self) -> list[str]:
+        """Return what is wrong with coefficients that are given by regions."""
+        given = {"contact.friction": (self.contact.friction, self.punch)}
+        for name, law, body in (("punch", self.wear.punch, self.punch), ("strip", self.wear.strip, self.strip)):
+            given[f"wear.{name}.coefficient"] = (None if law is None else law.coefficient, body)
+        problems = []
+        for key, (value, body) in given.items():
+            if not isinstance(value, Dependence) or value.regions is None:
+                continue
+            known = ", ".join(body.regions)
+            problems += [
+                f"{key}.regions.{r}: no such region; known are {known}" for r in value.regions.keys() - body.regions
+            ]
+            problems += [f"{key}.regions.{r}: missing, but required" for r in body.regions.keys() - value.regions]
         return problems
 
     def _program_problems(self) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.heat.periodic import CycleHeat, CycleJump
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import Worn
 
+FLAT = 1e-9  # mm: depths below it count as none
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
     'set heat.conducting = "nominal", or take weaker dependences: contact and what depends on it, the nodes that '
@@ -32,6 +35,64 @@ def cycle_heat(system: Tribosystem) -> CycleHeat | None:
     """Return the heat of whole cycles; None without heat."""
     exchange = with_reduced_heat(system).exchange
     return None if exchange is None else CycleHeat(exchange)
+
+
+@dataclass(frozen=True)
+class Passing:
+    """How the worn depths of an implicit step follow from its pressures.
+
+    Attributes:
+        before: Depths that it begins with.
+        cycles: Its length.
+        wear: What a cycle wears at pressures (m, n), at the coefficients last taken.
+        half_cycles: Done since the start of the run, at its end.
+    """
+
+    before: Worn
+    cycles: float
+    wear: Callable[[Array], Worn]
+    half_cycles: float
+
+    def depths(self, pressure: Array) -> list[Array]:
+        """Return the depths of punch and strip at its end, at these pressures."""
+        worn = self.before + self.wear(pressure).times(self.cycles)
+        return [worn.punch, worn.strip]
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """Pressures, and where coefficients depend on them temperatures and depths, in one vector.
+
+    Attributes:
+        units: Of each kind, which make them of one size: that is what their combination looks at.
+        cuts: Where the kinds begin.
+    """
+
+    units: Sequence[float]
+    cuts: NDArray[np.int64]
+
+    @classmethod
+    def like(cls, parts: Sequence[Array], scale: float, *, warm: bool) -> _Unknowns:
+        """Return the layout of these parts, the pressures first, and temperatures next where it is warm."""
+        least = [1.0, *([1.0] if warm else []), FLAT, FLAT]
+        units = [scale / max(float(np.abs(part).max()), low) for part, low in zip(parts, least, strict=False)]
+        return cls([1.0, *units[1:]], np.cumsum([part.size for part in parts])[:-1])
+
+    def joined(self, parts: Sequence[Array]) -> Array:
+        """Return the vector."""
+        return np.concatenate([part * unit for part, unit in zip(parts, self.units, strict=True)])
+
+    def parted(self, x: Array) -> list[NDArray[Any]]:
+        """Return the parts of a vector."""
+        return [part / unit for part, unit in zip(np.split(x, self.cuts), self.units, strict=True)]
+
+    def close(self, change: Array, x: Array) -> bool:
+        """Return whether pressures, and the temperatures and depths behind them, change by rounding only."""
+        return all(
+            float(np.abs(part).max()) <= CLOSE * max(float(np.abs(whole).max()), 1e-300)
+            for part, whole in zip(np.split(change, self.cuts), np.split(x, self.cuts), strict=True)
+            if part.size
+        )
 
 
 class Coupled:
@@ -54,55 +115,68 @@ class Coupled:
             self.heat = CycleHeat(self.heat.exchange.with_friction(self.mu))
 
     def solve(
-        self, temperature: Array | None, cycles: float, start: ContactState, solve: SolveContact
+        self,
+        temperature: Array | None,
+        cycles: float,
+        start: ContactState,
+        solve: SolveContact,
+        passing: Passing | None = None,
     ) -> tuple[ContactState, Array | None]:
         """Return contact, and temperature (dim,) at the start of its cycle, `cycles` cycles on in one implicit step.
 
         The unknowns are the pressures, and where coefficients depend on them the temperatures at the start of each
-        phase. Without such coefficients the solution is exact once the same nodes conduct.
+        phase and the worn depths. Without such coefficients the solution is exact once the same nodes conduct.
 
         Args:
             temperature: Before (dim,); None without heat.
             cycles: How many; infinitely many give the periodic temperature.
             start: Where contact starts from.
             solve: Contact at the friction and wear last taken.
+            passing: How depths follow from the pressures, where coefficients depend on depth or distance.
 
         Raises:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
         system, heat, constant = self.system, self.heat, self.system.constant_coefficients
-        shape, size, contact = start.pressure.shape, start.pressure.size, start
-        first: Array = start.pressure.ravel()
-        unit = 1.0
+        shape, contact = start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
-        if heat is not None and temperature is not None and not constant:
-            now = self.surfaces(temperature, start.pressure)
-            # Both kinds of unknown of one size, which is what their combination looks at.
-            unit = pressure_scale(system, start.pressure) / max(float(np.abs(now).max()), 1.0)
-            first = np.concatenate([first, unit * now.ravel()])
+        warm = heat is not None and temperature is not None and not constant
+        parts: list[Array] = [start.pressure.ravel()]
+        if temperature is not None and warm:
+            parts.append(self.surfaces(temperature, start.pressure).ravel())
+        if passing is not None:
+            # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
+            parts += [passing.before.punch, passing.before.strip]
+        unknowns = _Unknowns.like(parts, pressure_scale(system, start.pressure), warm=warm)
 
         def advance(x: Array) -> tuple[Array, tuple[ContactState, Array | None], bool]:
             nonlocal contact, known
-            pressure = x[:size].reshape(shape)
+            now = unknowns.parted(x)
+            pressure = now[0].reshape(shape)
             if not constant:
-                self._update(pressure, x[size:].reshape(-1, 2, shape[1]) / unit)
+                surfaces = now[1] if warm else np.zeros(0)
+                worn = None if passing is None else Worn(now[-2], now[-1])
+                self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing)
+            found: list[Array] = []
             if heat is None or temperature is None:
                 contact = solve(None, None, contact)
-                return contact.pressure.ravel(), (contact, None), constant
-            conductances = heat.conductances(pressure)
-            key = conductances.tobytes()
-            if known is None or known[0] != key:
-                known = (key, heat.jump(temperature, cycles, conductances))
-            end = known[1]
-            contact = solve(end.gap, end.coupling * self.mu, contact)
-            state = end.state(self.mu * contact.pressure)
-            found: Array = contact.pressure.ravel()
-            same = np.array_equal(heat.conductances(contact.pressure), conductances, equal_nan=True)
-            if not constant:
-                found = np.concatenate([found, unit * self.surfaces(state, contact.pressure).ravel()])
-            return found, (contact, state), same and constant
+                state, same = None, True
+            else:
+                conductances = heat.conductances(pressure)
+                key = conductances.tobytes()
+                if known is None or known[0] != key:
+                    known = (key, heat.jump(temperature, cycles, conductances))
+                end = known[1]
+                contact = solve(end.gap, end.coupling * self.mu, contact)
+                state = end.state(self.mu * contact.pressure)
+                same = np.array_equal(heat.conductances(contact.pressure), conductances, equal_nan=True)
+                if warm:
+                    found.append(self.surfaces(state, contact.pressure).ravel())
+            if passing is not None:
+                found.extend(passing.depths(contact.pressure))
+            return unknowns.joined([contact.pressure.ravel(), *found]), (contact, state), same and constant
 
-        return fixed_point(advance, first, lambda change, x: _close(change, x, size), DISAGREE)
+        return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE)
 
     def at_friction(self) -> CycleHeat | None:
         """Return the heat of whole cycles at the friction last taken."""
@@ -128,22 +202,16 @@ class Coupled:
             states.append(after)
         return states
 
-    def _update(self, pressure: NDArray[Any], surfaces: NDArray[Any]) -> None:
-        """Take the coefficients at these pressures and, where there are any, temperatures of the phases."""
+    def _update(
+        self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: Worn | None, passing: Passing | None
+    ) -> None:
+        """Take the coefficients at these pressures and, where there are any, temperatures of the phases and depths."""
         system = self.system
+        done = None if passing is None else passing.half_cycles
         conditions = [
-            system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None)
+            system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None, worn, done)
             for k, p in enumerate(pressure)
         ]
         self._take(conditions)
         if not system.friction.constant:
             self.mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
-
-
-def _close(change: Array, x: Array, pressures: int) -> bool:
-    """Return whether pressures, and the temperatures behind them, change by rounding only."""
-    return all(
-        float(np.abs(part).max()) <= CLOSE * max(float(np.abs(whole).max()), 1e-300)
-        for part, whole in ((change[:pressures], x[:pressures]), (change[pressures:], x[pressures:]))
-        if part.size
-    )

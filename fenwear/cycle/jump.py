@@ -30,17 +30,16 @@ which are kept: of the depths, of the pressures and of the temperatures.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
-from scipy.stats import wasserstein_distance
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord
-from fenwear.cycle.coupled import Coupled
+from fenwear.cycle.coupled import Coupled, Passing
 from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, as_given, drive, unwatched
 from fenwear.cycle.state import RunState, beginning, joined, parted
 from fenwear.cycle.totals import PhaseMeter, Totals
@@ -172,6 +171,7 @@ class _Stepper:
         self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
         self.coupled = Coupled(system, self.take)
         self._heated: Array = np.zeros(0)  # by the last cycle
+        self._done = 0.0  # half-cycles at the end of the stage
         self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
 
     def beginning(self) -> RunState:
@@ -189,7 +189,12 @@ class _Stepper:
             whole = known[2] if known and known[0] is state and known[1] == cycles else self.step(state, cycles)
             half = self.step(state, cycles / 2)
             self._half = (state, cycles / 2, half)
-            return (halves := self.step(half, cycles / 2, cycles / 2)), _estimate(self.system, state, whole, halves)
+            halves = self.step(half, cycles / 2, cycles / 2)
+            estimate = _estimate(self.system, state, whole, halves)
+            if self.system.passing_laws:
+                missed = self._missed(state, half, halves, cycles)
+                estimate = replace(estimate, depth=max(estimate.depth, missed))
+            return halves, estimate
         except ConvergenceError as error:
             if cycles > 1:
                 raise
@@ -199,6 +204,35 @@ class _Stepper:
                 raise error from None
             self.system.remedies.note(SMALLER_STEPS.format(PARTS))
             return parts, Estimate(np.inf, np.inf, np.inf)
+
+    def _missed(self, state: RunState, half: RunState, halves: RunState, cycles: float) -> float:
+        """Return the error of what a jump wears where coefficients change with depth or distance, relative.
+
+        Its stages do not look at its begin: a coating that is worn through before the first of them would be missed.
+        Simpson's rule on the wear of a cycle at the begin, in the middle and at the end does, and is of higher order.
+        """
+        if any(contact is None for contact in state.contacts):
+            return 0.0
+        strokes = self.system.motion.half_cycles
+        begin, middle, end = (
+            self._rate(one, state.half_cycle + share * cycles * strokes)
+            for one, share in ((state, 0.0), (half, 0.5), (halves, 1.0))
+        )
+        simpson = (begin + middle.times(4.0) + end).times(cycles / 6)
+        worn = halves.worn - state.worn
+        wrong, all_worn = (_area(self.system, one) for one in (simpson - worn, worn))
+        return wrong / max(all_worn, 1e-300)
+
+    def _rate(self, state: RunState, half_cycles: float) -> Worn:
+        """Return what a cycle wears at the depths, temperatures and pressures of a state."""
+        system, surfaces = self.system, None
+        pressures = np.concatenate([_present(contact).pressure for contact in state.contacts])
+        if self.coupled.heat is not None and state.temperature is not None:
+            surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
+        conditions = [
+            system.conditions(k, pressure, surfaces, state.worn, half_cycles) for k, pressure in enumerate(pressures)
+        ]
+        return system.wear.phases(conditions).worn(pressures)
 
     def steps(self, state: RunState, cycles: float, count: int) -> RunState:
         """Return the state `cycles` cycles later, by that many equal steps."""
@@ -232,10 +266,20 @@ class _Stepper:
         worn, totals = worn + second.worn.times(share), totals + second.adds.times(share)
         return RunState(state.half_cycle, worn, parted(second.contact), end, totals)
 
+    def _passing(self, worn: Worn, cycles: float) -> Passing | None:
+        """Return how depths follow in a stage where coefficients depend on them."""
+        if not self.system.passing_laws:
+            return None
+        return Passing(worn, cycles, self._wear, self._done)
+
+    def _wear(self, pressure: Array) -> Worn:
+        return self.wear.worn(pressure)  # as last taken
+
     def _press(self, half_cycle: int, cycles: float) -> None:
-        """Take the loads so many cycles after a half-cycle."""
+        """Take the time and the loads so many cycles after a half-cycle."""
+        self._done = half_cycle + cycles * self.system.motion.half_cycles
         if self.loading is not as_given and isinstance(self.contact, CondensedContact):
-            self.contact.press(self.loading(half_cycle + cycles * self.system.motion.half_cycles))
+            self.contact.press(self.loading(self._done))
 
     def _stage(self, worn: Worn, temperature: Array | None, start: ContactState | None, cycles: float) -> _Stage:
         """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0."""
@@ -249,6 +293,7 @@ class _Stepper:
             lambda thermal, coupling, near: self._solve(
                 gap if thermal is None else gap + thermal, near, cycles, coupling
             ),
+            self._passing(worn, cycles),
         )
         heated: Array = np.zeros(0)
         if begin is not None:
@@ -332,9 +377,8 @@ class _Stepper:
 
 def _estimate(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:
     """Return the error of two half steps from their difference to the whole one, by Richardson."""
-    weights, strip = system.pair.weights, system.pair.strip.weights
     apart, step = whole.worn - halves.worn, halves.worn - before.worn
-    wrong, worn = (weights @ np.abs(w.punch) + strip @ np.abs(w.strip) for w in (apart, step))
+    wrong, worn = _area(system, apart), _area(system, step)
     pressure = max(
         _force_difference(system, _present(one).pressure[0], _present(other).pressure[0])
         for one, other in zip(whole.contacts, halves.contacts, strict=True)
@@ -345,6 +389,12 @@ def _estimate(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
     )
 
 
+def _area(system: Tribosystem, worn: Worn) -> float:
+    """Return the integral of the size of depths over both surfaces."""
+    pair = system.pair
+    return float(pair.weights @ np.abs(worn.punch) + pair.strip.weights @ np.abs(worn.strip))
+
+
 def _force_difference(system: Tribosystem, first: Array, second: Array) -> float:
     """Return how far the force of one pressure (n,) lies from that of another, over the extent of the contact.
 
@@ -352,6 +402,8 @@ def _force_difference(system: Tribosystem, first: Array, second: Array) -> float
     difference: a node at the edge closes as soon as the shape changes by what a node gives way, and a norm would be
     that of this node alone.
     """
+    from scipy.stats import wasserstein_distance  # half a second of imports, for jumps alone
+
     x, weights = system.pair.punch.x, system.pair.weights
     forces = [weights * first, weights * second]
     one, other = (float(force.sum()) for force in forces)

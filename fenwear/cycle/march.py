@@ -84,7 +84,8 @@ class _HalfCycles:
         for place, phase in enumerate(phases):
             if place:
                 self.watch()
-            end = self.steps[phase].solve(temperature, worn, state.contacts[phase], load)
+            done = state.half_cycle + (place + 0.5) / len(phases)
+            end = self.steps[phase].solve(temperature, worn, state.contacts[phase], load, done)
             worn, temperature = worn + end.worn, end.temperature
             ends.append(end)
         return ends

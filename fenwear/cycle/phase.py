@@ -59,7 +59,12 @@ class PhaseStep:
         self._meter = PhaseMeter(system, phase, self._mu, self._wear)
 
     def solve(
-        self, temperature: HeatState | None, worn: Worn, before: ContactState | None, load: float = 1.0
+        self,
+        temperature: HeatState | None,
+        worn: Worn,
+        before: ContactState | None,
+        load: float = 1.0,
+        half_cycles: float = 0.0,
     ) -> PhaseEnd:
         """Return the end of the phase.
 
@@ -68,6 +73,7 @@ class PhaseStep:
             worn: Depths at its start.
             before: The same phase one cycle ago.
             load: Factor of all loads.
+            half_cycles: Done since the start of the run, in its middle.
 
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
@@ -85,7 +91,7 @@ class PhaseStep:
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            wear = self._update(pressure, temperature)
+            wear = self._update(pressure, temperature, worn, half_cycles)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
             except ConvergenceError as error:
@@ -103,13 +109,15 @@ class PhaseStep:
         )
         return self._end(contact, after, heat, before, wear)
 
-    def _update(self, pressure: Array | None, temperature: HeatState | None) -> PhasesWear:
-        """Take friction and wear at this pressure and at the temperature at the start of the phase."""
+    def _update(
+        self, pressure: Array | None, temperature: HeatState | None, worn: Worn, half_cycles: float
+    ) -> PhasesWear:
+        """Take friction and wear at this pressure, and at temperature and depths at the start of the phase."""
         system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature)
-        conditions = system.conditions(self.phase, pressure, surfaces)
+        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles)
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
             mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = system.phase_friction(self.phase, mu)

@@ -81,7 +81,9 @@ def at_stage(system: Tribosystem, stage: Stage) -> Tribosystem:
         system: Of the case, on meshes as they are now.
         stage: Of its program.
     """
-    return replace(with_case(system, stage.case), made_from=system.case, clock=Clock(stage.begin, stage.time))
+    return replace(
+        with_case(system, stage.case), made_from=system.case, clock=Clock(stage.begin, stage.time, stage.slid)
+    )
 
 
 def loading_of(system: Tribosystem, stage: Stage) -> Loading:

@@ -59,10 +59,11 @@ class SmallerSteps:
         steps = self._prepared(parts)
         temperature, worn, ends = state.temperature, state.worn, []
         for phase in phases:
-            before = state.contacts[phase]
+            before, place = state.contacts[phase], phase - phases.start
             contact, own = before, []
-            for step in steps[phase * parts : (phase + 1) * parts]:
-                end = step.solve(temperature, worn, contact, load)
+            for part, step in enumerate(steps[phase * parts : (phase + 1) * parts]):
+                done = state.half_cycle + (place + (part + 0.5) / parts) / len(phases)
+                end = step.solve(temperature, worn, contact, load, done)
                 contact, temperature, worn = end.record.contact, end.temperature, worn + end.worn
                 own.append(end)
             ends.append(_joined(own, phase, before, temperature))

@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigs
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
 from fenwear.cycle.coupled import cycle_heat
-from fenwear.errors import CaseError, ConvergenceError
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
@@ -86,6 +86,10 @@ def growth_rate(system: Tribosystem, pressure: Array) -> float:
         CaseError: a coefficient is negative or not finite there.
         ConvergenceError: friction and the temperatures that it depends on do not come together.
     """
+    if system.passing_laws:
+        raise CaseError(
+            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
+        )
     heat, states = repeating_temperatures(system, pressure)
     n = pressure.shape[1]
     dim = 0 if heat is None else heat.gap_rows.shape[1]
@@ -197,13 +201,13 @@ class _Laws:
 
 def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None, state: HeatState | None) -> _Laws:
     n, conditions = len(pressure), system.conditions(phase, pressure)
-    speed, surfaces = conditions.speed, conditions.temperatures
+    surfaces = conditions.temperatures
     if heat is not None and state is not None:
         surfaces = heat.exchange.contact_temperatures(state)
     around = (pressure, *surfaces)
 
     def at(p: Array, punch: Array, strip: Array) -> ContactConditions:
-        return ContactConditions(p, speed, (punch, strip))
+        return replace(conditions, pressure=p, temperatures=(punch, strip))
 
     def friction(*values: Array) -> Array:
         return system.friction.values(at(*values))

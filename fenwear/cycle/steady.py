@@ -242,6 +242,16 @@ def _check_exists(system: Tribosystem) -> None:
             "for ever, most where every position touches it. Follow the wear by `run` with run.integration = "
             '"jump", or take wear.strip away'
         )
+    if system.passing_laws:
+        raise ConvergenceError(
+            f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
+            "slid, as long as it slides. Follow the wear by `run`"
+        )
+    if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
+        raise ConvergenceError(
+            "no cyclic steady state is solved for with a pressure_threshold: below it any pressure stays. Follow the "
+            "wear by `run`"
+        )
     first = system.interfaces[0].rigid.rigid_normal
     for own in system.interfaces[1:]:
         if np.abs(own.rigid.rigid_normal - first).max(initial=0.0) > 1e-9 * np.abs(first).max(initial=1.0):

@@ -32,7 +32,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector, destroy, times, transposed_times
 from fenwear.bodies.contact_surface import contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import Factor
+from fenwear.bodies.factor import Factor, factored
 from fenwear.bodies.material import measure
 from fenwear.case import Body, Heat, Kind
 from fenwear.errors import CaseError, InputError
@@ -406,7 +406,7 @@ class HeatStep:
         self.a, self.b = a, b
         self._is_held = np.zeros(body.owned, dtype=bool)
         self._is_held[body.held] = True
-        self._factor = Factor(a, PREFIX, "lu", repeated=duration < np.inf)
+        self._factor = self._factored(repeated=duration < np.inf)
         self._pivoted, self._solved = duration == np.inf, 0
 
     def advance(self, theta: Array, *, sources: bool = True) -> Array:
@@ -456,7 +456,11 @@ class HeatStep:
         squares = total(self.body.body.mesh.comm, np.array([np.vdot(residual, residual), np.vdot(rhs, rhs)]))
         return bool(squares[0] <= LARGEST_RESIDUAL**2 * squares[1])
 
+    def _factored(self, *, repeated: bool = False) -> Factor:
+        domain = self.body.body.mesh
+        return factored(self.a, PREFIX, "lu", comm=domain.comm, dim=domain.topology.dim, repeated=repeated)
+
     def _pivot(self) -> None:
         """Factor again, with pivoting; collective."""
         self._factor.free()
-        self._factor, self._pivoted = Factor(self.a, PREFIX, "lu"), True
+        self._factor, self._pivoted = self._factored(), True

@@ -54,6 +54,13 @@ class Placement:
         moved = self._rotation.apply(in_space(x) - self.centre) + self.centre + self.shift
         return in_model(moved, x.shape[1])
 
+    def points_back(self, x: Array) -> Array:
+        """Return what points (n, d) in space are in the body's own frame, mm."""
+        if self.turn == ZERO:
+            return x - in_model(np.array([self.shift]), x.shape[1])
+        moved = self._rotation.inv().apply(in_space(x) - self.centre - self.shift) + self.centre
+        return in_model(moved, x.shape[1])
+
     def vectors(self, v: Array) -> Array:
         """Return vectors (n, d) that turn with the body."""
         return v if self.turn == ZERO else in_model(self._rotation.apply(in_space(v)), v.shape[1])

@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
-from fenwear.case import Case
+from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import RunState, beginning, joined
@@ -109,6 +109,12 @@ class Model:
         if self.case.program is not None:
             message = "not followed here; expected a case of constant loads and motion, or `run`"
             raise CaseError(InputError("program", message))
+        laws = {"contact.friction": self.case.contact.friction}
+        for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
+            laws[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
+        for key, law in laws.items():
+            if isinstance(law, Dependence) and law.passes:
+                raise CaseError(InputError(key, "depends on the worn depth or the distance slid: not followed here"))
 
     def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:
         """Return the assembled problem with keys at these values; what does not change is shared.

@@ -13,6 +13,8 @@ from fenwear.report.course import directions_present, is_conforming, mean_pressu
 from fenwear.report.figures import FOLDER, read_history
 from fenwear.report.shapes import surfaces_of, worn_range
 from fenwear.report.style import BODY_COLOURS, DIRECTIONS, contact_axis, legend_beside, level_line, panels, save_gif
+from fenwear.report.surface import model_of
+from fenwear.report.surface_animation import SurfaceFrames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,31 +75,30 @@ class HistoryFrames:
             self._depths[body].set_data(x, 1e3 * depth.sel(half_cycle=slice(None, half_cycle)).values[-1])
         self._title.set_text(f"after half-cycle {half_cycle:,} of {int(self.history.half_cycle[-1]):,}")
 
-    def image(self) -> Any:
-        """Return the figure as a picture of few colours."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from PIL import Image
 
-        canvas: Any = FigureCanvasAgg(self.figure)
-        canvas.draw()
-        self.figure.set_layout_engine("none")  # arranged once: frames must not jiggle, and it is slow
-        return (
-            Image.fromarray(np.asarray(canvas.buffer_rgba()))
-            .convert("RGB")
-            .quantize(64, method=Image.Quantize.FASTOCTREE)
-        )
+def image_of(figure: Figure) -> Any:
+    """Return a figure as a picture of few colours."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from PIL import Image
+
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    figure.set_layout_engine("none")  # arranged once: frames must not jiggle, and it is slow
+    picture = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    return picture.quantize(64, method=Image.Quantize.FASTOCTREE)
 
 
 def draw_animation(directory: Path) -> Path:
     """Draw figures/history.gif of a run; return its path."""
     history = read_history(directory)
     half_cycles = frames_of(history)
-    frames = HistoryFrames(history, half_cycles)
+    plane = model_of(history) == "plane"
+    frames = HistoryFrames(history, half_cycles) if plane else SurfaceFrames(history, half_cycles)
     frames.figure.set_dpi(90)
     images = []
     for n in half_cycles:
         frames.show(n)
-        images.append(frames.image())
+        images.append(image_of(frames.figure))
     path = directory / FOLDER / "history.gif"
     path.parent.mkdir(exist_ok=True)
     save_gif(images, path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xarray
 
 from fenwear.report.style import Look
+from fenwear.report.surface import model_of
 from fenwear.results.sheet import BODIES
 
 TEXTS = {
@@ -34,9 +35,36 @@ TEXTS = {
     "program": "What acted over the run: load, sliding speed and ambient temperature, where they change.",
 }
 
+OF_SURFACES = {  # of solids and rings
+    "shape": "Worn depth of the punch, and of the strip where it wears, in micrometres along the "
+    "contact, a line for each chosen half-cycle.",
+    "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, a "
+    "line for each chosen half-cycle.",
+    "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
+    "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
+    "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
+    "half-cycles.",
+    "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each "
+    "chosen half-cycle.",
+    "boundary_temperature": "Temperature round the punch from the middle of its contact on, and along the strip's "
+    "upper surface, at the last half-cycle with fields.",
+    "pressure_map": "Maps of the contact pressure in megapascals, one for each chosen half-cycle.",
+    "wear_map": "Maps of the worn depth of the punch over its largest, one for each chosen half-cycle.",
+    "wear_strip_map": "Maps of the worn depth of the strip over its largest, one for each chosen half-cycle.",
+    "temperature_map": "Maps of the temperature of the punch's contact surface, one for each chosen half-cycle.",
+    "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch, one for each chosen "
+    "half-cycle.",
+    "cuts_along": "Pressure, worn depths and temperatures along the sliding, a line for each chosen half-cycle.",
+    "cuts_across": "Pressure, worn depths and temperatures across the sliding, a line for each chosen half-cycle.",
+    "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
+}
+
 
 def caption(name: str, history: xarray.Dataset, look: Look) -> str:
     """Return the caption of a figure of a run."""
+    if name not in TEXTS or model_of(history) != "plane":
+        return OF_SURFACES.get(name, name.replace("_", " "))
     bodies = [body for body, end in BODIES.items() if f"wear{end}" in history]
     ways = {1: "the strip moving rightward", -1: "the strip moving leftward"}
     present = [text for d, text in ways.items() if bool((history.direction == d).any())]

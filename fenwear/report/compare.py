@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import xarray
 
 from fenwear.errors import CaseError, InputError
+from fenwear.report.compare_surfaces import surface_comparison
 from fenwear.report.course import directions_present, mark_few
 from fenwear.report.figures import read_history
 from fenwear.report.key_numbers import flat, number_text, read_case, read_summary
 from fenwear.report.style import DIRECTIONS, contact_axis, legend_beside, panels, run_style
+from fenwear.report.surface import model_of
 from fenwear.results.disk import writing
 
 if TYPE_CHECKING:
@@ -88,6 +90,8 @@ def compare(directories: Sequence[Path]) -> Comparison:
 
 def comparison_figure(comparison: Comparison) -> Figure:
     """Draw shape and pressures at the end of each run, its largest pressure and temperature over the half-cycles."""
+    if any(model_of(history) != "plane" for history in comparison.histories):
+        return surface_comparison(comparison.names, comparison.histories)
     runs = list(zip(comparison.names, comparison.histories, strict=True))
     present = [d for d in DIRECTIONS if any(d in directions_present(h) for h in comparison.histories)]
     hot = [h for h in comparison.histories if "max_temperature" in h]

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
-from fenwear.report.style import BODY_COLOURS, DIRECTIONS, STANDARD, Look, legend_beside, level_line, panels, run_style
+from fenwear.report.style import (
+    BODY_COLOURS,
+    DIRECTIONS,
+    STANDARD,
+    Look,
+    direction_style,
+    legend_beside,
+    level_line,
+    panels,
+    run_style,
+)
 from fenwear.results.history import HEAT_TERMS
 from fenwear.results.sheet import BODIES
 
@@ -30,7 +40,7 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         "max_temperature": f"largest temperature ({shown_unit(unit)})",
     }
     for ax, (name, label) in zip(axes, over.items(), strict=False):
-        _by_direction(ax, history, name, look)
+        by_direction(ax, history, name, look)
         ax.set_ylabel(label)
     if is_conforming(history):
         mean = mean_pressure(history)
@@ -50,7 +60,7 @@ def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure
     figure, axes = panels(2, 2.7, look=look)
     over = {"periodicity": "change in a cycle (-)", "optimum_distance": "distance to the optimum (-)"}
     for ax, (name, label) in zip(axes, over.items(), strict=True):
-        _by_direction(ax, history, name, look)
+        by_direction(ax, history, name, look)
         ax.set_ylabel(label)
         legend_beside(ax, "strip moves")
     axes[0].set_yscale("log")
@@ -172,11 +182,11 @@ def mark_few(points: Sized) -> dict[str, Any]:
     return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
 
 
-def _by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Look) -> None:
+def by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Look = STANDARD) -> None:
     """Draw a variable over the run, a line for each direction."""
     x = look.course(history)
     for d in directions_present(history):
-        text, dashes, colour = DIRECTIONS[d]
+        text, dashes, colour = direction_style(history, d)
         rows = history.direction.values == d
         ax.plot(x[rows], history[name][rows], dashes, color=colour, label=text, **mark_few(rows.nonzero()[0]))
 
@@ -192,3 +202,8 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Look, *, logarithmic: bool
     elif last > first:
         ax.set_xlim(0 if not logarithmic else first, last)
     ax.set_xlabel(look.label)
+
+
+def half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
+    """Label the axis of cycles of a figure of solids or rings."""
+    run_axis(ax, history, STANDARD)

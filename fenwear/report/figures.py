@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
-from fenwear.report.boundary import boundary_figure
-from fenwear.report.captions import caption
 from fenwear.report.course import (
     convergence_figure,
     directions_present,
@@ -24,12 +22,9 @@ from fenwear.report.course import (
     shown_unit,
     volume_figure,
 )
-from fenwear.report.key_numbers import read_case
 from fenwear.report.program import program_figure
-from fenwear.report.sections import geometry_figure, stress_figure
 from fenwear.report.shapes import profile_figure, surfaces_of, wear_map_figure, worn_range
 from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, level_line, panels, shades
-from fenwear.results.disk import write_text
 from fenwear.results.history import HISTORY
 
 if TYPE_CHECKING:
@@ -88,6 +83,12 @@ def cycle_means(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[int
     cycles = sorted({(n + 1) // 2 for n in half_cycles})
     pairs = {c: [2 * c - 1, 2 * c] for c in cycles if {2 * c - 1, 2 * c} <= recorded}
     return {c: history.pressure.sel(half_cycle=pair).mean("half_cycle") for c, pair in pairs.items()}
+
+
+def pressure_top(history: xarray.Dataset, half_cycles: Sequence[int]) -> float:
+    """Return the upper end of an axis of pressure: the edges of a fresh flat punch peak far beyond all that follows."""
+    late = float(history.pressure.sel(half_cycle=list(half_cycles[len(half_cycles) // 2 :])).max())
+    return 1.15 * max(late, float(history.pressure.median("half_cycle").max()))
 
 
 def early_half_cycles(history: xarray.Dataset, half_cycles: Sequence[int]) -> list[int]:
@@ -204,35 +205,3 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
         drawn["temperature"] = temperature_figure(history, chosen, look)
         drawn["heat_balance"] = heat_balance_figure(history, look)
     return drawn
-
-
-def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDARD) -> dict[str, Figure]:
-    """Draw what the fields of the last half-cycle that has them show, by its name."""
-    files = sorted((directory / "fields").glob("half_cycle_*.nc"))
-    if not files:
-        return {}
-    with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
-        drawn = {"geometry": geometry_figure(fields, case, look)}
-        if "punch_stress_xx" in fields:
-            drawn["surface_stress"] = stress_figure(fields, look)
-        if "punch_temperature" in fields:
-            drawn["boundary_temperature"] = boundary_figure(fields)
-    return drawn
-
-
-def draw_figures(
-    directory: Path, half_cycles: Sequence[int] = (), look: Look = STANDARD, formats: Sequence[str] = ("png",)
-) -> list[Path]:
-    """Draw all figures of a run, and their captions, into its folder `figures`; return the paths."""
-    folder = directory / FOLDER
-    history = read_history(directory)
-    drawn = all_figures(history, half_cycles, look) | field_figures(directory, read_case(directory), look)
-    folder.mkdir(exist_ok=True)
-    paths = []
-    for name, figure in drawn.items():
-        for ending in dict.fromkeys(("png", *formats)):  # the report shows the PNG
-            paths.append(folder / f"{name}.{ending}")
-            figure.savefig(paths[-1], dpi=DPI)
-    captions = folder / CAPTIONS
-    write_text(captions, "".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn))
-    return [*paths, captions]

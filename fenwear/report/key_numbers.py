@@ -12,7 +12,16 @@ from typing import Any
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 
-UNITS = {"_per_s": "1/s", "_MPa": "MPa", "_mm2": "mm²", "_mm": "mm", "_K": "K", "_mJ": "mJ", "_seconds": "s"}
+UNITS = {
+    "_per_s": "1/s",
+    "_MPa": "MPa",
+    "_mm2": "mm²",
+    "_mm3": "mm³",
+    "_mm": "mm",
+    "_K": "K",
+    "_mJ": "mJ",
+    "_seconds": "s",
+}
 LABELS = {
     "half_cycles": "half-cycles done",
     "half_cycle": "half-cycle",
@@ -24,6 +33,8 @@ LABELS = {
     "max_temperature_K": "largest temperature of the contact surfaces",
     "wear_mm": "worn depth of the punch",
     "pressure_MPa": "contact pressure",
+    "mean_pressure_MPa": "mean pressure",
+    "contact_area_mm2": "area in contact",
     "temperature_punch_K": "temperature of the punch",
     "temperature_strip_K": "temperature of the strip",
     "heat_mJ": "heat of the last half-cycle",

@@ -11,21 +11,25 @@ from typing import Any
 
 import xarray
 
-from fenwear.errors import CaseError, InputError, OutputError
+from fenwear.errors import CaseError, OutputError
 from fenwear.report.captions import caption
-from fenwear.report.figures import FOLDER, draw_figures, read_history
+from fenwear.report.draw import draw_figures
+from fenwear.report.figures import FOLDER, chosen_half_cycles, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
 from fenwear.report.stick import write_stick_report
 from fenwear.report.style import STANDARD, Look
+from fenwear.report.surface import model_of
+from fenwear.report.turned import Turned, turned_map
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
 SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "volume",
-            "scar", "friction", "surface_stress", "temperature", "boundary_temperature")  # fmt: skip
+            "scar", "friction", "surface_stress", "temperature", "boundary_temperature", "pressure_map",
+            "wear_strip_map", "temperature_map", "temperature_strip_map", "cuts_along", "cuts_across")  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
 
 
@@ -60,8 +64,6 @@ def _write_report(
     case = read_case(directory)
     if case.get("contact", {}).get("law") == "coulomb":
         return write_stick_report(directory)
-    if case.get("model", {}).get("kind", "plane") != "plane":
-        raise CaseError(InputError("model.kind", "figures are drawn of plane models so far"))
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()), look, formats)
     if complete:
         from fenwear.report.animation import draw_animation
@@ -124,7 +126,7 @@ class Places:
 def page(directory: Path, look: Look = STANDARD) -> str:
     """Return report.html of a run whose figures are drawn."""
     history, summary = read_history(directory), read_summary(directory)
-    images = _images(directory)
+    images, turned = _images(directory), _turned(history)
     written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
     return render(
         "report.html",
@@ -136,10 +138,13 @@ def page(directory: Path, look: Look = STANDARD) -> str:
         warnings=summary.get("warnings", ()),
         tables=_tables(summary, history),
         places=_places(summary),
-        figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS],
+        figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS if name in images],
+        turned=turned and turned.html,
+        nonce=turned and turned.nonce,
         bodies=_bodies(images),
         animations=_animations(images),
         change=_change(summary),
+        scale="the pressure scale",
         retries=summary.get("retries", {}),
         convergence=_figure(images, "convergence", caption("convergence", history, look)),
         equilibrium_error=summary.get("largest_equilibrium_error"),
@@ -150,6 +155,16 @@ def page(directory: Path, look: Look = STANDARD) -> str:
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
     )
+
+
+def _turned(history: xarray.Dataset) -> Turned | None:
+    """Return the map to turn of solids and rings; None without plotly, and of plane models."""
+    if model_of(history) == "plane":
+        return None
+    try:
+        return turned_map(history, chosen_half_cycles(history))
+    except (ImportError, OSError):
+        return None
 
 
 def _number(path: str, value: float, *, cut: int = 0) -> Number:
@@ -179,15 +194,15 @@ def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
 
 def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
     if not summary:
-        last = {name: float(history[name][-1]) for name in ("max_pressure", "contact_width", "periodicity")}
-        units = {"max_pressure": "_MPa", "contact_width": "_mm"}
-        return [_table("At the last recorded half-cycle", {n + units.get(n, ""): v for n, v in last.items()})]
+        units = {"max_pressure": "_MPa", "contact_width": "_mm", "contact_area": "_mm2", "periodicity": ""}
+        last = {name + unit: float(history[name][-1]) for name, unit in units.items() if name in history}
+        return [_table("At the last recorded half-cycle", last)]
     numbers = numbers_of(summary)
     single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}
     sheet = {p: v for p, v in numbers.items() if p.partition(".")[0] in ("sliding", *BODIES) and "[" not in p}
     tables = [_sheet_table(name, sheet) for name in ("sliding", *BODIES) if name in summary]
     tables.append(_table("The run", single))
-    for d in ("rightward", "leftward"):
+    for d in ("rightward", "leftward", "forward", "backward"):
         if d in summary:
             inside = {p: v for p, v in numbers.items() if p.startswith(f"{d}.") and "[" not in p}
             tables.append(_table(f"Last half-cycle with the strip moving {d}", inside, cut=len(d) + 1))
@@ -257,15 +272,25 @@ def _figure(images: dict[str, Path], name: str, text: str, alt: str = "") -> Pic
     return picture(path.read_bytes(), path.suffix[1:], text, alt or text)
 
 
+KINDS = {
+    "solid": "Deformed punch and strip, cut through the middle of the contact",
+    "turned": "Deformed rings, turned about their axis with a quarter left open",
+    "bodies": "Deformed punch and strip near the contact",
+}
+
+
 def _bodies(images: dict[str, Path]) -> list[Picture | None]:
     """Return pictures of the bodies at the last half-cycle that has them."""
     pictures = []
     for field, text in FIELDS.items():
-        names = [n for n in images if n.startswith(f"bodies_{field}_")]
-        if names:
-            number = int(names[-1].rpartition("_")[2])
-            alt = f"Deformed punch and strip near the contact, coloured by {text}, at half-cycle {number:,}."
-            pictures.append(_figure(images, names[-1], f"{text[0].upper()}{text[1:]} at half-cycle {number:,}", alt))
+        for kind, what in KINDS.items():
+            names = [n for n in images if n.startswith(f"{kind}_{field}_")]
+            if names:
+                number = int(names[-1].rpartition("_")[2])
+                alt = f"{what}, coloured by {text}, at half-cycle {number:,}."
+                pictures.append(
+                    _figure(images, names[-1], f"{text[0].upper()}{text[1:]} at half-cycle {number:,}", alt)
+                )
     return pictures
 
 

@@ -19,7 +19,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from fenwear.report.style import save_gif
+from fenwear.report.style import FORWARD, save_gif
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,10 +102,17 @@ def draw_here(directory: Path) -> list[Path]:
     if len(files) > MOST_FRAMES:
         files = [files[k] for k in np.unique(np.linspace(0, len(files) - 1, MOST_FRAMES).round().astype(int))]
     datasets = [_loaded(path) for path in files]
-    view = common_view(datasets)
     folder = directory / FIGURES
     folder.mkdir(exist_ok=True)
     paths = []
+    model = datasets[0].attrs.get("model", "plane")
+    if model != "plane":
+        from fenwear.report.solid_pictures import draw_solids
+
+        paths = draw_solids(datasets, folder, SHOWN)
+        if model == "solid":
+            return paths
+    view = common_view(datasets)
     for field in view.ranges:
         frames = []
         for data in datasets:
@@ -216,12 +223,15 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View, image: NDArray[n
     figure = Figure(figsize=(7.0, 6.6), layout="constrained")
     ax = figure.subplots()
     ax.imshow(image, extent=view.box, interpolation="antialiased")
-    ax.set_xlabel("x (mm)")
+    rings = data.attrs.get("model", "plane") == "axisymmetric"
+    ax.set_xlabel("r (mm)" if rings else "x (mm)")
     ax.set_ylabel("z (mm)")
     ax.set_title(
         f"{name[:1].upper()}{name[1:]}, half-cycle {half_cycle:,}: displacement and wear × {view.factor:,g}", loc="left"
     )
     moves = "strip moves rightward →" if direction > 0 else "← strip moves leftward"
+    if rings:
+        moves = f"strip turns {FORWARD[direction]}"
     middle = (view.box[0] + view.box[1]) / 2
     plate = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     ax.text(middle, view.box[2] + 0.06 * (view.box[3] - view.box[2]), moves, ha="center", bbox=plate)
@@ -231,7 +241,8 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View, image: NDArray[n
     bar = figure.colorbar(
         mappable, ax=ax, location="bottom", shrink=0.7, aspect=30, extend="max" if beyond else "neither"
     )
-    bar.set_label(f"{name} ({unit})" + (f", at single points up to {values.max():.0f} {unit}" if beyond else ""))
+    most = f"{values.max():.0f}" if values.max() >= 10 else f"{values.max():.3g}"
+    bar.set_label(f"{name} ({unit})" + (f", at single points up to {most} {unit}" if beyond else ""))
     return figure
 
 

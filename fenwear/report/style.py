@@ -25,6 +25,7 @@ DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1
 DIRECTIONS = {1: ("rightward", "-", BLUE), -1: ("leftward", "--", RED)}
 BODY_COLOURS = {"punch": BLUE, "strip": RED}
 LIGHTEST = 0.72  # of viridis: what is lighter fades on white
+FORWARD = {1: "forward", -1: "backward"}  # of solids and rings: along or around
 ALONG_CONTACT = "position along the contact x (mm)"
 AXES = {"cycles": ("cycles", "cycle"), "distance": ("sliding distance (m)", "sliding distance (m)"),
         "time": ("time (s)", "time (s)")}  # fmt: skip
@@ -70,6 +71,12 @@ class Look:
 
 
 STANDARD = Look()
+
+
+def direction_style(history: xarray.Dataset, direction: int) -> tuple[str, str, str]:
+    """Return name, dashes and colour of a sliding direction in a run."""
+    name, dashes, colour = DIRECTIONS[direction]
+    return (name if history.attrs.get("model", "plane") == "plane" else FORWARD[direction]), dashes, colour
 
 
 def panels(

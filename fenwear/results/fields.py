@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import basix
 import basix.ufl
 import dolfinx
 import numpy as np
 import ufl
-import xarray
 from dolfinx import fem
 from numpy.typing import NDArray
 
@@ -34,6 +33,9 @@ from fenwear.results.series import step_of
 from fenwear.results.subcells import linear_cells
 from fenwear.results.vtkhdf import append
 from fenwear.sliding.wear import Worn
+
+if TYPE_CHECKING:
+    import xarray
 
 FOLDER = "fields"
 BYTES_PER_NODE, BYTES_PER_RANK = 512, 262144  # that the files take, generously
@@ -247,9 +249,27 @@ def write_fields(
         data.update(_gathered(name, elastic, functions))
         data.update(_groups(elastic))
     time = float(system.time(np.array(half_cycle)))
-    attributes = {"half_cycle": half_cycle, "direction": direction, "time": time}
+    attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
     data.update(_contact_surfaces(system, worn, pressure))
+    import xarray  # with pandas, half a second that runs without fields spare themselves
+
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder, stem))
+
+
+def _frame(system: Tribosystem) -> dict[str, Any]:
+    """Return the model of solids and rings, the strip's way in the middle of the contact and the normal there (3,)."""
+    pair, kind = system.pair, system.bodies.punch.law.kind
+    if kind in ("stress", "strain"):
+        return {}
+    normal = in_space(pair.weights[None] @ pair.normal)[0]
+    normal /= np.linalg.norm(normal)
+    middle = pair.weights[None] @ pair.punch.x / pair.weights.sum()
+    velocity = system.sliding.field.velocity(middle)[0]
+    velocity -= (velocity @ normal) * normal
+    size = float(np.linalg.norm(velocity))
+    if size < 1e-9 * pair.punch.extent():  # a pin that spins on its own axis
+        velocity, size = np.eye(3)[0], 1.0
+    return {"model": kind, "along": velocity / size, "normal": normal}
 
 
 def _contact_surfaces(system: Tribosystem, worn: Worn, pressure: Array) -> dict[str, Any]:

@@ -383,7 +383,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         "periodicity": float(last.periodicity[-1]),
         **extremes,
         "contact_nodes": len(system.pair.x),
-        "degrees_of_freedom": system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0],
+        "degrees_of_freedom": system.bodies.unknowns,
         "ranks": system.comm.size,
         "versions": versions(),
     }

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
 from fenwear.arrays import Array
 from fenwear.results.vtkhdf import Step
+
+if TYPE_CHECKING:
+    import xarray
 
 BODIES = ("punch", "strip")
 TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON = 5, 9, 10, 12  # as VTK numbers them

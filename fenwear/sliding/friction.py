@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -29,11 +29,26 @@ class ContactConditions:
         pressure: p (n,), MPa.
         speed: Mean sliding speed v of each node (n,), or of all, mm/s.
         temperatures: Of the punch's and the strip's surface (n,) each, K; the initial ones without heat.
+        places: Of the nodes on the punch and on the strip's material (n, 3) each, mm.
+        depths: Worn off punch and strip there (n,) each, mm.
+        slid: What each node has slid from the start (n,), mm.
+        regions: Shares of the regions of punch and strip in the nodes (n,), by their names.
     """
 
     pressure: Array
     speed: float | Array
     temperatures: tuple[Array, Array]
+    places: tuple[Array, Array]
+    depths: tuple[Array, Array]
+    slid: Array
+    regions: tuple[Mapping[str, Array], Mapping[str, Array]]
+
+    @classmethod
+    def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
+        """Return conditions of which no more is known: at the origin, unworn, before any sliding."""
+        none, places = np.zeros_like(pressure), np.zeros((len(pressure), 3))
+        surfaces = (none, none) if temperatures is None else temperatures
+        return cls(pressure, speed, surfaces, (places, places), (none, none), none, ({}, {}))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -41,10 +56,22 @@ class ContactConditions:
         return self.pressure.shape
 
     def of(self, body: Literal["punch", "strip", "mean"]) -> Mapping[str, Array]:
-        """Return T, p, v with the temperature of a body's surface, or the mean of both."""
+        """Return the variables of laws, of a body; or of the punch, with the mean temperature of both."""
         punch, strip = self.temperatures
         temperature = {"punch": punch, "strip": strip, "mean": (punch + strip) / 2}[body]
-        return {"T": temperature, "p": self.pressure, "v": np.asarray(self.speed)}
+        own = 1 if body == "strip" else 0
+        x, y, z = self.places[own].T
+        return {
+            "T": temperature,
+            "p": self.pressure,
+            "v": np.asarray(self.speed),
+            "x": x,
+            "y": y,
+            "z": z,
+            "depth": self.depths[own],
+            "s": self.slid,
+            **{f"region {name}": share for name, share in self.regions[own].items()},
+        }
 
 
 @dataclass(frozen=True)
@@ -61,8 +88,8 @@ class Friction:
 
     @property
     def constant(self) -> bool:
-        """Whether mu does not depend on temperature, pressure or speed."""
-        return not isinstance(self.contact.friction, Dependence)
+        """Whether mu depends on nothing but the place."""
+        return not (isinstance(self.contact.friction, Dependence) and self.contact.friction.varies)
 
     def values(self, conditions: ContactConditions) -> Array:
         """Return mu at the nodes (n,).

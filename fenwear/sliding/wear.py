@@ -45,23 +45,32 @@ class Worn:
 
 @dataclass(frozen=True)
 class _BodyWear:
-    """What a body loses in each phase: rate p^b, the rate = beta~ S of the nodes (m, n), mm/MPa^b."""
+    """What a body loses in each phase: rate q^b, q = min(p, cap) - threshold >= 0, rate = beta~ S (m, n), mm/MPa^b."""
 
     rate: Array
     exponent: float
+    threshold: float = 0.0
+    cap: float = np.inf
+
+    @property
+    def linear(self) -> bool:
+        """Whether depths are the rate times the pressure."""
+        return self.exponent == 1 and self.threshold == 0 and self.cap == np.inf
 
     def depth(self, pressure: Array) -> Array:
         """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes."""
-        if self.exponent == 1:
+        if self.linear:
             return self.rate * pressure
-        return self.rate * np.maximum(pressure, 0.0) ** self.exponent
+        return self.rate * np.maximum(np.minimum(pressure, self.cap) - self.threshold, 0.0) ** self.exponent
 
     def slope(self, pressure: Array) -> Array:
         """Return their derivatives to the pressures (m, n), mm/MPa."""
-        if self.exponent == 1:
+        if self.linear:
             return np.broadcast_to(self.rate, pressure.shape)
         floor = 1e-9 * max(float(pressure.max()), 1e-300)  # b < 1: the slope at p = 0 is infinite
-        return self.rate * self.exponent * np.maximum(pressure, floor) ** (self.exponent - 1)
+        above = np.maximum(pressure - self.threshold, floor)
+        wears = ((pressure >= self.threshold) | (self.threshold == 0)) & (pressure <= self.cap)
+        return np.where(wears, self.rate * self.exponent * above ** (self.exponent - 1), 0.0)
 
 
 @dataclass(frozen=True)
@@ -172,17 +181,17 @@ class Wear:
 
     @property
     def constant(self) -> bool:
-        """Whether no coefficient depends on temperature, pressure or speed."""
+        """Whether no coefficient depends on more than the place."""
         laws = [law for law in (self.punch, self.strip) if law is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
-        dependent = any(isinstance(law.coefficient, Dependence) for law in laws)
+        dependent = any(isinstance(law.coefficient, Dependence) and law.coefficient.varies for law in laws)
         return not dependent and (self.friction.constant or not of_friction)
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
 
         Args:
-            conditions: T, p and v of each of these phases, for the coefficients that depend on them.
+            conditions: Of each of these phases, for the coefficients that depend on them.
             which: Numbers of the phases; by default all.
 
         Raises:
@@ -198,7 +207,8 @@ class Wear:
                 sliding[k] * coefficient(law, self.friction, state, key)
                 for k, state in zip(chosen, conditions, strict=True)
             ]
-            bodies.append(_BodyWear(np.array(rates), law.pressure_exponent))
+            cap = np.inf if law.pressure_cap is None else law.pressure_cap
+            bodies.append(_BodyWear(np.array(rates), law.pressure_exponent, law.pressure_threshold, cap))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 

@@ -57,14 +57,17 @@ def local_wear(
     """Return the wear by local slip of a case's laws.
 
     Raises:
-        CaseError: a coefficient depends on temperature, pressure or speed.
+        CaseError: a coefficient depends on anything, or the pressure has a threshold or a cap.
     """
     n = len(pair.weights)
-    state = ContactConditions(np.full(n, mean_pressure), 0.0, (np.zeros(n), np.zeros(n)))
+    state = ContactConditions.at(np.full(n, mean_pressure))
     found = []
     for law, key in zip(laws, ("wear.punch", "wear.strip"), strict=True):
         if law is not None and isinstance(law.coefficient, Dependence):
             raise CaseError(InputError(f"{key}.coefficient", "expected a constant with contact.law = 'coulomb'"))
+        if law is not None and (law.pressure_threshold > 0 or law.pressure_cap is not None):
+            message = "expected neither pressure_threshold nor pressure_cap with contact.law = 'coulomb'"
+            raise CaseError(InputError(key, message))
         found.append(
             None
             if law is None

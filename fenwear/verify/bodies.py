@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from fenwear.assembly import Tribosystem, assemble
+from fenwear.assembly import Bodies, Tribosystem, assemble, build_bodies
 from fenwear.case import Case, load_case, make_case
 
 STEEL = {"young": 2e5, "poisson": 0.3}
@@ -17,6 +17,13 @@ def two_blocks(
 ) -> Tribosystem:
     """Return two rectangles of the same width on each other, see `two_block_case`; collective."""
     return assemble(two_block_case(punch_material, strip_material, sizes, **tables))
+
+
+def bodies_of_blocks(
+    punch_material: Mapping[str, float], strip_material: Mapping[str, float], sizes: Mapping[str, float], **tables: Any
+) -> Bodies:
+    """Return two rectangles that are neither condensed nor joined, see `two_block_case`; collective."""
+    return build_bodies(two_block_case(punch_material, strip_material, sizes, **tables))
 
 
 def two_block_case(

@@ -10,13 +10,14 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import k0e
 
-from fenwear import vary
+from fenwear import load_case, vary
 from fenwear.arrays import Array
+from fenwear.assembly import place_case
 from fenwear.bodies.assembly import times
 from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.heat.field import HeatState
 from fenwear.results.fields import body_fields
-from fenwear.verify.bodies import builtin, clamped, two_blocks
+from fenwear.verify.bodies import bodies_of_blocks, builtin, clamped, two_blocks
 from fenwear.verify.manufactured import (
     DEGREES,
     convergence_plot,
@@ -43,7 +44,7 @@ HELD_SIDES = {"temperatures": [{"on": "strip_sides"}]}
 def conducting_square(elements: int, degree: int, *, free: bool = True) -> HeatBody:
     """Return conduction in the strip -1/2 < x < 1/2, -1 < z < 0, held at its sides, free to convect or insulated."""
     heat = {"convection": CONVECTION if free else 0.0, "ambient": AMBIENT}
-    system = two_blocks(
+    bodies = bodies_of_blocks(
         MATERIAL,
         MATERIAL,
         unit_square(elements),
@@ -52,8 +53,8 @@ def conducting_square(elements: int, degree: int, *, free: bool = True) -> HeatB
         model={"thickness": THICKNESS},
         heat=heat,
     )
-    assert system.bodies.heat is not None
-    return system.bodies.heat[1]
+    assert bodies.heat is not None
+    return bodies.heat[1]
 
 
 def owned_nodes(body: HeatBody) -> tuple[Array, Array]:
@@ -198,18 +199,18 @@ def thermal_strain() -> Result:
         for degree in DEGREES[:3]:
             pairs = []
             for count in (10, 20):
-                system = two_blocks(
+                bodies = bodies_of_blocks(
                     MATERIAL, MATERIAL, unit_square(count), degree=degree, plane=plane, strip=clamped("strip"), heat={}
                 )
-                assert system.bodies.heat is not None
-                heat = system.bodies.heat[1]
+                assert bodies.heat is not None
+                heat = bodies.heat[1]
                 x, z = owned_nodes(heat)
                 s, t = np.sin(pi * (x + 0.5)) ** 2, np.sin(pi * z) ** 2
                 c, d = np.cos(2 * pi * (x + 0.5)), np.cos(2 * pi * z)
                 theta = heat.function(2 * pi**2 * (c * t + s * d) / factor)
-                coupling = system.bodies.strip.thermal_coupling(heat.space)
+                coupling = bodies.strip.thermal_coupling(heat.space)
                 force = times(coupling, theta.x.array[: heat.owned])
-                pairs.append(errors(displacement(system.bodies.strip, force), exact))
+                pairs.append(errors(displacement(bodies.strip, force), exact))
             in_l2, in_h1 = np.array(pairs).T
             rows.append(order(f"plane {plane}, degree {degree}: order in L2", degree + 1, in_l2, 0.2))
             rows.append(order(f"plane {plane}, degree {degree}: order in H1", degree, in_h1, 0.2))
@@ -322,9 +323,9 @@ def periodic_flux() -> Result:
     omega, flux, periods = 10.0, 2.0, 6
     depth = 10 * math.sqrt(2 * K / (RHO_C * omega))
     sizes = {"width": 0.5, "strip_height": depth, "across": 2, "strip_layers": 20, "punch_layers": 1}
-    system = two_blocks(MATERIAL, MATERIAL, sizes, degree=4, heat={})
-    assert system.bodies.heat is not None
-    body = system.bodies.heat[1]
+    bodies = bodies_of_blocks(MATERIAL, MATERIAL, sizes, degree=4, heat={})
+    assert bodies.heat is not None
+    body = bodies.heat[1]
     rows: list[Row] = []
     lines: list[Line] = []
     amplitudes, lags = [], []
@@ -386,9 +387,9 @@ def open_strip() -> Result:
     """
     entering, flux, height = 20.0, 5.0, 1e-3
     sizes = {"strip_height": height, "across": 32, "strip_layers": 1, "punch_layers": 1}
-    system = two_blocks(MATERIAL, MATERIAL, sizes, degree=3, heat={"ambient": AMBIENT, "inflow": entering})
-    assert system.bodies.heat is not None
-    body, new = system.bodies.heat[1], Surroundings(renewed=True)
+    bodies = bodies_of_blocks(MATERIAL, MATERIAL, sizes, degree=3, heat={"ambient": AMBIENT, "inflow": entering})
+    assert bodies.heat is not None
+    body, new = bodies.heat[1], Surroundings(renewed=True)
     along = contact_abscissae(body) + 0.5
     load = body.load(np.full(len(body.surface.weights), flux))[:, None]
     rows: list[Row] = []
@@ -444,17 +445,13 @@ def moving_source() -> Result:
 
     The strip of Example 1, 2 m deep and 20 m long, with cold ends and bottom.
     """
-    system = builtin(
-        "example1-heat",
-        "heat.convection=0",
-        "geometry.parameters.growth=0.3",
-        "geometry.parameters.strip_height=2000",
-        "geometry.parameters.strip_length=20000",
-    )
-    assert system.bodies.heat is not None
-    body, half_width, conductivity = system.bodies.heat[1], 30.0, 55.0
+    settings = ["heat.convection=0", "geometry.parameters.growth=0.3"]
+    settings += ["geometry.parameters.strip_height=2000", "geometry.parameters.strip_length=20000"]
+    placed = place_case(load_case("example1-heat", settings))
+    assert placed.bodies.heat is not None
+    body, half_width, conductivity = placed.bodies.heat[1], 30.0, 55.0
     diffusivity = conductivity / (7.8e-9 * 4.6e8)
-    x = system.pair.x
+    x = placed.pair.x
     inner = np.abs(x) < 29.9
     rows: list[Row] = []
     lines: list[Line] = []

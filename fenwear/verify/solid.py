@@ -18,6 +18,7 @@ from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile
 YOUNG, POISSON = 210_000.0, 0.3
 STEEL, RIGID = {"young": YOUNG, "poisson": POISSON}, {"young": 1e6 * YOUNG, "poisson": POISSON}
 MODULUS = YOUNG / (1 - POISSON**2)  # E* of a rigid body on steel, MPa
+ELLIPSE, ELLIPSE_PEAK = (0.2080002, 0.1311640), 2 * 1750.100  # of radii 10 and 5 mm under 200 N: half-axes, p0
 ROTATION = {"kind": "rotation", "angular_speed": 1.0, "duration": 1.0}
 
 
@@ -220,7 +221,6 @@ def sphere() -> Result:
     load, rows = 200.0, list[Row]()
     a = (3 * load * 10 / (4 * MODULUS)) ** (1 / 3)
     peak = 3 * load / (2 * np.pi * a**2)
-    ellipse, ellipse_peak = (0.2080002, 0.1311640), 2 * 1750.100
     plots = []
     for elements, degree, tetrahedra in ((12, 1, False), (6, 2, False), (6, 2, True)):
         system = quarter(elements, degree, tetrahedra=tetrahedra)
@@ -240,25 +240,35 @@ def sphere() -> Result:
         ]
         plots.append(Plot(f"Sphere on a flat, {what}", "r (mm)", "pressure (MPa)", lines))
         x, p = indent(system, load, (10.0, 5.0))
-        exact = hertz(x, ellipse, ellipse_peak)
-        inside = exact > 0.6 * ellipse_peak
+        exact = hertz(x, ELLIPSE, ELLIPSE_PEAK)
+        inside = exact > 0.6 * ELLIPSE_PEAK
         rows += [
-            number(f"ellipsoid, {what}: largest pressure p0 (MPa)", ellipse_peak, p.max(), 0.02),
-            profile(f"ellipsoid, {what}: pressure (MPa)", exact[inside], p[inside], 0.04, scale=ellipse_peak),
+            number(f"ellipsoid, {what}: largest pressure p0 (MPa)", ELLIPSE_PEAK, p.max(), 0.02),
+            profile(f"ellipsoid, {what}: pressure (MPa)", exact[inside], p[inside], 0.04, scale=ELLIPSE_PEAK),
         ]
-    errors = [sphere_error(elements) for elements in (6, 12)]
     # The pressure's slope is infinite at the edge: the order is 1 whatever the elements' degree.
-    rows.append(order("sphere, hexahedra of degree 1: order of the L2 error, mean of four loads", 1, errors, 0.5))
+    for name, radii in (("sphere", (10.0, 10.0)), ("ellipsoid", (10.0, 5.0))):
+        errors = [indentation_error(elements, radii) for elements in (6, 12)]
+        rows += [
+            number(f"{name}, hexahedra of degree 1, {elements}: L2 error of four loads", 0, error, 0.1, scale=1)
+            for elements, error in zip((6, 12), errors, strict=True)
+        ]
+        rows.append(order(f"{name}, hexahedra of degree 1: order of it", 1, errors, 0.5))
     return Result(rows, plots)
 
 
-def sphere_error(elements: int) -> float:
-    """Return the L2 error of the pressure under the sphere over that of the pressure, the mean of four loads."""
+def indentation_error(elements: int, radii: tuple[float, float]) -> float:
+    """Return the L2 error of the pressure over that of the pressure, the mean of four loads.
+
+    Half-axes and largest pressure grow with the cube root of the load.
+    """
     system, found = quarter(elements, 1), []
+    a = (3 * 200 * 10 / (4 * MODULUS)) ** (1 / 3)
+    axes, peak = ((a, a), 300 / (np.pi * a**2)) if radii[0] == radii[1] else (ELLIPSE, ELLIPSE_PEAK)
     for load in (90.0, 120.0, 160.0, 200.0):
-        a = (3 * load * 10 / (4 * MODULUS)) ** (1 / 3)
-        x, p = indent(system, load, (10.0, 10.0))
-        exact = hertz(x, (a, a), 3 * load / (2 * np.pi * a**2))
+        grown = (load / 200) ** (1 / 3)
+        x, p = indent(system, load, radii)
+        exact = hertz(x, (axes[0] * grown, axes[1] * grown), peak * grown)
         found.append(np.sqrt(system.pair.weights @ (p - exact) ** 2 / (system.pair.weights @ exact**2)))
     return float(np.mean(found))
 

@@ -33,7 +33,7 @@ def row(elements: str, growth: str) -> None:
     done = time.perf_counter()
     state = steady(system)
     memory = comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss) / 1024**2
-    unknowns = system.bodies.punch.stiffness.size[0] + system.bodies.strip.stiffness.size[0]
+    unknowns = system.bodies.unknowns
     if comm.rank == 0:
         print(
             f"| {unknowns:9,} | {len(system.pair.x):5,} | {comm.size} | {assembled - begin:6.1f} s "

@@ -15,10 +15,10 @@ from fenwear import CaseError, load_case
 from fenwear.report.animation import draw_animation, frames_of
 from fenwear.report.chosen import chosen_formats, chosen_look
 from fenwear.report.course import convergence_figure, heat_balance_figure, peak_figure, scar_figure, volume_figure
+from fenwear.report.draw import draw_figures
 from fenwear.report.figures import (
     all_figures,
     chosen_half_cycles,
-    draw_figures,
     early_half_cycles,
     mean_pressure_figure,
     open_history,

@@ -22,7 +22,8 @@ BOTH = (
 
 
 def conditions(pressure: Array, speed: float = 2.0, temperature: float = 300.0) -> ContactConditions:
-    return ContactConditions(pressure, speed, (np.full_like(pressure, temperature), np.full_like(pressure, 280.0)))
+    surfaces = (np.full_like(pressure, temperature), np.full_like(pressure, 280.0))
+    return ContactConditions.at(pressure, speed, surfaces)
 
 
 @pytest.mark.parametrize("b", [0.5, 1.0, 2.0, 3.0])
@@ -100,5 +101,7 @@ def test_friction_of_temperature_pressure_and_speed() -> None:
 def test_bad_values_are_named(expression: str) -> None:
     """A coefficient that is negative or not a number somewhere is an error, with the place in T, p and v."""
     law = Friction(Contact(friction=Dependence(expression=expression)))
-    with pytest.raises(CaseError, match=r"contact.friction: expected zero or more, got .* at T = 290, p = 1, v = 2"):
+    with pytest.raises(
+        CaseError, match=r"contact.friction: expected zero or more, got .* at T = 290 K, p = 1 MPa, v = 2 mm/s"
+    ):
         law.values(conditions(np.array([1.0, 4.0])))

@@ -1,0 +1,194 @@
+"""What the set-up of a system will take, known before it is spent: memory and time from the sizes of the meshes.
+
+The sizes of sparse factors follow those of nested dissection, with factors measured on the ready geometries: of N
+unknowns about 5 N log2 N entries in a plane and 22 N^(4/3) in a solid. Each pattern of force is one solution for each
+of its directions; what comes of them is dense, n by n contact nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from petsc4py import PETSc
+
+from fenwear.assembly.placed import Placed
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.errors import CaseError, InputError
+from fenwear.parallel import on_root
+
+NUMBER, GIB = 8, 2**30  # bytes
+FACTORING = {2: 1e-8, 3: 8e-10}  # s over N^1.5 in a plane and N² in a solid
+SOLVING = 2e10  # operations a second of many solutions at once, four for each entry of a factor
+WORKING = 1.3  # of a factor: what it is made in
+SMALL = GIB  # below which no estimate refuses anything
+COARSEST = 20.0  # times larger elements
+
+
+@dataclass(frozen=True)
+class BodyNeeds:
+    """What one body asks for.
+
+    Attributes:
+        dim: d.
+        unknowns: Degrees of freedom of the displacement.
+        matrix: Entries of its stiffness.
+        columns: Solutions: patterns of force times the directions of each.
+        patterns: Of force.
+        temperatures: Degrees of freedom of the temperature; 0 without heat.
+    """
+
+    dim: int
+    unknowns: float
+    matrix: float
+    columns: float
+    patterns: float
+    temperatures: float
+
+    def coarser(self, times: float) -> BodyNeeds:
+        """Return the same of elements so many times as large."""
+        volume, surface = times**-self.dim, times ** (1 - self.dim)
+        return BodyNeeds(
+            self.dim,
+            self.unknowns * volume,
+            self.matrix * volume,
+            self.columns * surface,
+            self.patterns * surface,
+            self.temperatures * volume,
+        )
+
+    @property
+    def factor(self) -> float:
+        """Entries of the factor."""
+        n = max(self.unknowns, 2.0)
+        return float(5 * n * np.log2(n) if self.dim == 2 else 22 * n ** (4 / 3))
+
+    @property
+    def memory(self) -> float:
+        """Bytes of stiffness, factor and answers."""
+        answers = self.patterns * self.dim * self.columns + self.patterns * self.temperatures
+        return NUMBER * (1.5 * self.matrix + WORKING * self.factor + answers)
+
+    @property
+    def seconds(self) -> float:
+        """Time of one core."""
+        factoring = FACTORING[self.dim] * self.unknowns ** (1.5 if self.dim == 2 else 2.0)
+        return float(factoring + 4 * self.factor * self.columns / SOLVING)
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What the set-up of both bodies and of their contact asks for; heat's own steps are not in it.
+
+    Attributes:
+        punch, strip: The bodies.
+        nodes: Contact nodes.
+        interfaces: Positions of the strip, and loads, that differ.
+        phases: Of the motion.
+    """
+
+    punch: BodyNeeds
+    strip: BodyNeeds
+    nodes: float
+    interfaces: int
+    phases: int
+
+    def coarser(self, times: float) -> Needs:
+        """Return the same of elements so many times as large."""
+        nodes = self.nodes * times ** (1 - self.punch.dim)
+        return Needs(self.punch.coarser(times), self.strip.coarser(times), nodes, self.interfaces, self.phases)
+
+    @property
+    def memory(self) -> float:
+        """Bytes at the end of the set-up, and in the first half-cycles."""
+        contact = (self.interfaces * self.punch.dim + 2 * self.phases + 1) * self.nodes**2
+        return self.punch.memory + self.strip.memory + NUMBER * contact
+
+    @property
+    def seconds(self) -> float:
+        """Time of one core."""
+        return self.punch.seconds + self.strip.seconds
+
+    def text(self) -> str:
+        """Say it in a line."""
+        unknowns = " and ".join(f"{body.unknowns:,.0f}" for body in (self.punch, self.strip))
+        return (
+            f"{unknowns} unknowns, {self.nodes:,.0f} contact nodes: the set-up takes about {_duration(self.seconds)} "
+            f"of one core and {_size(self.memory)}"
+        )
+
+    def fitting(self, memory: float) -> tuple[float, Needs] | None:
+        """Return how many times as large elements fit into so much memory, and what they need; None where none do."""
+        for times in np.geomspace(1.0, COARSEST, 121):
+            less = self.coarser(float(times))
+            if less.memory <= memory:
+                return float(times), less
+        return None
+
+
+def needs(placed: Placed, frames: tuple[bool, bool, bool]) -> Needs:
+    """Return what condensing the bodies and joining them will need; collective.
+
+    Args:
+        placed: The bodies opposite each other.
+        frames: Whether the strip moves as a whole, whether the contact frame stays, and whether the strip is flat.
+    """
+    moves, fixed, flat = frames
+    bodies, pair = placed.bodies, placed.pair
+    n, dim = len(pair.weights), pair.punch.dim
+    on_strip = len(pair.strip.trace) if moves else n
+    of_punch = _body(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
+    one = not moves or (fixed and flat)
+    of_strip = _body(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
+    interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
+    return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs))
+
+
+def _body(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> BodyNeeds:
+    size = elastic.stiffness.getSize()[0]
+    entries = elastic.stiffness.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+    return BodyNeeds(elastic.dim, size, entries, columns, patterns, size / elastic.dim if heat else 0.0)
+
+
+def check_memory(placed: Placed, wanted: Needs) -> None:
+    """Make sure that the set-up fits into the memory that is free; collective.
+
+    Raises:
+        CaseError: it does not; says which mesh would.
+    """
+    free = on_root(placed.comm, free_memory)
+    if free is None or wanted.memory <= max(free, SMALL):
+        return
+    message = f"{wanted.text()}, but {_size(free)} are free"
+    found = wanted.fitting(0.9 * free)
+    if found is not None:
+        times, less = found
+        message += f"; elements {times:.2g} times as large would fit: {less.text()}"
+    raise CaseError(InputError("geometry", message))
+
+
+def free_memory() -> float | None:
+    """Return the bytes that this process may still take; None where the system does not tell."""
+    found: list[float] = []
+    try:
+        lines = Path("/proc/meminfo").read_text("ascii").splitlines()
+        found += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
+    except (OSError, ValueError, IndexError):
+        pass
+    try:  # the limit of a container
+        limit, used = (Path(f"/sys/fs/cgroup/memory.{name}").read_text("ascii").strip() for name in ("max", "current"))
+        found += [] if limit == "max" else [float(limit) - float(used)]
+    except (OSError, ValueError):
+        pass
+    return min(found) if found else None
+
+
+def _size(memory: float) -> str:
+    return f"{memory / GIB:.1f} GiB" if memory > 0.1 * GIB else f"{memory / 2**20:.0f} MiB"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.1g} s" if seconds < 10 else f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} minutes" if seconds < 5400 else f"{seconds / 3600:.1f} hours"

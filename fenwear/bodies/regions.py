@@ -1,0 +1,33 @@
+"""Which material regions a contact surface belongs to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import facet_dofs
+from fenwear.bodies.elasticity import ElasticBody
+
+
+def contact_regions(body: ElasticBody) -> Mapping[str, Array]:
+    """Return the share of each material region in the pressure nodes (n,), by its name; collective.
+
+    A node between two regions belongs to both by halves.
+    """
+    mesh = body.body
+    local, cells = facet_dofs(mesh, body.space)
+    index_map = mesh.mesh.topology.index_map(mesh.mesh.topology.dim)
+    of_cell = np.zeros((index_map.size_local + index_map.num_ghosts, len(mesh.regions)))
+    for column, tag in enumerate(mesh.regions.values()):
+        of_cell[mesh.cell_tags.find(tag), column] = 1.0
+    blocks = body.space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64)
+    order = np.argsort(body.trace.blocks)
+    nodes = order[np.searchsorted(body.trace.blocks[order], blocks)]
+    sums = np.zeros((len(order), len(mesh.regions)))
+    np.add.at(sums, nodes, np.repeat(of_cell[cells], local.shape[1], axis=0))
+    mesh.mesh.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
+    shares = (sums / sums.sum(axis=1, keepdims=True))[body.surface.nodes]
+    return dict(zip(mesh.regions, shares.T, strict=True))

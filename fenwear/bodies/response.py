@@ -1,0 +1,187 @@
+"""How the contact surfaces of bodies answer to forces on them, each body solved on a rank of its own.
+
+Where the surface is small against the body, the Schur complement S of its degrees of freedom has all of
+the answer, (K^-1)_ss = S^-1. Else each column of forces is solved for: sparse right-hand sides, of which
+MUMPS leaves out what their zeros do not reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.factor import entries, moved
+from fenwear.bodies.schur import available
+from fenwear.parallel import total
+
+BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
+SURFACE_SHARE = 10  # entries of the factor for each of the Schur complement, from which on that pays
+
+Columns = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a body is to be condensed onto.
+
+    Attributes:
+        elastic: The body.
+        patterns: Share of each trace node in a unit force (N, q).
+        directions: One unit vector for each pattern (q, d); None for all axes.
+        thermal_coupling: G; needs one direction for each pattern.
+    """
+
+    elastic: ElasticBody
+    patterns: csr_array
+    directions: Array | None = None
+    thermal_coupling: PETSc.Mat | None = None
+
+    @property
+    def along(self) -> Array:
+        """The directions of each pattern (q, d, a)."""
+        q, d = self.patterns.shape[1], self.elastic.dim
+        return np.broadcast_to(np.eye(d), (q, d, d)) if self.directions is None else self.directions[:, :, None]
+
+    @property
+    def count(self) -> int:
+        """Number of columns q a."""
+        return int(self.patterns.shape[1] * self.along.shape[2])
+
+    def identity(self) -> list[object]:
+        """Return all that the answer follows from, on this rank."""
+        patterns, coupling = csr_array(self.patterns), self.thermal_coupling
+        values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
+        return [*self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
+
+    def forces(self, columns: NDArray[np.int64]) -> Array:
+        """Return the forces on the trace nodes of some columns (N, d, k): column l a is pattern l along direction a."""
+        count = self.along.shape[2]
+        along = self.along[columns // count, :, columns % count]
+        return np.einsum("Nk,kd->Ndk", self.patterns[:, columns // count].toarray(), along)
+
+    def seen(self, displacement: Array) -> Array:
+        """Return what the patterns see of displacements of the trace nodes (N, d, k), as (q, d, k)."""
+        q, d = self.patterns.shape[1], self.elastic.dim
+        product = self.patterns.T.tocsr() @ displacement.reshape(len(displacement), -1)
+        return np.asarray(product).reshape(q, d, -1)
+
+    @property
+    def by_surface(self) -> bool:
+        """Whether the body is eliminated down to its surface: where that is small against the factor.
+
+        The response to temperature needs the whole body's displacements.
+        """
+        surface = self.elastic.surface_dofs.size
+        small = surface**2 * SURFACE_SHARE <= entries(self.elastic.size, self.elastic.dim)
+        return self.thermal_coupling is None and small and available()
+
+
+def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | None]]:
+    """Return the response (q, d, q a) and that to temperature (q, owned), or None, of each body; collective.
+
+    Their factors are made. Each owner solves a block of columns of its body, then all share what they have
+    found: bodies of different owners are solved at once.
+    """
+    answers = [_Answer(one) for one in requests]
+    for number in range(max(len(answer.blocks) for answer in answers)):
+        working = [answer for answer in answers if number < len(answer.blocks)]
+        found = [answer.solve(answer.blocks[number]) for answer in working]
+        for answer, one in zip(working, found, strict=True):
+            answer.share(one)
+    return [answer.gathered() for answer in answers]
+
+
+class _Answer:
+    """The response of one body, as its blocks of columns are solved for."""
+
+    def __init__(self, request: Request) -> None:
+        """Bring to the owner what it needs; collective."""
+        self.request, self.factor = request, request.elastic.factor
+        elastic, coupling = request.elastic, request.thermal_coupling
+        self.comm: MPI.Comm = self.factor.comm
+        held = np.zeros(len(elastic.load))
+        held[elastic.supported] = 1.0
+        self._held = elastic.trace.pick(held[:, None])[:, :, 0].ravel() > 0
+        count = request.count
+        whole = request.by_surface and not self.factor.is_spread
+        self.blocks: list[Columns] = (
+            [np.arange(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK)]
+            if not whole
+            else [np.arange(count)]
+        )
+        self._coupling: csr_array | None = None
+        self._temperatures: NDArray[np.int64] | None = None
+        if coupling is not None:
+            self._temperatures = np.append(0, np.cumsum(self.comm.allgather(coupling.getLocalSize()[1])))
+            self._coupling = _rows(coupling) if self.factor.is_spread else _rows(moved(coupling, self.factor.owner))
+        self._response: list[Array] = []
+        self._by_temperature: list[Array] = []
+
+    def solve(self, columns: Columns) -> tuple[Array, Array | None] | None:
+        """Return the response to some columns and G^T times their solutions, where they are solved.
+
+        Collective where the factor is spread.
+        """
+        if not self.factor.is_here:
+            return None
+        elastic, forces = self.request.elastic, self.request.forces(columns)
+        at_surface = forces.reshape(-1, len(columns))
+        at_surface[self._held] = 0.0
+        if self.factor.is_spread:
+            solution = self.factor.solve(elastic.trace.place(at_surface.reshape(forces.shape)))
+            displacement = elastic.trace.pick(solution)
+        elif self.factor.schur is not None and self._coupling is None:
+            displacement = self.factor.solve_on_surface(at_surface)
+            displacement[self._held] = 0.0
+        else:
+            dofs = elastic.surface_dofs
+            nodes, which = np.nonzero(at_surface)
+            shape = (len(columns), elastic.size)
+            right = csr_array((at_surface[nodes, which], (which, dofs[nodes])), shape=shape)
+            solution = self.factor.solve_sparse(right)
+            displacement = solution[dofs]
+        warm = None if self._coupling is None else np.asarray(self._coupling.T @ solution)
+        return self.request.seen(displacement.reshape(forces.shape)), warm
+
+    def share(self, found: tuple[Array, Array | None] | None) -> None:
+        """Keep what was found for a block, and give each rank its part of the response to temperature; collective."""
+        if found is not None:
+            self._response.append(found[0])
+        if self._temperatures is None:
+            return
+        warm = None if found is None else found[1]
+        counts = np.diff(self._temperatures)
+        if self.factor.is_spread:
+            assert warm is not None
+            first, last = self._temperatures[self.comm.rank : self.comm.rank + 2]
+            self._by_temperature.append(np.ascontiguousarray(total(self.comm, warm)[first:last].T))
+            return
+        columns = self.comm.bcast(None if warm is None else warm.shape[1], root=self.factor.owner)
+        own = np.empty((counts[self.comm.rank], columns))
+        sent = None if warm is None else (np.ascontiguousarray(warm), (counts * columns).tolist())
+        self.comm.Scatterv(sent, own, root=self.factor.owner)
+        self._by_temperature.append(np.ascontiguousarray(own.T))
+
+    def gathered(self) -> tuple[Array, Array | None]:
+        """Return the whole response, on every rank, and this rank's part of that to temperature; collective."""
+        q, d = self.request.patterns.shape[1], self.request.elastic.dim
+        response = np.concatenate(self._response, axis=2) if self._response else np.empty((q, d, self.request.count))
+        if self.comm.size > 1:  # where it is spread, equal to the last bit on all ranks
+            self.comm.Bcast(response, root=self.factor.owner)
+        return response, np.concatenate(self._by_temperature) if self._by_temperature else None
+
+
+def _rows(matrix: PETSc.Mat | None) -> csr_array | None:
+    """Return this rank's rows of a matrix (owned, all columns)."""
+    if matrix is None:
+        return None
+    starts, columns, values = matrix.getValuesCSR()
+    return csr_array((values, columns, starts), shape=(len(starts) - 1, matrix.getSize()[1]))

@@ -1,0 +1,164 @@
+"""Maps of the contact surface of solids at chosen half-cycles, and cuts along and across the sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import xarray
+
+from fenwear.arrays import Array
+from fenwear.report.figures import pressure_top
+from fenwear.report.style import GREY, WIDTH, legend_beside, panels, shades
+from fenwear.report.surface import Surface, centre_of_wear, surface_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LEVELS = 16
+LONG = 2.2  # length over height of a map from which on fewer stand beside each other
+EDGE_OF_CONTACT = 1e-2  # of the largest pressure
+
+
+class Quantity(NamedTuple):
+    """What a map shows: a variable of the history, on which body's surface, and how."""
+
+    variable: str
+    body: str
+    title: str
+    unit: str
+    factor: float
+    colours: str
+
+
+def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
+    """Return what there are maps of, by the figure's name."""
+    found = {
+        "pressure_map": Quantity("pressure", "punch", "Contact pressure", "MPa", 1.0, "YlGnBu"),
+        "wear_map": Quantity("wear", "punch", "Worn depth of the punch", "µm", 1e3, "YlOrBr"),
+        "wear_strip_map": Quantity("wear_strip", "strip", "Worn depth of the strip", "µm", 1e3, "YlOrBr"),
+        "temperature_map": Quantity(
+            "temperature_punch", "punch", "Temperature of the punch's contact surface", "K", 1.0, "YlOrRd"
+        ),
+        "temperature_strip_map": Quantity(
+            "temperature_strip", "punch", "Temperature of the strip's surface below the punch", "K", 1.0, "YlOrRd"
+        ),
+    }
+    return {name: q for name, q in found.items() if q.variable in history}
+
+
+def map_figure(history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int]) -> Figure:
+    """Draw a quantity on its surface at each chosen half-cycle.
+
+    All have the same colours, but worn depths, which are shown over the largest one of each half-cycle.
+    """
+    from matplotlib import colormaps
+
+    surface = surface_of(history, quantity.body)
+    values = quantity.factor * history[quantity.variable].sel(half_cycle=list(half_cycles)).values
+    relative = quantity.variable.startswith("wear")
+    largest = values.max(axis=1)
+    if relative:
+        values = values / np.where(largest > 0, largest, 1.0)[:, None]
+        levels, extend = np.linspace(0, 1, 11), "neither"
+    else:
+        levels, extend = _levels(history, quantity, values, half_cycles)
+    figure, axes = _map_panels(surface, len(half_cycles))
+    drawn: Any = None
+    for number, (n, ax) in enumerate(zip(half_cycles, axes, strict=True)):
+        found, most = values[number], float(largest[number])
+        triangles, shown = surface.drawn(np.clip(found, levels[0], None))
+        drawn = ax.tricontourf(triangles, shown, levels=levels, cmap=colormaps[quantity.colours], extend=extend)
+        title = f"n = {n:,}"
+        if quantity.variable == "pressure":
+            _contact_edge(ax, surface, found)
+            title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
+        size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
+        ax.set_title(f"{title}\n≤ {size} {quantity.unit}", loc="left")
+    every: Any = axes
+    bar = figure.colorbar(drawn, ax=every, shrink=min(1.0, 3.5 / figure.get_figheight()), aspect=25)
+    name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
+    bar.set_label("depth over the largest of its half-cycle" if relative else f"{name} ({quantity.unit})")
+    arrow = ", with the strip's way" if quantity.variable == "pressure" else ""
+    figure.suptitle(f"{quantity.title} in half-cycle n{arrow}", x=0.01, ha="left", fontsize="medium")
+    return figure
+
+
+def _map_panels(surface: Surface, count: int) -> tuple[Figure, list[Any]]:
+    """Return a figure of equal maps with the surface's border on each."""
+    from matplotlib import rc_context
+    from matplotlib.collections import LineCollection
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    size = np.ptp(surface.map, axis=0)
+    columns = min(count, 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3)
+    rows = -(-count // columns)
+    height = rows * (min(max((WIDTH - 1.6) / columns * size[1] / size[0], 0.9), 4.5) + 0.55) + 0.8
+    with rc_context({"axes.titlesize": "small"}):
+        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for ax in axes.ravel()[count:]:
+        ax.set_visible(False)
+    for ax in axes.ravel()[:count]:
+        ax.add_collection(LineCollection(list(surface.border), colors=GREY, linewidths=0.8))
+        ax.set_aspect("equal")
+        ax.margins(0.03)
+        ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
+    for column in range(columns):  # the last row may be shorter
+        lowest = axes[max(row for row in range(rows) if row * columns + column < count), column]
+        lowest.set_xlabel(f"{surface.names[0]} (mm)")
+        lowest.tick_params(labelbottom=True)
+    for ax in axes[:, 0]:
+        ax.set_ylabel(f"{surface.names[1]} (mm)")
+    return figure, list(axes.ravel()[:count])
+
+
+def _levels(
+    history: xarray.Dataset, quantity: Quantity, values: Array, half_cycles: Sequence[int]
+) -> tuple[Array, Any]:
+    """Return the steps of the colours, and whether what is above them is cut off."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = float(values.min()), float(values.max())
+    cut = False
+    if quantity.variable == "pressure":
+        low, top = 0.0, pressure_top(history, half_cycles)
+        cut, high = high > top, min(high, top)
+    low = 0.0 if 0 < low < high / 2 else low
+    levels = MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high if high > low else low + 1.0)
+    return np.asarray(levels), "max" if cut else "neither"
+
+
+def _contact_edge(ax: Any, surface: Surface, pressure: Array) -> None:
+    """Draw where contact ends."""
+    level = EDGE_OF_CONTACT * float(pressure.max())
+    if pressure.min() < level < pressure.max():
+        ax.tricontour(*surface.drawn(pressure), levels=[level], colors="black", linewidths=1.0)
+
+
+def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], *, along: bool) -> Figure:
+    """Draw pressure, worn depths and temperatures along or across the sliding through the middle of the wear."""
+    drawn = list(quantities(history).values())
+    figure, axes = panels(len(drawn), 2.3, share_x=False)
+    at = centre_of_wear(history)
+    for ax, quantity in zip(axes, drawn, strict=True):
+        surface = surface_of(history, quantity.body)
+        for colour, n in shades(half_cycles):
+            values = quantity.factor * history[quantity.variable].sel(half_cycle=n).values
+            ax.plot(*surface.cut(values, at, along=along), color=colour, label=f"{n:,}")
+        ax.set_title(quantity.title, loc="left")
+        ax.set_ylabel(f"{'p' if quantity.variable == 'pressure' else 'w' if 'wear' in quantity.variable else 'T'} "
+                      f"({quantity.unit})")  # fmt: skip
+        if quantity.variable == "pressure":
+            ax.set_ylim(0, pressure_top(history, half_cycles))
+        elif "wear" in quantity.variable:
+            ax.set_ylim(bottom=0)
+        ax.margins(x=0.01)
+        legend_beside(ax, "half-cycle")
+    place, other = (float(at[1]), "across") if along else (float(at[0]), "along")
+    grain = 1e-4 * float(np.ptp(surface_of(history).sliding, axis=0).max())
+    place = round(place / grain) * grain
+    axes[-1].set_xlabel(f"place {'along' if along else 'across'} the sliding (mm), at {place:.4g} mm {other} it")
+    return figure

@@ -1,0 +1,141 @@
+"""A contact surface read back from history.nc: triangles to draw on, and cuts along and across the sliding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+
+if TYPE_CHECKING:
+    from matplotlib.tri import Triangulation
+
+POINTS = 301  # along a cut
+AXES = ("x", "y", "z")
+ARROWS = "→↗↑↖←↙↓↘"
+
+
+def model_of(history: xarray.Dataset) -> str:
+    """Return "plane", "axisymmetric" or "solid"."""
+    return str(history.attrs.get("model", "plane"))
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The contact surface of a body of a solid model, n nodes.
+
+    Attributes:
+        body: "punch" or "strip".
+        x: Coordinates (n, 3), mm.
+        cells: Nodes around each part of the surface (f, 3 or 4).
+        sliding: Places along and across the sliding (n, 2), mm.
+        seen: The two axes that are left when it is seen along its normal.
+    """
+
+    body: str
+    x: Array
+    cells: NDArray[np.int64]
+    sliding: Array
+    seen: tuple[int, int]
+
+    @cached_property
+    def triangles(self) -> NDArray[np.int64]:
+        """Nodes of triangles (t, 3)."""
+        return np.concatenate([self.cells[:, [0, k, k + 1]] for k in range(1, self.cells.shape[1] - 1)])
+
+    @cached_property
+    def map(self) -> Array:
+        """Coordinates on a map (n, 2), mm."""
+        return self.x[:, list(self.seen)]
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Names of the map's axes."""
+        return AXES[self.seen[0]], AXES[self.seen[1]]
+
+    @cached_property
+    def border(self) -> Array:
+        """Segments around the map (m, 2, 2), mm."""
+        edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+        single, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+        return self.map[single[counts == 1]]
+
+    def drawn(self, values: Array) -> tuple[Triangulation, Array]:
+        """Return triangles of the map and values at their corners: four around the middle of each quadrilateral.
+
+        Args:
+            values: At the nodes (n,).
+        """
+        from matplotlib.tri import Triangulation
+
+        points, triangles = self.map, self.triangles
+        if self.cells.shape[1] == 4:
+            middle = len(points) + np.arange(len(self.cells))
+            points = np.concatenate([points, points[self.cells].mean(axis=1)])
+            values = np.concatenate([values, values[self.cells].mean(axis=1)])
+            around = [(self.cells[:, k], self.cells[:, (k + 1) % 4], middle) for k in range(4)]
+            triangles = np.concatenate([np.stack(corners, axis=1) for corners in around])
+        return Triangulation(points[:, 0], points[:, 1], triangles), values
+
+    def arrow(self, direction: int) -> str:
+        """Return the arrow that is nearest to the strip's way on the map."""
+        arm = self.map - self.map.mean(axis=0)
+        slope, *_ = np.linalg.lstsq(arm, self.sliding[:, 0] - self.sliding[:, 0].mean(), rcond=None)
+        return ARROWS[round(np.arctan2(direction * slope[1], direction * slope[0]) / (np.pi / 4)) % 8]
+
+    def cut(self, values: Array, at: Array, *, along: bool) -> tuple[Array, Array]:
+        """Return places along or across the sliding and the values there, NaN beside the surface.
+
+        Args:
+            values: At the nodes (n,).
+            at: The point that the cut goes through: its places along and across the sliding, mm.
+            along: Along the sliding, or across it.
+        """
+        from matplotlib.tri import LinearTriInterpolator, Triangulation
+
+        free, fixed = (0, 1) if along else (1, 0)
+        # Where a track is closed, triangles between its two ends lie all over it.
+        size = np.ptp(self.sliding[self.triangles, 0], axis=1)
+        whole = size < 0.5 * max(float(np.ptp(self.sliding[:, 0])), 1e-300)
+        kept = self.triangles[whole] if whole.any() else self.triangles
+        plane = Triangulation(self.sliding[:, free], self.sliding[:, fixed], kept)
+        places = np.linspace(self.sliding[:, free].min(), self.sliding[:, free].max(), POINTS)
+        found: Any = LinearTriInterpolator(plane, values)(places, np.full(POINTS, at[fixed]))
+        return places, np.asarray(found.filled(np.nan))
+
+
+def surface_of(history: xarray.Dataset, body: str = "punch") -> Surface:
+    """Return the contact surface of a body that the history of a solid has."""
+    end = "" if body == "punch" else "_strip"
+    x = np.column_stack([history[f"{axis}{end}"].values for axis in AXES])
+    sliding = np.column_stack([history[f"{name}{end}"].values for name in ("along", "across")])
+    of_punch = np.column_stack([history[axis].values for axis in AXES])
+    seen_along = int(np.argmin(np.ptp(of_punch, axis=0)))
+    first, second = (k for k in range(3) if k != seen_along)
+    return Surface(body, x, history[f"facets{end}"].values, sliding, (first, second))
+
+
+def centre_of_wear(history: xarray.Dataset) -> Array:
+    """Return the places along and across the sliding of the centre of what is worn off at the end (2,), mm.
+
+    Of the punch, or of the strip where it alone wears; of the contact where nothing is worn yet.
+    """
+    last = history.isel(half_cycle=-1)
+    for end in ("", "_strip"):
+        if f"wear{end}" not in last:
+            continue
+        volume = (last[f"wear{end}"] * last[f"weight{end}"]).values
+        if volume.sum() > 0:
+            return np.array([np.average(last[f"{name}{end}"].values, weights=volume) for name in ("along", "across")])
+    return np.array([np.average(last[name].values, weights=last.weight.values) for name in ("along", "across")])
+
+
+def radial(history: xarray.Dataset, end: str = "") -> tuple[Array, str]:
+    """Return where the nodes of rings lie along their contact, mm, and what the axis of a figure says of it."""
+    r, z = history[f"r{end}"].values, history[f"z{end}"].values
+    return (r, "radius r (mm)") if np.ptp(r) >= np.ptp(z) else (z, "height z (mm)")

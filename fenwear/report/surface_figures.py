@@ -1,0 +1,160 @@
+"""Figures of solids and rings, drawn from the history of a run: maps and cuts, or lines over the radius; series."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
+
+from fenwear.report.course import (
+    by_direction,
+    convergence_figure,
+    directions_present,
+    half_cycle_axis,
+    heat_balance_figure,
+    mark_few,
+    mean_pressure,
+    nominal_width,
+)
+from fenwear.report.figures import chosen_half_cycles, nearest_half_cycles, pressure_top
+from fenwear.report.maps import cuts_figure, map_figure, quantities
+from fenwear.report.program import program_figure
+from fenwear.report.style import direction_style, legend_beside, panels, reference_line, run_style, shades
+from fenwear.report.surface import model_of, radial
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MAPS = 6  # at most
+
+
+def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str, Figure]:
+    """Draw every figure that the history of a solid or of rings has data for, by its name."""
+    chosen = chosen_half_cycles(history, wanted)
+    if model_of(history) == "solid":
+        shown = chosen[-MAPS:]
+        drawn = {name: map_figure(history, quantity, shown) for name, quantity in quantities(history).items()}
+        drawn["cuts_along"] = cuts_figure(history, chosen, along=True)
+        drawn["cuts_across"] = cuts_figure(history, chosen, along=False)
+    else:
+        drawn = {"shape": ring_shape_figure(history, chosen), "pressure": ring_pressure_figure(history, chosen)}
+        if "max_temperature" in history:
+            drawn["temperature"] = ring_temperature_figure(history, chosen)
+    drawn["peaks"] = series_figure(history)
+    if "load_factor" in history:
+        drawn["program"] = program_figure(history)
+    drawn["convergence"] = convergence_figure(history)
+    if "max_temperature" in history:
+        drawn["heat_balance"] = heat_balance_figure(history)
+    return drawn
+
+
+def conforms(history: xarray.Dataset) -> bool:
+    """Return whether the unworn surfaces lie on each other, so that the load over their area says something."""
+    return bool(history.attrs.get("conforming", 1))
+
+
+def series_figure(history: xarray.Dataset) -> Figure:
+    """Draw over the half-cycles: largest pressure, area in contact, depth and size of the scars, and temperature."""
+    sizes = [n for n in ("scar_length", "scar_width") if n in history or f"{n}_strip" in history]
+    hot = "max_temperature" in history
+    figure, axes = panels(4 + hot, 2.3)
+    pressure, area, depth, size, *rest = axes
+    by_direction(pressure, history, "max_pressure")
+    pressure.set_title("Largest contact pressure", loc="left")
+    pressure.set_ylabel("pressure (MPa)")
+    if conforms(history):
+        mean = mean_pressure(history)
+        reference_line(pressure, mean, f"mean {mean:.2f}")
+    by_direction(area, history, "contact_area")
+    area.set_title("Area in contact", loc="left")
+    area.set_ylabel("area (mm²)")
+    if conforms(history):
+        nominal = nominal_width(history)
+        reference_line(area, nominal, f"nominal area {nominal:.4g}")
+        area.set_ylim(top=1.15 * nominal)
+    _of_bodies(depth, history, {"max_wear": "worn depth"}, 1e3)
+    depth.set_title("Largest worn depth", loc="left")
+    depth.set_ylabel("depth (µm)")
+    _of_bodies(size, history, {name: name.removeprefix("scar_") for name in sizes}, 1.0)
+    size.set_title("Size of the scars along and across the sliding" if len(sizes) > 1 else "Width of the scars",
+                   loc="left")  # fmt: skip
+    size.set_ylabel("size (mm)")
+    for ax in rest:
+        by_direction(ax, history, "max_temperature")
+        ax.set_title("Largest temperature of the contact surfaces, at the end of each half-cycle", loc="left")
+        ax.set_ylabel("temperature (K)")
+    for ax in axes[:4]:
+        ax.set_ylim(bottom=0)
+    legend_beside(pressure, "strip moves")
+    half_cycle_axis(axes[-1], history)
+    return figure
+
+
+def _of_bodies(ax: Axes, history: xarray.Dataset, names: dict[str, str], factor: float) -> None:
+    """Draw variables of both bodies over the half-cycles."""
+    number = 0
+    for name, text in names.items():
+        for end, body in (("", "punch"), ("_strip", "strip")):
+            if f"{name}{end}" in history:
+                style = {**run_style(number), **mark_few(history.half_cycle)}
+                ax.plot(history.half_cycle, factor * history[f"{name}{end}"], label=f"{body}: {text}", **style)
+                number += 1
+    legend_beside(ax, "")
+
+
+def ring_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+    """Draw the pressure over the radius in both directions, at each chosen half-cycle and the one beside it."""
+    present = directions_present(history)
+    figure, axes = panels(len(present), 3.2, share_y=True)
+    x, label = radial(history)
+    for ax, d in zip(axes, present, strict=True):
+        one_way = history.isel(half_cycle=np.flatnonzero(history.direction.values == d))
+        for colour, n in shades(nearest_half_cycles(one_way, half_cycles)):
+            ax.plot(x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
+        name, *_ = direction_style(history, d)
+        ax.set_title(f"Contact pressure while the strip turns {name}", loc="left")
+        ax.set_ylabel("contact pressure p (MPa)")
+        ax.set_ylim(0, pressure_top(history, half_cycles))
+        if conforms(history):  # named in the legend: lines that wear evenly run along it
+            mean = mean_pressure(history)
+            ax.axhline(mean, color="0.5", linewidth=0.8, linestyle=":", label=f"mean {mean:.2f}")
+        legend_beside(ax, "half-cycle")
+        ax.margins(x=0.01)
+    axes[-1].set_xlabel(label)
+    return figure
+
+
+def ring_shape_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+    """Draw what is worn off both rings over the radius at the chosen half-cycles."""
+    bodies = [("punch", "")] + ([("strip", "_strip")] if "wear_strip" in history else [])
+    figure, axes = panels(len(bodies), 3.2)
+    for ax, (body, end) in zip(axes, bodies, strict=True):
+        x, label = radial(history, end)
+        for colour, n in shades(half_cycles):
+            ax.plot(x, 1e3 * history[f"wear{end}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
+        ax.set_title(f"Worn shape: depth off the {body}", loc="left")
+        ax.set_ylabel("worn depth w (µm)")
+        ax.set_ylim(bottom=0)
+        ax.margins(x=0.01)
+        legend_beside(ax, "after half-cycle")
+    axes[-1].set_xlabel(label)
+    return figure
+
+
+def ring_temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+    """Draw the temperature of both contact surfaces over the radius at the chosen half-cycles."""
+    figure, axes = panels(2, 3.0)
+    x, label = radial(history)
+    for ax, body in zip(axes, ("punch", "strip"), strict=True):
+        for colour, n in shades(half_cycles):
+            ax.plot(x, history[f"temperature_{body}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
+        ax.set_title(f"Temperature of the {body}'s contact surface", loc="left")
+        ax.set_ylabel("temperature (K)")
+        ax.margins(x=0.01)
+        legend_beside(ax, "after half-cycle")
+    axes[-1].set_xlabel(label)
+    return figure

@@ -1,0 +1,198 @@
+"""One picture of the contact surface that can be turned and zoomed in a browser, without a network.
+
+plotly's own script goes into the page, compressed: the browser unpacks it. Rings are shown as they are, turned about
+their axis.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import xarray
+from markupsafe import Markup
+
+from fenwear.arrays import Array
+from fenwear.report.figures import pressure_top
+from fenwear.report.maps import Quantity, quantities
+from fenwear.report.surface import model_of, surface_of
+
+AROUND = 72  # parts of a ring
+RAISED = 0.15  # of the surface's size: the largest worn depth as it is drawn
+COLOURS = {"YlGnBu": "YlGnBu", "YlOrBr": "YlOrBr", "YlOrRd": "YlOrRd"}
+HEIGHT = 560  # pixels
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A part of a page that runs a script.
+
+    Attributes:
+        html: The part.
+        nonce: By which the page's policy knows the script for its own; no other may run.
+    """
+
+    html: Markup
+    nonce: str
+
+
+def turned_map(history: xarray.Dataset, half_cycles: Sequence[int]) -> Turned:
+    """Return worn surfaces, coloured by pressure, worn depth or temperature at each half-cycle.
+
+    Raises:
+        ImportError: plotly is missing.
+        OSError: its script is.
+    """
+    # json.dumps leaves "</" alone, which would end a script.
+    data = json.dumps(turned_figure(history, half_cycles), separators=(",", ":"), allow_nan=False)
+    data = data.replace("<", "\\u003c")
+    packed = _packed_script()
+    nonce = hashlib.sha256(data.encode()).hexdigest()[:32]
+    html = Markup(_PAGE).format(height=HEIGHT, nonce=nonce, data=Markup(data), script=Markup(packed))
+    return Turned(html, nonce)
+
+
+@lru_cache(maxsize=1)
+def _packed_script() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), compresslevel=6, mtime=0)).decode()
+
+
+def turned_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[str, Any]:
+    """Return the figure as plotly takes it: a mesh for each quantity, a button for each, a slider over half-cycles."""
+    import plotly.graph_objects as go
+
+    shown = list(quantities(history).values())
+    traces, frames = [], []
+    for number, n in enumerate(half_cycles):
+        meshes = [_mesh(history, quantity, n, half_cycles) for quantity in shown]
+        frames.append(go.Frame(name=f"{n:,}", data=meshes))
+        if number == len(half_cycles) - 1:
+            traces = meshes
+    for k, trace in enumerate(traces):
+        trace.visible = k == 0
+    figure = go.Figure(data=traces, layout=_layout(shown, half_cycles))
+    found: dict[str, Any] = figure.to_plotly_json()
+    # What changes from half-cycle to half-cycle alone, so that the chosen quantity stays.
+    steps = [
+        {"x": [m.x for m in f.data], "y": [m.y for m in f.data], "z": [m.z for m in f.data],
+         "intensity": [m.intensity for m in f.data]}
+        for f in frames
+    ]  # fmt: skip
+    for step, change in zip(found["layout"]["sliders"][0]["steps"], steps, strict=True):
+        step["args"] = [change]
+    return dict(_plain(found))
+
+
+def _layout(shown: Sequence[Quantity], half_cycles: Sequence[int]) -> dict[str, Any]:
+    pick = [
+        {"label": q.title, "method": "update", "args": [{"visible": [other is q for other in shown]}]} for q in shown
+    ]
+    steps = [{"label": f"{n:,}", "method": "restyle", "args": [{}]} for n in half_cycles]
+    slider = {
+        "steps": steps,
+        "active": len(half_cycles) - 1,
+        "currentvalue": {"prefix": "half-cycle "},
+        "pad": {"b": 30, "l": 10, "r": 20},
+    }
+    return {
+        "height": HEIGHT,
+        "margin": {"l": 0, "r": 0, "t": 50, "b": 20},
+        "updatemenus": [{"buttons": pick, "x": 0, "y": 1.1, "xanchor": "left", "yanchor": "top"}],
+        "sliders": [slider],
+        "scene": {
+            "aspectmode": "data",
+            "xaxis": {"title": "x (mm)"},
+            "yaxis": {"title": "y (mm)"},
+            "zaxis": {"title": "z, worn depth raised", "showticklabels": False},
+            "camera": {"eye": {"x": 1.2, "y": -1.7, "z": 1.1}},
+        },
+    }
+
+
+def _mesh(history: xarray.Dataset, quantity: Quantity, half_cycle: int, half_cycles: Sequence[int]) -> Any:
+    """Return a quantity on its surface, whose worn depth is raised so that it can be seen."""
+    import plotly.graph_objects as go
+
+    x, triangles, repeat = _solid_or_rings(history, quantity.body)
+    end = "_strip" if quantity.body == "strip" else ""
+    depth = history[f"wear{end}"].sel(half_cycle=half_cycle).values
+    most = float(history[f"wear{end}"].max())
+    # Seen from the gap: what is worn off is a hollow.
+    raised = x[:, 2] - (RAISED * float(np.ptp(x, axis=0).max()) / most if most > 0 else 0.0) * np.tile(depth, repeat)
+    values = quantity.factor * history[quantity.variable]
+    low, high = float(values.min()), float(values.max())
+    if quantity.variable == "pressure":
+        low, high = 0.0, min(high, pressure_top(history, half_cycles))
+    i, j, k = triangles.T
+    return go.Mesh3d(
+        x=_short(x[:, 0]), y=_short(x[:, 1]), z=_short(raised), i=i.tolist(), j=j.tolist(), k=k.tolist(),
+        intensity=_short(np.tile(values.sel(half_cycle=half_cycle).values, repeat)),
+        cmin=low, cmax=high if high > low else low + 1.0, colorscale=COLOURS[quantity.colours],
+        colorbar={"title": quantity.unit, "len": 0.7}, name=quantity.title, showscale=True,
+        hovertemplate=f"%{{intensity:.4g}} {quantity.unit}<br>x = %{{x:.4g}} mm, y = %{{y:.4g}} mm",
+        lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
+    )  # fmt: skip
+
+
+def _solid_or_rings(history: xarray.Dataset, body: str) -> tuple[Array, Any, int]:
+    """Return points (m, 3), triangles (t, 3), and how often the nodes' values are repeated around the axis."""
+    if model_of(history) == "solid":
+        surface = surface_of(history, body)
+        return surface.x, surface.triangles, 1
+    end = "_strip" if body == "strip" else ""
+    r, z, edges = history[f"r{end}"].values, history[f"z{end}"].values, history[f"facets{end}"].values
+    turn = 2 * np.pi * np.arange(AROUND + 1)[:, None] / AROUND
+    x = np.stack([r * np.cos(turn), r * np.sin(turn), z + 0 * turn], axis=-1).reshape(-1, 3)
+    here = len(r) * np.arange(AROUND)[:, None, None] + edges
+    there = here + len(r)
+    first = np.stack([here[..., 0], here[..., 1], there[..., 1]], axis=-1)
+    second = np.stack([here[..., 0], there[..., 1], there[..., 0]], axis=-1)
+    return x, np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)]), AROUND + 1
+
+
+def _short(values: Array) -> list[float]:
+    """Return values with as many digits as can be seen."""
+    return [float(f"{v:.5g}") for v in values]
+
+
+def _plain(value: Any) -> Any:
+    """Return plotly's own types and arrays as lists and dictionaries."""
+    if hasattr(value, "to_plotly_json"):
+        return _plain(value.to_plotly_json())
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+_PAGE = """<div id="turned" style="height: {height}px"></div>
+<noscript>Scripts are switched off: the figures above show the same without them.</noscript>
+<script type="application/json" id="turned-data">{data}</script>
+<script type="application/octet-stream" id="turned-script">{script}</script>
+<script nonce="{nonce}">
+(async () => {{
+  const place = document.getElementById("turned");
+  try {{
+    const packed = Uint8Array.from(atob(document.getElementById("turned-script").textContent), (c) => c.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    const script = document.createElement("script");
+    script.nonce = "{nonce}";
+    script.textContent = await new Response(stream).text();
+    document.head.appendChild(script);
+    const figure = JSON.parse(document.getElementById("turned-data").textContent);
+    await Plotly.newPlot(place, figure.data, figure.layout, {{responsive: true, displaylogo: false}});
+  }} catch (error) {{
+    place.textContent = "This browser cannot draw the map: " + error;
+  }}
+}})();
+</script>"""

@@ -1,0 +1,143 @@
+"""What is kept on disk: taken where it fits, computed where it does not, and never in the way."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenwear import CaseError, Tribosystem, assemble, load_case
+from fenwear.bodies import factor, kept
+
+SMALL = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
+Setup = Callable[..., tuple[Tribosystem, int]]
+
+
+@pytest.fixture
+def setup(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Setup:
+    """Return setup(*settings): a system, with how many factors it took; what is kept is in a folder of the test."""
+    folder = MPI.COMM_WORLD.bcast(tmp_path_factory.mktemp("cache"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    monkeypatch.setenv(kept.LIMIT, "1")
+    monkeypatch.setattr(kept, "_told", [])
+    made: list[object] = []
+    compute = factor.Factor.compute
+    monkeypatch.setattr(factor.Factor, "compute", lambda self: (made.append(self), compute(self))[1])
+
+    def setup(*settings: str, name: str = "example1", fresh: bool = False) -> tuple[Tribosystem, int]:
+        made.clear()
+        system = assemble(load_case(name, [*SMALL, *settings]), heat="none", fresh=fresh)
+        return system, len(made)
+
+    return setup
+
+
+def same(one: Tribosystem, other: Tribosystem) -> bool:
+    """Return whether both bodies' answers are equal to the last bit."""
+    pairs = [(getattr(one.condensed, name), getattr(other.condensed, name)) for name in ("punch", "strip")]
+    return all(
+        a.arrays().keys() == b.arrays().keys() and all((a.arrays()[k] == b.arrays()[k]).all() for k in a.arrays())
+        for a, b in pairs
+    )
+
+
+@pytest.mark.parametrize("name", ["example1", "example1-heat"])
+@pytest.mark.mpi
+def test_a_second_start_factors_nothing(setup: Setup, name: str) -> None:
+    """And has the same bits; --fresh factors, and gives them, too."""
+    first, count = setup(name=name)
+    again, none = setup(name=name)
+    anew, both = setup(name=name, fresh=True)
+    assert (count, none, both) == (2, 0, 2)
+    assert same(first, again)
+    assert same(first, anew)
+
+
+@pytest.mark.parametrize(
+    ("setting", "count"),
+    [
+        ("contact.friction=0.1", 0),
+        ("motion.amplitude=1", 0),
+        ("materials.steel.young=2.1e5", 2),
+        ("materials.composite.poisson=0.2", 1),
+        ("punch.loads.0.force=['0 N', '-5 kN']", 1),
+        ("geometry.parameters.strip_height=90", 2),
+        ("model.thickness=11", 1),
+        ("geometry.degree=3", 2),
+    ],
+)
+def test_only_what_a_change_leaves_is_taken(
+    setup: Setup, monkeypatch: pytest.MonkeyPatch, setting: str, count: int
+) -> None:
+    """A body whose mesh, material, supports or loads differ is condensed anew, to what it is without a cache."""
+    setup()
+    changed, found = setup(setting)
+    assert found == count
+    monkeypatch.setenv(kept.LIMIT, "0")
+    assert same(changed, setup(setting)[0])
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed", "emptied", "another"])
+@pytest.mark.mpi
+def test_a_broken_file_is_computed_again(setup: Setup, damage: str) -> None:
+    """On every rank, though one of them alone finds it broken."""
+    first, _ = setup()
+    if MPI.COMM_WORLD.rank == 0:
+        path = sorted(kept.folder().glob("*-0of*.npz"))[0]
+        content = bytearray(path.read_bytes())
+        content[len(content) // 2] ^= 255
+        path.write_bytes(
+            {"cut": bytes(content[:900]), "changed": bytes(content), "emptied": b"", "another": b"text"}[damage]
+        )
+    MPI.COMM_WORLD.Barrier()
+    again, count = setup()
+    assert count == 1
+    assert same(first, again)
+    assert setup()[1] == 0
+
+
+def test_a_folder_that_cannot_be_written_is_told_once(setup: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    """And the set-up goes on."""
+    Path(os.environ["XDG_CACHE_HOME"], "fenwear").write_text("a file")
+    assert setup()[1] == 2
+    assert setup()[1] == 2
+    assert capsys.readouterr().err.count("set-ups are not kept in") == 1
+
+
+def test_a_full_disk_leaves_no_part_of_a_file(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor does it end the run."""
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez", full)
+    assert setup()[1] == 2
+    assert not list(kept.folder().iterdir())
+
+
+def test_the_longest_unused_goes_first(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Above the limit; and what a killed process has left goes, too."""
+    setup()
+    for path in kept.files():
+        os.utime(path, (1.0, 1.0))
+    old, largest = set(kept.files()), max(path.stat().st_size for path in kept.files())
+    left = kept.folder() / "killed.tmp"
+    left.write_text("a part")
+    os.utime(left, (1.0, 1.0))
+    monkeypatch.setenv(kept.LIMIT, str(2.5 * largest / 2**30))
+    setup("materials.steel.young=2.1e5")
+    assert kept.size() <= kept.limit()
+    assert not left.exists()
+    assert not old & set(kept.files())
+
+
+@pytest.mark.parametrize("text", ["much", "-1", "nan"])
+def test_a_limit_that_is_no_number_is_named(setup: Setup, monkeypatch: pytest.MonkeyPatch, text: str) -> None:
+    """Before anything is computed."""
+    monkeypatch.setenv(kept.LIMIT, text)
+    with pytest.raises(CaseError, match="FENWEAR_KEPT_GIB: expected a number of GiB, 0 to keep nothing"):
+        setup()

@@ -1,0 +1,212 @@
+"""Laws: coefficients of position, depth, distance, regions and one's own functions; threshold and cap."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fenwear
+from fenwear import Tribosystem, assemble, jump, load_case, make_case, march, steady
+from fenwear.case import Case, changed_case
+from fenwear.cycle.stability import growth_rate
+from fenwear.errors import CaseError, ConvergenceError
+from fenwear.life.model import Model
+from fenwear.sliding.wear import WornLayer
+
+Assemble = Callable[..., Tribosystem]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
+# One way, without friction: all pressures come to one that wears evenly.
+PLAIN = (*SMALL, "contact.friction=0", "motion={kind='one-way', direction='rightward', speed=100, duration=1}")
+MEAN = 1e4 / 600
+
+
+def law_of(system: Tribosystem, **given: Any) -> np.ndarray:
+    return system.wear.phases([system.conditions(0, **given)], [0]).punch.rate[0]
+
+
+def test_position(assembled: Assemble) -> None:
+    """Steady one-way wear is even: p = p_m (1 / k) / mean(1 / k), for any k(x)."""
+    system = assembled("example2", *PLAIN, "wear.punch.coefficient={expression='1e-8*(1 + (x/30)**2)'}")
+    state, x, weights = steady(system), system.pair.x, system.pair.weights
+    inverse = 1 / (1 + (x / 30) ** 2)
+    np.testing.assert_allclose(state.pressure[0], MEAN * inverse * weights.sum() / (weights @ inverse), rtol=1e-8)
+    np.testing.assert_allclose(system.optimum(1).pressure, state.pressure[0], rtol=1e-8)
+    assert system.constant_coefficients
+
+
+def two_linings(tmp_path: Any, *settings: str) -> Case:
+    """Return a case of two linings side by side on a plate, for x below and above zero."""
+    (tmp_path / "linings.geo").write_text("""
+For body In {0 : 1}
+  w = 10 + 5 * body; low = -5 * body; high = 5 - 5 * body;
+  p = newp; Point(p) = {-w, low, 0}; Point(p + 1) = {0, low, 0}; Point(p + 2) = {w, low, 0};
+  Point(p + 3) = {w, high, 0}; Point(p + 4) = {0, high, 0}; Point(p + 5) = {-w, high, 0};
+  l = newl; Line(l) = {p, p + 1}; Line(l + 1) = {p + 1, p + 2}; Line(l + 2) = {p + 2, p + 3};
+  Line(l + 3) = {p + 3, p + 4}; Line(l + 4) = {p + 4, p + 5}; Line(l + 5) = {p + 5, p}; Line(l + 6) = {p + 1, p + 4};
+  Transfinite Curve{l, l + 1, l + 3, l + 4} = 9; Transfinite Curve{l + 2, l + 5, l + 6} = 5;
+  c = newll; Curve Loop(c) = {l, l + 6, l + 4, l + 5}; Curve Loop(c + 1) = {l + 1, l + 2, l + 3, -l - 6};
+  s = news; Plane Surface(s) = {c}; Plane Surface(s + 1) = {c + 1};
+  first~{body} = s; line~{body} = l;
+EndFor
+Transfinite Surface{:}; Recombine Surface{:};
+Physical Surface("punch_left") = {first_0}; Physical Surface("punch_right") = {first_0 + 1};
+Physical Surface("strip_body") = {first_1, first_1 + 1};
+Physical Curve("punch_contact") = {line_0, line_0 + 1}; Physical Curve("punch_top") = {line_0 + 3, line_0 + 4};
+Physical Curve("punch_sides") = {line_0 + 2, line_0 + 5};
+Physical Curve("strip_contact") = {line_1 + 3, line_1 + 4}; Physical Curve("strip_bottom") = {line_1, line_1 + 1};
+""")
+    data = {
+        "geometry": {"file": "linings.geo", "degree": 2, "follow_wear": "never"},
+        "materials": {"steel": {"young": 2e5, "poisson": 0.3}},
+        "punch": {
+            "regions": {"punch_left": "steel", "punch_right": "steel"},
+            "supports": [{"on": "punch_sides", "fix": ["x"]}],
+            "loads": [{"on": "punch_top", "force": [0, -1000]}],
+        },
+        "strip": {"regions": {"strip_body": "steel"}, "supports": [{"on": "strip_bottom", "fix": ["x", "z"]}]},
+        "wear": {"punch": {"coefficient": {"regions": {"punch_left": 1e-8, "punch_right": 3e-8}}}},
+        "motion": {"kind": "one-way", "direction": "rightward", "speed": 10, "duration": 1},
+        "run": {"half_cycles": 10},
+    }
+    return changed_case(make_case(data, tmp_path), *settings) if settings else make_case(data, tmp_path)
+
+
+def test_two_linings_side_by_side(tmp_path: Any) -> None:
+    """Each wears as its region says: in the end three times the pressure on the lining that wears a third."""
+    system = assemble(two_linings(tmp_path))
+    x = system.pair.x
+    rate = law_of(system)
+    np.testing.assert_allclose(rate[x < -0.1], 1e-7, rtol=1e-12)
+    np.testing.assert_allclose(rate[x > 0.1], 3e-7, rtol=1e-12)
+    np.testing.assert_allclose(rate[abs(x) < 1e-9], 2e-7, rtol=1e-12)
+    pressure = steady(system).pressure[0]
+    # k p is the same everywhere, the node between at the mean coefficient.
+    np.testing.assert_allclose(rate * pressure, (rate * pressure).mean(), rtol=1e-8)
+    assert pressure @ system.pair.weights == pytest.approx(1000, rel=1e-9)
+    with pytest.raises(CaseError, match=r"wear\.punch.coefficient.regions.punch_middle: no such region"):
+        two_linings(tmp_path, "wear.punch.coefficient={regions={punch_left=1e-8, punch_middle=1}}")
+
+
+def test_coating_worn_through(assembled: Assemble) -> None:
+    """A coating of 0.05 mm and k_1 on a substrate of k_2 = 5 k_1, k straight between them over h = 0.5 um.
+
+    At the mean pressure d = k_1 p s up to 0.05 mm, then h more over h ln(k_2 / k_1) / ((k_2 - k_1) p), then k_2 p s.
+    """
+    table = "{table=[[0, 1e-6], [0.05, 1e-6], [0.0505, 5e-6], [1, 5e-6]], of='depth'}"
+    system = assembled("example2", *PLAIN, "motion.duration=0.1", f"wear.punch.coefficient={table}")
+    steps, weights = 750, system.pair.weights  # of 10 mm
+    through = 0.05 / (1e-6 * MEAN) + 5e-4 * np.log(5) / (4e-6 * MEAN)
+    exact = 0.0505 + 5e-6 * MEAN * (10 * steps - through)
+    *_, marched = march(system, steps, implicit=True, block=50)
+    assert weights @ marched.wear[-1] / weights.sum() == pytest.approx(exact, rel=2e-3)
+    assert np.ptp(marched.wear[-1]) < 0.01 * exact
+    errors, counts = [], []
+    for tolerance in (3e-2, 3e-3):
+        blocks = list(jump(system, steps, tolerance=tolerance, block=1))
+        errors.append(abs(weights @ blocks[-1].wear[-1] / weights.sum() / exact - 1))
+        counts.append(len(blocks))
+        depths = [float(block.wear[-1].max()) for block in blocks]
+        assert any(0.045 < depth < 0.055 for depth in depths)  # no jump goes over the end of the coating
+    assert errors[1] < 3e-4
+    assert errors[1] < errors[0]
+    assert max(counts) < steps / 10
+
+
+def test_running_in(assembled: Assemble) -> None:
+    """k(s) = k_0 (1 + 9 exp(-s / s_0)): worn area = F / t times the integral of k; jumps as near as their tolerance."""
+    law = "{expression='1e-8 * (1 + 9 * exp(-s / 20000))'}"
+    system = assembled("example2", *PLAIN, f"wear.punch.coefficient={law}")
+    slid = 100.0 * 2000
+    exact = 1e-8 * 1000 * (slid + 9 * 20000 * (1 - np.exp(-slid / 20000)))
+    *_, last = march(system, 2000)
+    assert system.pair.weights @ last.wear[-1] == pytest.approx(exact, rel=1e-5)  # the middle of each step
+    errors = []
+    for tolerance in (3e-2, 1e-3):
+        *_, last = jump(system, 2000, tolerance=tolerance)
+        errors.append(abs(system.pair.weights @ last.wear[-1] / exact - 1))
+    assert errors[1] < 1e-3
+    assert errors[1] < errors[0]
+
+
+def test_threshold_and_cap(assembled: Assemble) -> None:
+    """Below the threshold nothing wears, above it what is more; beyond the cap no more; slopes by differences."""
+    law = "wear.punch={coefficient=1e-8, pressure_threshold=5, pressure_cap=20, pressure_exponent=2}"
+    system = assembled("example2", *PLAIN, law)
+    wear = system.phases_wear
+    p = np.resize(np.array([0.0, 4.0, 6.0, 15.0, 25.0]), (1, len(system.pair.x)))
+    depths = 1e-8 * 100 * np.resize(np.array([0.0, 0.0, 1.0, 100.0, 225.0]), p.shape)
+    np.testing.assert_allclose(wear.depth(p), depths, rtol=1e-12)
+    layer, change = WornLayer(wear, 3.0), np.full_like(p, 1e-6)
+    left, right = layer.border(p)
+    derivative = np.einsum("knq,jqi,ji->kn", left, right, change)
+    differences = (layer.opening(p + change) - layer.opening(p - change)) / 2
+    np.testing.assert_allclose(derivative, differences, atol=1e-6 * np.abs(differences).max())
+    # A flat punch at less than the threshold wears at its edges until nothing is above it.
+    light = assembled("example2", *PLAIN, "wear.punch={coefficient=1e-5, pressure_threshold=20}")
+    *_, last = jump(light, 20000, tolerance=1e-2)
+    assert last.pressure[-1].max() < 20.1
+    assert last.pressure[0].max() <= 20.1 or last.pressure[0].max() > last.pressure[-1].max()
+    with pytest.raises(ConvergenceError, match="pressure_threshold"):
+        steady(light)
+
+
+def test_own_law_in_python(assembled: Assemble) -> None:
+    """A registered function is a law like an expression; a case that names one that is not registered is refused."""
+    with pytest.raises(CaseError, match="no law 'mine' is registered"):
+        load_case("example2", ["wear.punch.coefficient={law='mine'}"])
+    fenwear.register_law("mine", lambda now: 1e-8 * (1 + now["p"] / 50))
+    try:
+        settings = (*SMALL, "run.half_cycles=10")
+        own = assemble(load_case("example2", [*settings, "wear.punch.coefficient={law='mine', unit='1/MPa'}"]))
+        same = assembled("example2", *settings, "wear.punch.coefficient={expression='1e-8*(1 + p/50)'}")
+        one, other = (next(march(system, 10)).wear[-1] for system in (own, same))
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+        np.testing.assert_allclose(steady(own).pressure, steady(same).pressure, rtol=1e-9)
+        for wrong, message in (
+            (lambda now: now["p"][:3], "expected one for each of"),
+            (lambda now: now["p"] * np.nan, "expected zero or more, got nan"),
+            (lambda now: -1e-8, "expected zero or more, got -1e-08"),
+            (lambda now: now["depth"], "the law 'mine' fails: 'depth'"),
+        ):
+            fenwear.register_law("mine", wrong)
+            with pytest.raises(CaseError, match=message):
+                next(march(own, 2))
+    finally:
+        fenwear.case.dependence._LAWS.clear()
+    with pytest.raises(CaseError, match="expected a word"):
+        fenwear.register_law("my law", abs)
+    with pytest.raises(CaseError, match="expected a function"):
+        fenwear.register_law("mine", 3)
+    with pytest.raises(CaseError, match="expected a list of some of T, p, v, x, y, z, depth, s, got 'q'"):
+        fenwear.register_law("mine", abs, of=["p", "q"])
+
+
+def test_what_changes_for_ever_has_no_steady_state(assembled: Assemble) -> None:
+    """A law of depth or distance is refused, by its key, where a state that repeats is asked for."""
+    system = assembled("example2", *SMALL, "contact.friction={expression='0.2 + 0.1*exp(-s)'}")
+    assert system.passing_laws == ["contact.friction"]
+    with pytest.raises(ConvergenceError, match=r"contact\.friction changes with the worn depth or the distance"):
+        steady(system)
+    with pytest.raises(CaseError, match=r"contact\.friction"):
+        growth_rate(system, np.full((2, len(system.pair.x)), MEAN))
+    with pytest.raises(CaseError, match=r"contact\.friction: depends on"):
+        Model(system.case)
+
+
+@pytest.mark.parametrize(
+    ("setting", "expected"),
+    [
+        ("wear.punch.coefficient={expression='1e-8*depht'}", "'depht' is not known"),
+        ("wear.punch.coefficient={table=[['5 mm', 1], [6, 2]], of='depth'}", "another kind|expected a number"),
+        ("wear.punch.coefficient={table=[[5, 1], [4, 2]], of='depth'}", "rising arguments"),
+        ("wear.punch.coefficient={expression='1', law='a'}", "give one of expression, table, regions and law"),
+        ("wear.punch={coefficient=1e-8, pressure_threshold=5, pressure_cap=4}", "more than pressure_threshold"),
+        ("wear.punch.coefficient={table=[[0, 1], [1, 2]], of='dept'}", "did you mean 'depth'"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong(setting: str, expected: str) -> None:
+    with pytest.raises(CaseError, match=expected):
+        load_case("example2", [setting])

@@ -1,0 +1,82 @@
+"""What a set-up takes, told before it is spent."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable
+
+import pytest
+
+from fenwear import CaseError, load_case
+from fenwear.assembly import elastic, needs_of, place_case, tribosystem
+from fenwear.assembly import needs as module
+from fenwear.assembly.needs import GIB, BodyNeeds, Needs, free_memory, needs
+
+COARSE = ("geometry.degree=1", "geometry.order=1")
+
+
+def solid(unknowns: float, nodes: float) -> Needs:
+    """Return the needs of two equal solids."""
+    body = BodyNeeds(3, unknowns, 150 * unknowns, nodes, nodes, 0.0)
+    return Needs(body, body, nodes, 1, 2)
+
+
+def test_a_large_solid() -> None:
+    """151,000 unknowns and 2,401 nodes in each body were measured with 4.9 GiB, 118 s: within half as much again."""
+    found = solid(155_000, 2401)
+    assert 4.9 / 1.5 < found.memory / GIB < 1.5 * 4.9
+    assert 118 / 1.5 < found.seconds < 2 * 118
+    assert "155,000 and 155,000 unknowns, 2,401 contact nodes" in found.text()
+
+
+def test_coarser_elements() -> None:
+    """Twice as large: an eighth of the unknowns of a solid, a quarter of its nodes; the answer just fits."""
+    found = solid(80_000, 400).coarser(2.0)
+    assert (found.punch.unknowns, found.punch.columns, found.nodes) == (10_000, 100, 100)
+    plane = BodyNeeds(2, 400.0, 4e3, 20.0, 20.0, 0.0).coarser(2.0)
+    assert (plane.unknowns, plane.columns) == (100, 10)
+    large = solid(1e6, 1e4)
+    fits = large.fitting(8 * GIB)
+    assert fits is not None
+    assert 0.9 * 8 * GIB < fits[1].memory <= 8 * GIB < large.memory
+    assert large.fitting(1.0) is None
+
+
+def test_columns_of_frames() -> None:
+    """One direction each where the frame stays; a strip that moves as a whole is asked for all nodes of its trace."""
+    ball = place_case(load_case("ball-on-flat", COARSE))
+    found = needs_of(ball)
+    assert found.punch.columns == len(ball.pair.weights)
+    assert found.strip.columns == len(ball.pair.strip.trace)
+    assert (found.interfaces, found.phases) == (5, 10)
+    curved = needs(ball, (True, False, False))
+    assert curved.strip.columns == 3 * found.strip.columns
+    assert curved.memory > found.memory
+    flat = needs_of(place_case(load_case("example1")))
+    assert flat.punch.columns == flat.strip.columns == 65
+    assert flat.interfaces == 1
+
+
+def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Refused before anything is factored, with the mesh that would fit."""
+    placed = place_case(load_case("ball-on-flat", COARSE))
+    monkeypatch.setattr(module, "SMALL", 0.0)
+    monkeypatch.setattr(module, "free_memory", lambda: needs_of(placed).memory / 3)
+    monkeypatch.setattr(tribosystem, "condense_bodies", lambda _placed: pytest.fail("condensed all the same"))
+    with pytest.raises(CaseError, match=r"geometry: .* unknowns, .* are free; elements 1\.\d times as large would fit"):
+        elastic(placed)
+
+
+def test_free_memory() -> None:
+    """The system tells, here."""
+    free = free_memory()
+    assert free is not None
+    assert free > 0
+
+
+@pytest.mark.process
+def test_check_tells(fenwear: Callable[..., subprocess.CompletedProcess[str]]) -> None:
+    """The sizes come first, and linear tetrahedra are a last resort."""
+    done = fenwear("check", "example1")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.startswith("4,810 and 12,506 unknowns, 65 contact nodes: the set-up takes about")

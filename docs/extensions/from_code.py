@@ -16,6 +16,7 @@ from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
 from fenwear.results import history, sheet, surfaces
+from fenwear.stick import results as stick
 from fenwear.verify.suite import registered
 
 
@@ -128,7 +129,9 @@ class Results(Written):
             "Where the strip wears": history.STRIP_VARIABLES,
             "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
             "With heat": {**history.HEAT_VARIABLES, **heat},
+            "With heat.track": history.BULK,
             "Of solids and rings instead, or as well": _of_surfaces(),
+            "With contact.law = coulomb, these alone": stick.VARIABLES,
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

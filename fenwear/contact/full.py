@@ -10,6 +10,8 @@ change of the active set factors the whole system again.
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_array
@@ -90,7 +92,12 @@ class FullContact:
             lower.array[self._free : self._free + n] = 0.0
         self._bounds = (lower, upper)
         self.snes = PETSc.SNES().create(self.comm)
-        self.snes.setFunction(self._residual, self._x.duplicate())
+        own = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
+
+        def residual(snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
+            own._residual(snes, x, f)
+
+        self.snes.setFunction(residual, self._x.duplicate())
         self.snes.setJacobian(lambda snes, x, J, P: None, self._operator)
         configure(self.snes, "fenwear_full_contact_")
         self.snes.setTolerances(atol=1e-9)  # the rounding of a system with all displacements in it

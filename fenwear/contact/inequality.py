@@ -11,6 +11,7 @@ kept. Where the result fulfils all conditions it is the solution; where it does 
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -119,16 +120,17 @@ class Inequality:
     def _make(self, prefix: str, line_search: str) -> PETSc.SNES:
         comm, size = PETSc.COMM_SELF, len(self._lower)
         snes = PETSc.SNES().create(comm)
+        own = weakref.proxy(self)  # Python does not see what PETSc holds: a circle through it would never be freed
 
         def residual(_snes: PETSc.SNES, x: PETSc.Vec, f: PETSc.Vec) -> None:
-            f.array_w[:] = self._function(x.array_r)
+            f.array_w[:] = own._function(x.array_r)
 
         def update(_snes: PETSc.SNES, x: PETSc.Vec, J: PETSc.Mat, _P: PETSc.Mat) -> None:
-            self._operator = self._jacobian(x.array_r)
+            own._operator = own._jacobian(x.array_r)
             J.assemble()
 
         snes.setFunction(residual, PETSc.Vec().createSeq(size, comm=comm))
-        snes.setJacobian(update, _shell(size, _Matrix(self)))
+        snes.setJacobian(update, _shell(size, _Matrix(own)))
         configure(snes, prefix, line_search)
         bounds = [np.clip(b, PETSc.NINFINITY, PETSc.INFINITY) for b in (self._lower, self._upper)]
         snes.setVariableBounds(*(PETSc.Vec().createWithArray(b, comm=comm) for b in bounds))
@@ -273,5 +275,9 @@ class _Solver:
             context.inequality.singular = True
             pc.setFailedReason(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
-    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        y.array_w[:] = 0.0 if self.solve is None else self.solve(x.array_r)
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        try:
+            y.array_w[:] = 0.0 if self.solve is None else self.solve(x.array_r)
+        except np.linalg.LinAlgError:  # of a large set, whose factor was put off
+            pc.getOperators()[1].getPythonContext().inequality.singular = True
+            pc.setFailedReason(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)

@@ -10,15 +10,20 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csc_array, csr_array
 
 from fenwear.arrays import Array
+from fenwear.contact.krylov import NotSolvedError, iterative
 
 Indices = NDArray[np.int32]
 Solve = Callable[[Array], Array]
 SINGULAR = 1e-14  # of the largest entry: a pivot that is rounding
 LARGE = 300  # unknowns above which a factor follows its set; below it a new one costs as little
 UPDATES = 0.1  # of the unknowns of a factor: what may have come and gone before a new one is made
+ITERATED = 1000  # unknowns from which on a set that is far from the factor's may be solved by iterations
+FACTOR, COLUMN = 0.03, 0.1  # products that cost as much: a factor for each unknown, a column of an update (measured)
+ITERATIONS = 40  # that a solution takes, before there was one
+BORDERS = 12  # rows without a diagonal entry, as the balance of forces has none, that iterations go with
 DENSE = 400  # unknowns up to which one elimination of the whole beats one for each block
 
 
@@ -55,16 +60,33 @@ class Updating:
 
     whose Schur complement has as many rows as unknowns have come and gone. Columns once solved for are kept.
 
+    A large set that is far from K is solved by iterations, until as much was spent on them as a factor costs: so
+    whatever comes, it takes about twice the time at most of who knows it before. Costs are counted, not measured by a
+    clock: every process comes to the same decision.
+
     Args:
         entries: Returns the numbers of some rows and columns.
+        diagonal: The numbers on the diagonal (size,); without them there are no iterations.
+        multiply: The product with the whole matrix; None to have that of the entries.
+        cost: Of that product, in entries of a matrix in memory that could be multiplied meanwhile.
 
     Attributes:
         base: What was eliminated last.
+        iterations: All that there were.
     """
 
-    def __init__(self, entries: Callable[[Indices, Indices], Array]) -> None:
-        self._entries = entries
+    def __init__(
+        self,
+        entries: Callable[[Indices, Indices], Array],
+        diagonal: Array | None = None,
+        multiply: Callable[[Array], Array] | None = None,
+        cost: float | None = None,
+    ) -> None:
+        self._entries, self._multiply, self._diagonal, self._cost = entries, multiply, diagonal, cost
         self.base: _Base | None = None
+        self.iterations = 0
+        self._expected = ITERATIONS
+        self._spent = 0.0  # on iterations since the last factor, in entries
         self._columns: dict[int, Array] = {}  # solutions by the base of what has come or gone
 
     def factor(self, kept: Indices) -> Solve:
@@ -79,14 +101,70 @@ class Updating:
             out = np.setdiff1d(base.kept, kept, assume_unique=True)
             if not len(into) + len(out):
                 return base.solve
-            if len(into) + len(out) <= UPDATES * len(base.kept):
+            if len(into) + len(out) <= UPDATES * len(base.kept) and self._update_pays(base, into, out):
                 return self._updated(base, kept, into, out)
-        self.base, self._columns = None, {}
+        if self._diagonal is not None and len(kept) >= ITERATED and self._spent < FACTOR * len(kept) ** 3:
+            solve = self._by_iterations(kept, self._diagonal)
+            if solve is not None:
+                return solve
+        return self._eliminated(kept)
+
+    def _update_pays(self, base: _Base, into: Indices, out: Indices) -> bool:
+        """Return whether what has come and gone costs less than iterations."""
+        size = len(base.kept)
+        if self._diagonal is None or size < ITERATED:
+            return True
+        new = sum(int(i) not in self._columns for i in (*into, *out))
+        return COLUMN * new * size**2 <= self._expected * self._product_cost(size)
+
+    def _product_cost(self, size: int) -> float:
+        return float(size**2) if self._cost is None or self._multiply is None else self._cost
+
+    def _eliminated(self, kept: Indices) -> Solve:
+        self.base, self._columns, self._spent = None, {}, 0.0
         solve = eliminate(self._entries(kept, kept))
         place = np.full(int(kept.max(initial=0)) + 1, -1)
         place[kept] = np.arange(len(kept))
         self.base = _Base(kept, place, solve)
         return solve
+
+    def _by_iterations(self, kept: Indices, diagonal: Array) -> Solve | None:
+        """Return the solution operator by GMRES; None where the matrix is none for it."""
+        own = diagonal[kept]
+        border = np.flatnonzero(np.abs(own) <= SINGULAR * np.abs(own).max(initial=0.0))
+        if len(border) > BORDERS:
+            return None
+        near, multiply = _bordered(own, border, kept, self._entries), self._product(kept)
+        try:
+            solve = iterative(multiply, near, lambda iterations: self._count(iterations, len(kept)))
+        except np.linalg.LinAlgError:
+            return None
+
+        def solve_or_eliminate(b: Array) -> Array:
+            try:
+                return solve(b)
+            except NotSolvedError:
+                return self._eliminated(kept)(b)
+
+        return solve_or_eliminate
+
+    def _count(self, iterations: int, size: int) -> None:
+        self.iterations += iterations
+        self._expected = iterations
+        self._spent += iterations * self._product_cost(size)
+
+    def _product(self, kept: Indices) -> Callable[[Array], Array]:
+        """Return the product with the rows and columns `kept`."""
+        if self._multiply is None:
+            matrix = self._entries(kept, kept)
+            return lambda x: matrix @ x
+        multiply, whole = self._multiply, np.zeros(len(self._diagonal if self._diagonal is not None else kept))
+
+        def product(x: Array) -> Array:
+            whole[kept] = x.ravel()
+            return multiply(whole)[kept]
+
+        return product
 
     def _updated(self, base: _Base, kept: Indices, into: Indices, out: Indices) -> Solve:
         size, come = len(base.kept), len(into)
@@ -121,12 +199,27 @@ class Updating:
         return solve
 
 
+def _bordered(
+    own: Array, border: NDArray[np.int64], kept: Indices, entries: Callable[[Indices, Indices], Array]
+) -> csc_array:
+    """Return the diagonal of some rows and columns, with the whole of those rows and columns that have none."""
+    size, inner = len(kept), np.setdiff1d(np.arange(len(kept)), border)
+    parts = [(inner, inner, own[inner])]
+    if len(border):
+        rows, columns = entries(kept[border], kept), entries(kept[inner], kept[border])
+        every = np.arange(size)
+        parts.append((np.repeat(border, size), np.tile(every, len(border)), rows.ravel()))
+        parts.append((np.repeat(inner, len(border)), np.tile(border, len(inner)), columns.ravel()))
+    i, j, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return csc_array(coo_array((values, (i, j)), shape=(size, size)))
+
+
 class Dense:
     """A matrix of numbers (size, size)."""
 
     def __init__(self, matrix: Array) -> None:
         self.matrix = matrix
-        self._updating = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)])
+        self._updating = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)], matrix.diagonal())
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""

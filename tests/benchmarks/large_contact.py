@@ -1,11 +1,12 @@
 """Contacts of thousands of nodes: a sphere on a half-space that wears, by an operator and by a dense matrix.
 
-python3 tests/benchmarks/large_contact.py [--dense] [--steps N]
+python3 tests/benchmarks/large_contact.py [--beside] [--steps N] [--loads F F ...]
 
 Square grids of 2,025, 4,900 and 10,000 nodes, constant pressure on each square (Love 1929), friction
 none, the load given. Each implicit wear step is one inequality in p and the approach; products go
-by fast Fourier transform, the factor is that of the nodes in contact and follows them. --dense gives the
-same steps with the matrix of all nodes beside it. Times are of the process, memory the most it had.
+by fast Fourier transform, the factor is that of the nodes in contact and follows them; a large set that comes at once
+is iterated. --beside gives the same steps with factors alone, and with the matrix of all nodes. --loads changes
+the load from step to step, so that hundreds of nodes come and go. Times are of the process, memory the most it had.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import argparse
 import os
 import resource
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -31,7 +32,7 @@ WEAR, LOAD, RADIUS = 5e-4, 6.6e-4, 8.0  # gap worn by unit pressure in a step; m
 class HalfSpace:
     """Influence of pressures on a square grid on the gap, with wear, the approach and the balance of forces."""
 
-    def __init__(self, side: int) -> None:
+    def __init__(self, side: int, *, iterated: bool = True) -> None:
         self.side, n = side, side * side
         h = 2 / side
         far = h * np.arange(side)
@@ -41,7 +42,8 @@ class HalfSpace:
         padded = np.where(np.arange(2 * side) == side, 0, 1)
         self.kernel = scipy.fft.rfft2(self.table[np.ix_(wrapped, wrapped)] * np.outer(padded, padded))
         self.at = np.divmod(np.arange(n), side)
-        self.updating = Updating(self.entries)
+        diagonal = np.append(np.full(n, self.table[0, 0]), 0.0)
+        self.updating = Updating(self.entries, diagonal if iterated else None, self.multiply, 170.0 * n)
 
     def multiply(self, x: Array) -> Array:
         """Return S p - a and the mean of p."""
@@ -78,14 +80,21 @@ def love(x: Array, y: Array, half: float) -> Array:
     )
 
 
-def wear(side: int, steps: int, *, dense: bool) -> tuple[list[float], list[int], list[int], Array]:
-    """Return time, Newton iterations and nodes in contact of each step, and the last pressures."""
+def wear(side: int, steps: int, way: str, loads: Sequence[float]) -> tuple[list[float], list[int], list[int], Array]:
+    """Return time, Newton iterations and nodes in contact of each step, and the last pressures.
+
+    Args:
+        side: Nodes along a side of the square.
+        steps: How many.
+        way: "iterated", "factors" or "dense".
+        loads: Of one step after the other, over and over.
+    """
     n = side * side
-    space = HalfSpace(side)
+    space = HalfSpace(side, iterated=way == "iterated")
     every = np.arange(n + 1, dtype=np.int32)
-    operator = Dense(space.entries(every, every)) if dense else space
+    operator = Dense(space.entries(every, every)) if way == "dense" else space
     middle = (2 * (np.arange(side) + 0.5) / side - 1) ** 2 / (2 * RADIUS)
-    gap = np.append((middle[:, None] + middle).ravel(), -LOAD)
+    gap = np.append((middle[:, None] + middle).ravel(), 0.0)
     solver = Inequality(
         np.append(np.zeros(n), -np.inf),
         np.full(n + 1, np.inf),
@@ -98,6 +107,7 @@ def wear(side: int, steps: int, *, dense: bool) -> tuple[list[float], list[int],
     times, iterations, touching = [], [], []
     for step in range(steps):
         begin = time.process_time()
+        gap[-1] = -LOAD * loads[step % len(loads)]
         x = solver.solve(x, near=step > 0)
         gap[:-1] += WEAR * x[:-1]
         times.append(time.process_time() - begin)
@@ -123,7 +133,8 @@ def report(name: str, side: int, run: Callable[[], tuple[list[float], list[int],
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description="Contacts of thousands of nodes.")
-    parser.add_argument("--dense", action="store_true")
+    parser.add_argument("--beside", action="store_true")
+    parser.add_argument("--loads", type=float, nargs="*", default=[1.0])
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--sides", type=int, nargs="*", default=[45, 70, 100])
     arguments = parser.parse_args()
@@ -131,11 +142,10 @@ def main() -> None:
     print("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for side in arguments.sides:
         few = min(arguments.steps, 50)
-        one = report("operator", side, lambda: wear(side, arguments.steps, dense=False))  # noqa: B023
-        if arguments.dense:
-            other = report("dense", side, lambda: wear(side, few, dense=True))  # noqa: B023
-            if few == arguments.steps:
-                print(f"largest difference of pressure: {np.abs(one - other).max() / other.max():.0e}")
+        ways = [("iterated", arguments.steps), *([("factors", few), ("dense", few)] if arguments.beside else [])]
+        last = [report(way, side, lambda: wear(side, steps, way, arguments.loads)) for way, steps in ways]  # noqa: B023
+        if arguments.beside and few == arguments.steps:
+            print(f"largest difference of pressure: {max(np.abs(p - last[0]).max() for p in last) / last[0].max():.0e}")
 
 
 if __name__ == "__main__":

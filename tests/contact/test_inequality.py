@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -9,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fenwear import ConvergenceError
+from fenwear import ConvergenceError, Tribosystem, steady
 from fenwear.arrays import Array
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Dense, Phases, Updating, WornShape
@@ -224,3 +228,79 @@ def test_worn_shape(seed: int, m: int, local: bool) -> None:
     scale = np.linalg.norm(whole, 2) * np.abs(x).max()
     np.testing.assert_allclose(whole @ x, b, rtol=0, atol=1e-12 * scale)
     np.testing.assert_allclose(x, np.linalg.solve(whole, b), rtol=0, atol=1e-14 * scale * np.linalg.cond(whole))
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_large_sets_by_iterations(monkeypatch: pytest.MonkeyPatch, whole: bool) -> None:
+    """Sets that change by many nodes, with and without a balance of forces: as by elimination, by iterations or not."""
+    monkeypatch.setattr("fenwear.contact.operators.ITERATED", 40)
+    random = np.random.default_rng(3)
+    n = 400
+    matrix, b = np.zeros((n + 1, n + 1)), random.uniform(-1, 1, n + 1)
+    matrix[:n, :n] = compliance(n, 0.3, 3)[0] + 0.02 * np.eye(n)
+    matrix[:n, n], matrix[n, :n] = -1.0, random.uniform(0.5, 1.5, n) / n
+    products = (lambda x: matrix @ x, 10.0 * n) if whole else (None, None)
+    factors = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)], matrix.diagonal(), *products)
+    eliminated, iterated = set(), 0
+    for step in range(30):
+        free = np.append(random.uniform(size=n) < 0.7, step % 3 > 0)
+        if step % 5 == 0:
+            kept = np.flatnonzero(free).astype(np.int32)
+        before = factors.iterations
+        x = factors.factor(kept)(b[kept])
+        iterated += factors.iterations > before
+        eliminated.add(id(factors.base))
+        exact = np.linalg.solve(matrix[np.ix_(kept, kept)], b[kept])
+        np.testing.assert_allclose(x, exact, rtol=0, atol=1e-8 * np.abs(exact).max())
+    assert iterated >= 5
+    assert len(eliminated) >= 2  # iterations that have cost as much as a factor are followed by one
+
+
+def test_iterations_that_fail_are_followed_by_an_elimination(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A matrix whose diagonal says nothing of it; and a set that is singular, iterated or not."""
+    monkeypatch.setattr("fenwear.contact.operators.ITERATED", 40)
+    monkeypatch.setattr("fenwear.contact.krylov.RESTARTS", 1)
+    random = np.random.default_rng(5)
+    matrix = random.uniform(-1, 1, (300, 300))
+    factors = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)], matrix.diagonal())
+    every = np.arange(300, dtype=np.int32)
+    b = random.uniform(-1, 1, 300)
+    exact = np.linalg.solve(matrix, b)
+    np.testing.assert_allclose(factors.factor(every)(b), exact, atol=1e-9 * np.abs(exact).max())
+    assert factors.iterations > 0
+    assert factors.base is not None
+    matrix[7] = 0.0
+    singular = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)], matrix.diagonal())
+    with pytest.raises(np.linalg.LinAlgError):
+        singular.factor(every)(b)
+
+
+def test_a_large_contact_by_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The inequality is solved as accurately by iterations as by factors; a singular set is an error in words."""
+    n = 300
+    matrix, gap = compliance(n, 0.3, 11)
+    exact = inequality(Dense(matrix), gap).solve(np.ones(n))
+    monkeypatch.setattr("fenwear.contact.operators.ITERATED", 20)
+    monkeypatch.setattr("fenwear.contact.operators.LARGE", 20)
+    solved: list[int] = []
+    count = Updating._count
+    monkeypatch.setattr(Updating, "_count", lambda self, *its: (solved.append(its[0]), count(self, *its))[1])
+    x = inequality(Dense(matrix), gap).solve(np.ones(n))
+    assert solved
+    np.testing.assert_allclose(x, exact, rtol=0, atol=1e-10 * exact.max())
+    twins = np.eye(400)
+    twins[3, 4] = twins[4, 3] = 1.0  # two nodes that are one, at different gaps
+    with pytest.raises(ConvergenceError, match="singular"):
+        inequality(Dense(twins), -1.0 - np.arange(400) / 400).solve(np.ones(400))
+
+
+def test_nothing_holds_a_solver_that_is_done(assembled: Callable[..., Tribosystem]) -> None:
+    """SNES holds callbacks, out of sight of Python's garbage collection: 38 MiB a steady state once stayed for ever."""
+    system = replace(assembled("example1", "geometry.degree=2", "geometry.parameters.elements_along_contact=8"))
+    seen = weakref.ref(system)
+    steady(system)
+    contact = system.phase_contact((0,))
+    contact.solve(system.gap(0, system.unworn()))
+    del system, contact
+    gc.collect()
+    assert seen() is None

@@ -112,6 +112,9 @@ def steady_command(
 
     begin = time.perf_counter()
     loaded = _load(case, settings)
+    if loaded.contact.law == "coulomb":
+        _print_final(case, loaded, as_json=as_json)
+        return
     system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
@@ -146,6 +149,17 @@ def steady_command(
             "warnings": warnings,
         }
     )
+
+
+def _print_final(name: str, case: Case, *, as_json: bool) -> None:
+    """Print the shape to which partial slip wears."""
+    from fenwear.stick.command import final_of, final_text
+
+    _, numbers = final_of(case)
+    if as_json:
+        _print_json(numbers)
+    else:
+        print(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
 
 
 def _coordinates(system: Tribosystem) -> dict[str, Any]:
@@ -229,6 +243,15 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     from fenwear.watch import initial_warnings
 
     loaded = _load(case, settings)
+    if loaded.contact.law == "coulomb":
+        from fenwear.stick.command import check_text
+
+        text = check_text(loaded)
+        for warning in doubts(loaded):
+            log(f"warning: {warning}")
+        print(loaded.to_toml())
+        log(text)
+        return
     placed = place_case(loaded)
     log(needs_of(placed).text())
     system = elastic(placed)

@@ -27,6 +27,25 @@ def test_nothing_wears_on_the_axis_itself() -> None:
         placed.optimum(1)
 
 
+def test_elements_that_fold() -> None:
+    """An arc of 45 degrees in a thin element: the chord of its neighbour lies beyond where its map folds."""
+    with pytest.raises(CaseError, match=r"geometry\.order: elements at the contact are so curved that they fold"):
+        place_case(load_case("pin-on-disc", ["geometry.parameters.around=2"]))
+
+
+def test_a_pin_that_turns_off_its_disc() -> None:
+    """The part of the disc that is meshed does not reach as far as the pin turns."""
+    motion = "motion={kind='oscillation', amplitude=1.0, period=1.0, positions=3}"
+    with pytest.raises(CaseError, match="motion: the stroke runs off the meshed strip: turned by"):
+        place_case(load_case("pin-on-disc", [*COARSE, motion, "wear.strip.coefficient=1e-9"]))
+
+
+def test_an_axis_that_leans() -> None:
+    """A disc that turns about an axis 3 degrees off its normal would not stay under the pad."""
+    with pytest.raises(CaseError, match=r"motion\.axis: .* none of revolution"):
+        place_case(load_case("brake-pad", [*COARSE, "motion.axis=[0, 0.05, 1]"]))
+
+
 def test_a_ball_that_leaves_its_flat() -> None:
     """The message names the motion and how far the strip reaches."""
     with pytest.raises(CaseError, match="motion: the stroke runs off the meshed strip: moved by"):

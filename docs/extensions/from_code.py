@@ -16,6 +16,7 @@ from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
 from fenwear.results import history, sheet, surfaces
+from fenwear.stick import results as stick
 from fenwear.verify.suite import registered
 
 
@@ -129,6 +130,7 @@ class Results(Written):
             "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
             "With heat": {**history.HEAT_VARIABLES, **heat},
             "Of solids and rings instead, or as well": _of_surfaces(),
+            "With contact.law = coulomb, these alone": stick.VARIABLES,
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

@@ -22,6 +22,7 @@ from fenwear.assembly.tribosystem import (
     with_reduced_heat,
 )
 from fenwear.case import Case, Heat, changed_case
+from fenwear.errors import CaseError, InputError
 from fenwear.sliding.wear import Worn
 
 
@@ -47,6 +48,9 @@ def assemble(
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
+    if case.contact.law == "coulomb":
+        reason = "expected 'gross-sliding' here: with 'coulomb', `run`, `check`, `steady` and fenwear.stick go on"
+        raise CaseError(InputError("contact.law", reason))
     system = elastic(place_case(case, comm, followed), fresh=fresh)
     if heat == "none":
         return system

@@ -18,11 +18,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
+from fenwear.errors import CaseError, InputError
 
 Indices: TypeAlias = NDArray[np.int64]
 
 SLACK = 1e-6  # of the surface's size: how far the first surface may reach beyond the second
 CURVED, CURVED_STEPS = 1e-13, 20  # of the surface's size: rounding of a point's place; Newton steps to it
+ASTRAY, FOLDED = 1e-9, 1e3  # of the surface's size: what Newton's method may leave, and where it has no end
 NOTHING = 1e-12  # of the smaller of two polygons: they share an edge up to rounding, no area
 RING = {"interval": [0, 1], "triangle": [0, 1, 2], "quadrilateral": [0, 1, 3, 2]}  # basix' corners in order around
 
@@ -252,16 +254,27 @@ def _pull_back_curved(surface: ChartedSurface, facet: Indices, s: Array) -> Arra
 
     Newton's method on s = sum of phi_a s_a over the facet's trace nodes, from the facet of straight edges on: the
     transfer then takes every node's own place to just this place, so that moments are kept.
+
+    Raises:
+        CaseError: a facet folds where the other surface's lies over it.
     """
     points = _pull_back(surface.cell, surface.corners, facet, s)
-    nodes = surface.s[surface.facets]
+    if not len(points):
+        return points
+    nodes, size = surface.s[surface.facets], surface.extent
     element = _element(surface.cell, surface.degree)
-    for _ in range(CURVED_STEPS if len(points) else 0):
+    for step in range(CURVED_STEPS + 1):
         table = element.tabulate(1, points)[..., 0]
         rest = s - np.einsum("qa,qad->qd", table[0], nodes[facet])
-        if np.abs(rest).max(initial=0.0) <= CURVED * surface.extent:
-            break
         slopes = np.einsum("cqa,qad->qdc", table[1:], nodes[facet])
+        largest = float(np.abs(rest).max())
+        if largest <= CURVED * size:
+            break
+        if step == CURVED_STEPS or not largest < FOLDED * size or not np.abs(np.linalg.det(slopes)).min() > 0:
+            if largest <= ASTRAY * size:
+                break
+            message = "elements at the contact are so curved that they fold; expected smaller ones there, or order 1"
+            raise CaseError(InputError("geometry.order", message))
         points = points + np.linalg.solve(slopes, rest[:, :, None])[:, :, 0]
     return points
 

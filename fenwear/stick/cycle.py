@@ -112,13 +112,16 @@ class Rig:
         pair = self.interface.middle.pair
         return Worn(np.zeros(len(pair.weights)), np.zeros(len(pair.strip.weights)))
 
-    def beginning(self) -> RigState:
+    def beginning(self, shape: Worn | None = None) -> RigState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
+
+        Args:
+            shape: Depths worn before; by default none.
 
         Raises:
             ConvergenceError: a step did not converge.
         """
-        interface, program, worn = self.interface, self.program, self.unworn()
+        interface, program, worn = self.interface, self.program, shape or self.unworn()
         loaded = interface.loaded(None if program.steps[-1].fraction is None else 0.0)
         opening = self.opening(interface.middle, worn)
         state, before = untouched(interface), Imposed(loaded.times(0), opening)

@@ -27,6 +27,7 @@ from fenwear.stick.cycle import Records, Rig, RigState
 from fenwear.stick.interface import Position
 
 GAMMA = 1 + np.sqrt(0.5)
+REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
 
 
@@ -140,7 +141,8 @@ def _attempt(rig: Rig, at: RigState, now: Cycle, cycles: int) -> tuple[RigState,
     missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
     area = np.concatenate([pair.weights, pair.strip.weights])
-    error = float(area @ np.abs(missing) / max(area @ (end - begin), 1e-300))
+    scale = area @ (end - begin) + REST * (area @ end)
+    error = float(area @ np.abs(missing) / max(scale, 1e-300))
     return at, replace(then, error=error)
 
 

@@ -16,23 +16,30 @@ from fenwear.sliding.wear import coefficient
 
 @dataclass(frozen=True)
 class BodyRate:
-    """The wear law of a body: beta~ at the nodes (n,), b and a."""
+    """The wear law of a body: beta~ at the nodes (n,), b and a; the pressures below and above which nothing changes."""
 
     rate: Array
     pressure_exponent: float
     speed_exponent: float
+    threshold: float = 0.0
+    cap: float = np.inf
+
+    def effective(self, pressure: Array) -> Array:
+        """Return what of the pressure (n,) wears, MPa."""
+        return np.clip(pressure, self.threshold, self.cap) - self.threshold
 
     def depth(self, pressure: Array, slid: Array, duration: float) -> Array:
         """Return the depth worn off (n,), mm, by pressure (n,) and slip (n,) in a time."""
         slide = slid if self.speed_exponent == 1 else slid**self.speed_exponent * duration ** (1 - self.speed_exponent)
-        return self.rate * pressure**self.pressure_exponent * slide
+        return self.rate * self.effective(pressure) ** self.pressure_exponent * slide
 
     def slope(self, pressure: Array, slid: Array, duration: float) -> Array:
         """Return the derivative of the depth to the pressure (n,), mm/MPa."""
         b = self.pressure_exponent
         slide = slid if self.speed_exponent == 1 else slid**self.speed_exponent * duration ** (1 - self.speed_exponent)
         floor = 1e-9 * max(float(pressure.max(initial=0.0)), 1e-300)
-        return self.rate * b * np.maximum(pressure, floor) ** (b - 1) * slide
+        changes = (pressure >= self.threshold) & (pressure <= self.cap)
+        return self.rate * b * np.maximum(self.effective(pressure), floor) ** (b - 1) * slide * changes
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,7 @@ def local_wear(
     """Return the wear by local slip of a case's laws.
 
     Raises:
-        CaseError: a coefficient depends on anything, or the pressure has a threshold or a cap.
+        CaseError: a coefficient depends on anything.
     """
     n = len(pair.weights)
     state = ContactConditions.at(np.full(n, mean_pressure))
@@ -65,12 +72,15 @@ def local_wear(
     for law, key in zip(laws, ("wear.punch", "wear.strip"), strict=True):
         if law is not None and isinstance(law.coefficient, Dependence):
             raise CaseError(InputError(f"{key}.coefficient", "expected a constant with contact.law = 'coulomb'"))
-        if law is not None and (law.pressure_threshold > 0 or law.pressure_cap is not None):
-            message = "expected neither pressure_threshold nor pressure_cap with contact.law = 'coulomb'"
-            raise CaseError(InputError(key, message))
         found.append(
             None
             if law is None
-            else BodyRate(coefficient(law, friction, state, key), law.pressure_exponent, law.speed_exponent)
+            else BodyRate(
+                coefficient(law, friction, state, key),
+                law.pressure_exponent,
+                law.speed_exponent,
+                law.pressure_threshold,
+                np.inf if law.pressure_cap is None else law.pressure_cap,
+            )
         )
     return LocalWear(found[0], found[1])

@@ -101,6 +101,18 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
     assert strip @ cycle.rate.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
 
 
+def test_wear_begins_at_a_pressure_and_ends_to_grow_at_another() -> None:
+    """Threshold and cap count at each node in each time step; sqrt(p) and the square of the speed, too."""
+    law = "wear.punch={coefficient='1e-8 1/MPa', pressure_threshold='200 MPa', pressure_cap='500 MPa'}"
+    records = next(iter(march(rig(law), 1))).records
+    expected = 1e-8 * (np.clip(records.pressure, 200, 500) - 200) * records.slid
+    assert records.punch_depth == pytest.approx(expected, rel=1e-12)
+    law = "wear.punch={coefficient=1e-8, pressure_exponent=0.5, speed_exponent=2}"
+    records = next(iter(march(rig(law), 1))).records
+    duration = 0.2 / 40
+    assert records.punch_depth == pytest.approx(1e-8 * records.pressure**0.5 * records.slid**2 / duration, rel=1e-12)
+
+
 def test_large_strokes_slide_as_a_whole() -> None:
     """Fretting of 25 um: pressures as of known direction; the bodies take 3 % of the stroke elastically."""
     settings = ["geometry.parameters.elements_along_contact=24", "motion.positions=9"]

@@ -1,0 +1,82 @@
+"""What `check` and `steady` say of a case with stick."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fenwear.case import Case
+from fenwear.errors import CaseError, InputError
+from fenwear.stick.cycle import Records
+from fenwear.stick.final import FinalShape, final_shape, stick_zone
+from fenwear.stick.run import check_touching
+from fenwear.stick.setup import make_rig
+
+
+def check_text(case: Case) -> str:
+    """Return what a case with stick comes to in its first cycle; collective.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong.
+        ConvergenceError: a time step did not converge.
+    """
+    rig = make_rig(case)
+    check_touching(rig)
+    records = Records.joined(rig.cycle(rig.beginning())[1])
+    thick, weights = case.model.thickness, rig.weights
+    closed = weights @ (records.pressure > 0).any(axis=0)
+    stuck = weights @ records.sticking.all(axis=0)
+    regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
+    if stuck == closed:
+        regime = "full stick"
+    return (
+        f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
+        f"first cycle: {regime}, "
+        f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
+        f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
+    )
+
+
+def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
+    """Return the final shape of a case's partial slip, and its key numbers; collective.
+
+    Raises:
+        CaseError: a model that is not plane, or what only the geometry can tell.
+        ConvergenceError: nothing sticks.
+    """
+    if case.model.kind != "plane":
+        raise CaseError(
+            InputError("model.kind", "`steady` of contact with stick is for plane models; Python takes solids")
+        )
+    rig = make_rig(case)
+    check_touching(rig)
+    found = final_shape(rig, stick_zone(rig))
+    x, weights = rig.interface.middle.pair.x, rig.weights
+    scar = x[found.depth > 0]
+    numbers = {
+        "stick_width_mm": float(weights @ found.stick),
+        "scar_from_mm": float(scar.min()) if len(scar) else None,
+        "scar_to_mm": float(scar.max()) if len(scar) else None,
+        "largest_depth_mm": float(found.depth.max()),
+        "worn_area_mm2": float(weights @ found.depth),
+        "max_pressure_MPa": float(found.pressure.max()),
+        "x": x.tolist(),
+        "pressure": found.pressure.tolist(),
+        "depth": found.depth.tolist(),
+    }
+    return found, numbers
+
+
+def final_text(numbers: dict[str, Any]) -> str:
+    """Return the key numbers of a final shape for readers."""
+    scar = "no scar"
+    if numbers["scar_from_mm"] is not None:
+        scar = f"scar from x = {numbers['scar_from_mm']:.4g} to {numbers['scar_to_mm']:.4g} mm"
+    return (
+        f"  the stick zone, {numbers['stick_width_mm']:.4g} mm wide, carries all of the load in the end\n"
+        f"  {scar}, {1e3 * numbers['largest_depth_mm']:.4g} µm deep in both bodies together, "
+        f"{numbers['worn_area_mm2']:.4g} mm²\n"
+        f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone: as high as nodes "
+        "are near to them"
+    )

@@ -1,0 +1,79 @@
+"""The shape to which partial slip wears in the end, directly.
+
+Wear goes on wherever there is slip and pressure. Under a fixed stroke, or force, a contact that sticks in its
+middle keeps this zone; around it wear goes on until the pressure has vanished there. So in the end the stick zone
+alone carries the load, and beside it the surfaces are worn by what they would otherwise overlap at any time of the
+cycle (M. Ciavarella and D. A. Hills, J. Strain Anal. 34, 1999): one cycle with contact in the stick zone only,
+
+    p >= 0, gap >= 0, p gap = 0 in the stick zone;    p = 0, depth = max(0, -gap) outside of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array, Mask
+from fenwear.errors import ConvergenceError
+from fenwear.sliding.wear import Worn
+from fenwear.stick.cycle import Records, Rig
+
+FAR = 1e3  # times the largest gap: never closes
+
+
+@dataclass(frozen=True)
+class FinalShape:
+    """The end of partial-slip wear.
+
+    Attributes:
+        stick: The zone that carries the load (n,).
+        pressure: At the end of a cycle (n,), MPa.
+        depth: Worn off both bodies together (n,), mm.
+        gap: Beside the scar (n,), mm.
+        worn: The depth shared between the bodies by their wear rates.
+    """
+
+    stick: Mask
+    pressure: Array
+    depth: Array
+    gap: Array
+    worn: Worn
+
+
+def stick_zone(rig: Rig) -> Mask:
+    """Return the nodes that stick all through the first cycle (n,); collective.
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    return np.asarray(Records.joined(rig.cycle(rig.beginning())[1]).sticking.all(axis=0))
+
+
+def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
+    """Return the shape to which partial slip wears; collective.
+
+    Args:
+        rig: The bodies and what is done to them.
+        stick: The zone that never slips (n,); by default that of the first cycle.
+
+    Raises:
+        ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
+    """
+    zone = stick_zone(rig) if stick is None else stick
+    if not zone.any():
+        raise ConvergenceError(
+            "no final shape exists: every node slips in a cycle, so that wear goes on for ever; expected a smaller "
+            "stroke or force, or contact.law = 'gross-sliding'"
+        )
+    unworn = rig.unworn()
+    gap = rig.opening(rig.interface.middle, unworn)
+    far = FAR * (np.abs(gap).max() + float(np.abs(rig.interface.middle.compliance.diagonal()).max()))
+    at = rig.beginning(Worn(np.where(zone, 0.0, far), unworn.strip))
+    records = Records.joined(rig.cycle(at)[1])
+    found = records.gap.min(axis=0) - np.where(zone, 0.0, far)
+    depth = np.where(zone, 0.0, np.maximum(-found, 0.0))
+    rates = [0.0 if law is None else float(law.rate.mean()) for law in (rig.wear.punch, rig.wear.strip)]
+    share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
+    strip = rig.interface.middle.pair.deposit @ ((1 - share) * depth)
+    return FinalShape(zone, records.pressure[-1], depth, np.maximum(found, 0.0), Worn(share * depth, strip))

@@ -25,6 +25,7 @@ from fenwear.case.schema import (
     Stick,
     Support,
     Tabulated,
+    Track,
     Wear,
     WearLaw,
 )
@@ -51,6 +52,7 @@ __all__ = [
     "Stick",
     "Support",
     "Tabulated",
+    "Track",
     "Wear",
     "WearLaw",
     "builtin_cases",

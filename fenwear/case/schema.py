@@ -654,6 +654,17 @@ PerfectOrConductance = Annotated[
 Motions = Reciprocating | OneWay | Tabulated | Oscillation | Rotation
 
 
+class Track(_Part):
+    """The rest of a disc or ring whose material passes under the punch, warms up and comes back."""
+
+    heat_capacity: Annotated[float, *_quantity("N*mm/K"), Field(gt=0)] = Field(
+        description="of what is not meshed, its mass times c; 1 J/K = 1000"
+    )
+    loss: Annotated[float, *_quantity("N*mm/(s*K)"), Field(ge=0)] = Field(
+        default=0.0, description="to the surroundings, its area times h; 1 W/K = 1000"
+    )
+
+
 class Heat(_Part):
     """Friction heat and its conduction; without this table a case knows no temperature."""
 
@@ -682,6 +693,7 @@ class Heat(_Part):
         description="of the strip's material that enters through free ends; by default, sliding one way, the "
         "ambient, and to and fro what has left comes back as it was",
     )
+    track: Track | None = Field(default=None, description="closed track of one-way sliding, which warms up as a whole")
     initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
     coupling: Literal["implicit", "split"] = Field(
@@ -1039,6 +1051,13 @@ class Case(_Part):
         ]
         if self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' with heat")
+        if heat.track is not None:
+            if not isinstance(self.motion, OneWay | Rotation):
+                problems.append("heat.track: expected one-way sliding: to and fro the same material stays")
+            if heat.inflow is not None:
+                problems.append("heat.inflow: expected none with heat.track, whose bulk comes in")
+            if heat.operator != "reduced":
+                problems.append("heat.operator: expected 'reduced' with heat.track")
         if heat.conductance_per_pressure is not None and heat.conductance != 0:
             problems.append("heat.conductance: give either conductance or conductance_per_pressure")
         return problems

@@ -28,12 +28,14 @@ class BlockHeat:
         temperature_strip: Of the strip's (k, n), K.
         terms: Heat of each half-cycle by `fenwear.heat.exchange.TERMS` (k, 6), mJ.
         coupling_iterations: Of heat and contact (k,).
+        temperature_bulk: Of the bulk of the strip's closed track at the end (k,), K; NaN where there is none.
     """
 
     temperature_punch: Array
     temperature_strip: Array
     terms: Array
     coupling_iterations: NDArray[np.int64]
+    temperature_bulk: Array
 
     @property
     def max_temperature(self) -> Array:
@@ -55,11 +57,13 @@ class HalfCycleHeat:
     temperature_strip: Array
     terms: Array
     coupling_iterations: int
+    temperature_bulk: float = np.nan
 
     def then(self, later: HalfCycleHeat) -> HalfCycleHeat:
         """Return the heat of this phase and the next one."""
         iterations = max(self.coupling_iterations, later.coupling_iterations)
-        return HalfCycleHeat(later.temperature_punch, later.temperature_strip, self.terms + later.terms, iterations)
+        terms, bulk = self.terms + later.terms, later.temperature_bulk
+        return HalfCycleHeat(later.temperature_punch, later.temperature_strip, terms, iterations, bulk)
 
 
 @dataclass(frozen=True)
@@ -251,7 +255,7 @@ class Recorder:
         optima = np.array([f * self._optimum(d, p) for d, p, f in zip(directions, pressure, loads, strict=True)])
         heat = None
         if self._heat:
-            names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations")
+            names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations", "temperature_bulk")
             heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
         block = Block(
             system,

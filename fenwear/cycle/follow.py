@@ -64,7 +64,8 @@ def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:
     if state is None or bodies is None:
         return None
     pairs = zip(state.functions(), bodies, strict=True)
-    return HeatState.nodal(bodies, [_in_place(old, body.function(body.initial())) for old, body in pairs])
+    moved_along = [_in_place(old, body.function(body.initial())) for old, body in pairs]
+    return HeatState.nodal(bodies, moved_along, state.bulk)
 
 
 def _in_place(old: fem.Function, new: fem.Function) -> Array:

@@ -371,7 +371,8 @@ class _Stepper:
             pressure = _present(contact).pressure[0]
             conductance = exchange.conductance(pressure)
             temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
-            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature), terms, 1))
+            bulk = np.nan if temperature.bulk is None else temperature.bulk
+            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature), terms, 1, bulk))
         return heats
 
 

@@ -148,7 +148,7 @@ class ThermalContact:
 
     def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:
         punch, strip = self.exchange.contact_temperatures(state)
-        return HalfCycleHeat(punch, strip, terms, iterations)
+        return HalfCycleHeat(punch, strip, terms, iterations, np.nan if state.bulk is None else state.bulk)
 
 
 def gap_volume(system: Tribosystem, gap: Array) -> float:

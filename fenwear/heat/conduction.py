@@ -96,6 +96,8 @@ class HeatBody:
         body = self.body = elastic.body
         self.law, self.heat, self.kind = law, heat, elastic.law.kind
         self.inflow = heat.ambient if heat.inflow is None else heat.inflow
+        if heat.track is not None:  # what comes back is counted from the initial temperature on
+            self.inflow = heat.initial
         degree = elastic.space.ufl_element().degree
         self.space = fem.functionspace(body.mesh, basix.ufl.element("Lagrange", body.mesh.basix_cell(), degree))
         self.surface, self.trace = elastic.surface, trace_of(elastic.trace, elastic.space, self.space)
@@ -179,7 +181,7 @@ class HeatBody:
             loss.destroy()
         carried = speed * flow.carried + entering
         brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.sum()))
-        return HeatStep(self, a, b, f, duration, carried, brought)
+        return HeatStep(self, a, b, f, duration, carried, brought, entering)
 
     def loses_heat(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> bool:
         """Return whether a heat sink exists: convection, a held temperature or new material; collective."""
@@ -378,6 +380,7 @@ class HeatStep:
         body: Whose step it is.
         carried: Heat that the material carries out a second, for each kelvin (owned,), mW/(mm K).
         brought: Heat that new material brings in a second, mW/mm.
+        entering: Heat capacity of what enters in a second (owned,), mW/(mm K).
         held_by_end, held_by_start, held_source: Sums of the rows of A, B and f that held
             temperatures replace: with them the heat that enters through these boundaries.
     """
@@ -391,8 +394,9 @@ class HeatStep:
         duration: float,
         carried: Array,
         brought: float,
+        entering: Array,
     ) -> None:
-        self.body, self.carried, self.brought = body, carried, brought
+        self.body, self.carried, self.brought, self.entering = body, carried, brought, entering
         start = body.space.dofmap.index_map.local_range[0]
         rows = (body.held + start).astype(np.int32)
         indicator = np.zeros(body.owned)

@@ -72,21 +72,54 @@ class ReducedBasis(Basis):
 
 
 @dataclass(frozen=True, eq=False)
+class TrackBasis(ReducedBasis):
+    """A reduced basis with the temperature of the bulk of a closed track as its last coordinate, less the reference.
+
+    Attributes:
+        reference: K.
+    """
+
+    reference: float
+
+    def __len__(self) -> int:
+        """Return dim + 1."""
+        return self.columns.shape[1] + 1
+
+    def temperature(self, coordinates: Array) -> Array:
+        """Return the temperature of the mesh."""
+        return self.lift + self.columns @ coordinates[:-1]
+
+    def coordinates(self, temperature: Array) -> Array:
+        """Return the projection, with the bulk at the reference."""
+        return np.append(super().coordinates(temperature), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
 class HeatState:
     """The temperatures of both bodies, with what gives them meaning.
 
     Attributes:
         bases: Of the punch and of the strip.
         values: Coordinates on the punch's and then on the strip's basis.
+        told: Temperature of the bulk of a closed track, K, where no basis has it; None for the initial one.
     """
 
     bases: tuple[Basis, Basis]
     values: Array
+    told: float | None = None
 
     @classmethod
-    def nodal(cls, bodies: tuple[HeatBody, HeatBody], temperatures: Sequence[Array]) -> HeatState:
-        """Return the state of these temperatures of this rank's own nodes of both bodies."""
-        return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)))
+    def nodal(
+        cls, bodies: tuple[HeatBody, HeatBody], temperatures: Sequence[Array], bulk: float | None = None
+    ) -> HeatState:
+        """Return the state of these temperatures of this rank's own nodes of both bodies, and of a track's bulk."""
+        return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)), bulk)
+
+    @property
+    def bulk(self) -> float | None:
+        """Temperature of the bulk of the strip's closed track, K; None where there is none, or for the initial one."""
+        basis = self.bases[1]
+        return float(self.values[-1]) + basis.reference if isinstance(basis, TrackBasis) else self.told
 
     def temperatures(self) -> tuple[Array, Array]:
         """Return the temperatures of this rank's own nodes of punch and strip (owned,), K."""
@@ -103,7 +136,9 @@ class HeatState:
         if all(one is other for one, other in zip(self.bases, bases, strict=True)):
             return self
         parts = [basis.coordinates(t) for basis, t in zip(bases, self.temperatures(), strict=True)]
-        return HeatState(bases, np.concatenate(parts))
+        if isinstance(bases[1], TrackBasis) and self.bulk is not None:
+            parts[1][-1] = self.bulk - bases[1].reference
+        return HeatState(bases, np.concatenate(parts), self.bulk)
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.case import Heat
+from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.reduction import ROUNDING, reduced_basis
+from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
 from fenwear.parallel import total
 from fenwear.sliding.field import SlidingField
@@ -68,11 +69,12 @@ def prepare_exchange(
     ):
         around = _surroundings(body, pair, sliding, renewed=renewed)
         steps = [body.step(velocity, duration, around) for velocity in own]
-        if reduced:
-            moving = [own[step] for step in cycle]
-            field: FullField | ReducedField = _reduced(
-                body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle
-            )
+        field: FullField | ReducedField | TrackField
+        moving = [own[step] for step in cycle]
+        if heat.track is not None and body.body.name == "strip":
+            field = _on_track(heat, heat.track, body, steps, inflow, own, duration, around, cycle, thickness)
+        elif reduced:
+            field = _reduced(body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle)
         else:
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # collective: each is asked
@@ -137,6 +139,36 @@ def _reduced(
         tolerance = max(tolerance / 10, ROUNDING)  # more fields: nearer to the full steps, whose temperatures die out
 
 
+def _on_track(
+    heat: Heat,
+    track: Track,
+    body: HeatBody,
+    steps: list[HeatStep],
+    inflow: Array,
+    speeds: Sequence[float],
+    duration: float,
+    surroundings: Surroundings,
+    cycle: Sequence[int],
+    thickness: float,
+) -> TrackField:
+    """Return the strip's reduced field with the bulk of its closed track; collective.
+
+    Raises:
+        CaseError: nothing enters the mesh.
+    """
+    if not surroundings.renewed or not body.flow(surroundings.sliding).is_open:
+        message = "expected a strip whose material enters through a free end: none leaves the mesh to come back"
+        raise CaseError(InputError("heat.track", message))
+    # What enters at a kelvin, as large as a unit flux: what is small against the largest is dropped from the basis.
+    comm, entering = body.body.mesh.comm, steps[0].entering
+    fluxes, unit = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], np.abs(entering).sum()]))
+    both = np.hstack([inflow, entering[:, None] * (fluxes / unit)])
+    moving = [speeds[step] for step in cycle]
+    inner = _reduced(body, steps, both, moving, duration, heat.reduction_tolerance, surroundings, cycle)
+    kelvins = [abs(speed / speeds[0]) * unit / fluxes for speed in speeds]
+    return TrackField(inner, steps, kelvins, duration, track, thickness)
+
+
 def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, renewed: bool) -> Surroundings:
     """Return what a body meets beyond its mesh: the strip new material, and beside the punch the surroundings."""
     if body.body.name == "punch":
@@ -172,7 +204,7 @@ def _exchange(
 
 
 def _side(
-    field: FullField | ReducedField,
+    field: FullField | ReducedField | TrackField,
     steps: Sequence[HeatStep],
     surroundings: Surroundings,
     pair: ContactPair,
@@ -193,7 +225,7 @@ def _side(
     comm, moves = body.body.mesh.comm, body.body.name == "strip"
     initial = total(comm, gap_rows @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
     capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
-    return Side(
+    side = Side(
         field,
         field.observe(contact_rows),
         field.observe(gap_rows).less(initial),
@@ -206,3 +238,4 @@ def _side(
         surroundings.renewed or not moves or not body.flow(surroundings.sliding).is_open,
         cooled,
     )
+    return field.balanced(side) if isinstance(field, TrackField) else side

@@ -51,13 +51,15 @@ def reduced_basis(
     scales += [np.inf] if body.loses_heat(mean, surroundings) else [scales[-1] * 100]
     # What is new on both sides does not average out: material that leaves is cooled on either way.
     unlike = len(scales) if surroundings.renewed and min(speeds) * max(speeds) < 0 else FAST
+    uniform = np.ones((body.owned, 1))  # carries the balance of energy
+    uniform[body.held] = 0.0
     snapshots: list[Array] = []
     relaxed: list[Array] = []
     largest = 0.0
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
         for velocity in [mean, *(moving if k < unlike else [])]:
             step = body.step(velocity, scale, surroundings)
-            fields, values = _principal(body, step.respond(even), tolerance, largest)
+            fields, values = _principal(body, _uneven(body, uniform, step.respond(even)), tolerance, largest)
             largest = max(largest, values[-1])
             snapshots.append(fields)
             if np.isinf(scale):
@@ -65,7 +67,6 @@ def reduced_basis(
             else:
                 relaxed.append(step.advance(body.initial() - lift, sources=False)[:, None])
             step.free()
-    uniform = np.ones((body.owned, 1))  # carries the balance of energy
     start = (body.initial() - lift)[:, None]
     hottest = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0)), MPI.MAX)
     warm = hottest > 0
@@ -79,6 +80,16 @@ def reduced_basis(
     rest = np.hstack(snapshots)
     rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
     return ReducedBasis(body, lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0))
+
+
+def _uneven(body: HeatBody, uniform: Array, fields: Array) -> Array:
+    """Return fields without their mean, which is in the basis already; collective.
+
+    In a body that hardly loses heat it is far larger than all else, which would be small against it and dropped.
+    """
+    stored = body.store(uniform)
+    means = total(body.body.mesh.comm, stored.T @ np.hstack([fields, uniform]))
+    return fields - uniform @ (means[:, :-1] / means[:, -1:])
 
 
 def _gram(body: HeatBody, fields: Array) -> Array:

@@ -38,6 +38,7 @@ NUMBERS, WEAR, STATES = (
     ("pressure", "gap", "rigid"),
 )
 TOTALS = ("totals", "energy")
+BULK = "bulk"  # temperature of a closed track, NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
 # A run may go on farther than it was meant to, and keep other things.
@@ -89,11 +90,17 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
             **{name: getattr(state, name) for name in NUMBERS},
             **_depths(WEAR, state.worn),
             **_totals(state.totals),
+            **_bulk(state.temperature),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
         )
         file.flush()
         os.fsync(file.fileno())
+
+
+def _bulk(temperature: HeatState | None) -> dict[str, Any]:
+    bulk = None if temperature is None else temperature.bulk
+    return {BULK: np.nan if bulk is None else bulk}
 
 
 def _totals(totals: Totals) -> dict[str, Any]:
@@ -135,9 +142,9 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if system.bodies.heat is not None:
-        temperature = HeatState.nodal(
-            system.bodies.heat, [_read_temperature(folder, body) for body in system.bodies.heat]
-        )
+        bulk = None if np.isnan(arrays[BULK]) else float(arrays[BULK])
+        read = [_read_temperature(folder, body) for body in system.bodies.heat]
+        temperature = HeatState.nodal(system.bodies.heat, read, bulk)
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
@@ -184,7 +191,7 @@ def _arrays(folder: Path) -> dict[str, Any]:
     try:
         with np.load(folder / ARRAYS) as arrays:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
-            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, *STATES, *followed)}
+            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         raise _damaged(folder) from None
 

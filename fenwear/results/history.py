@@ -61,6 +61,7 @@ HEAT_VARIABLES = {
     "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
     "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
 }
+BULK = {"temperature_bulk": (("half_cycle",), "K", "temperature of the bulk of the strip's closed track at the end")}
 HEAT_TERMS = {
     "friction": "heat made by friction in the half-cycle",
     "debris": "heat carried off by debris",
@@ -99,7 +100,7 @@ def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str
         variables = {**variables, **PROGRAM_VARIABLES, **({} if case.heat is None else AMBIENT)}
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
-        variables = {**variables, **HEAT_VARIABLES, **terms}
+        variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
     variables = {**variables, **sheet.variables(system)}
     if case.model.kind == "plane":
         return variables
@@ -136,7 +137,7 @@ def _values(block: Block, name: str) -> NDArray[Any]:
         return getattr(block, name)
     if name == "heat_balance_error":
         return block.heat.balance_error
-    if name in HEAT_VARIABLES:
+    if name in HEAT_VARIABLES or name in BULK:
         return getattr(block.heat, name)
     return block.heat.terms[:, TERMS.index(name.removeprefix("heat_"))]
 

@@ -1,0 +1,123 @@
+"""A closed track: the disc or ring beneath warms up as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import Case, Tribosystem, assemble, jump, march
+from fenwear.cycle.steady import steady
+from fenwear.errors import CaseError
+from fenwear.results import checkpoint
+
+Edited = Callable[..., Case]
+SMALL = (
+    "geometry.degree=2",
+    "geometry.parameters.elements_along_contact=8",
+    "geometry.follow_wear=never",
+    "heat.reduction_tolerance=1e-7",
+)
+CAPACITY, LOSS, SPEED = 2e6, 4e3, 500.0  # N mm/K, N mm/(s K), mm/s
+
+
+def on_track(**more: Any) -> Callable[[dict[str, Any]], None]:
+    def edit(tables: dict[str, Any]) -> None:
+        tables["motion"] = {"kind": "one-way", "direction": "rightward", "speed": SPEED, "duration": 1.0}
+        tables["strip"]["supports"] = [{"on": "strip_bottom", "fix": ["x", "z"]}]
+        for body in ("punch", "strip"):
+            tables[body].pop("temperatures", None)
+        for material in tables["materials"].values():  # good conductors: a low Biot number
+            material["conductivity"] = "400 W/(m*K)"
+            material["expansion"] = 0.0
+        tables["heat"] = {
+            "conductance": "perfect",
+            "convection": 1e-9,  # nothing, but a sink for the punch
+            "steps": 4,
+            "track": {"heat_capacity": CAPACITY, "loss": LOSS},
+            **more,
+        }
+        tables["run"] = {"half_cycles": 100}
+
+    return edit
+
+
+def bulk(system: Tribosystem, block: Any) -> float:
+    found = system.exchange.own(block.end.temperature).bulk
+    assert found is not None
+    assert found == pytest.approx(block.heat.temperature_bulk[-1], rel=1e-12)
+    return found
+
+
+def test_lumped_disc(edited: Edited) -> None:
+    """At a low Biot number the bulk follows C dT/dt = mu F v - G T, C of the disc and of what is meshed.
+
+    Energy is balanced in each step, and nothing is carried out of the model any more.
+    """
+    system = assemble(edited("example1-heat", on_track(), *SMALL))
+    exchange, count = system.exchange, 200
+    (block,) = march(system, count, block=count)
+    power = 0.25 * 1e4 * SPEED
+    meshed = sum(side.capacity for side in exchange.sides) * system.bodies.punch.thickness
+    assert meshed > CAPACITY
+    time = np.arange(1, count + 1)
+    lumped = power / LOSS * (1 - np.exp(-LOSS * time / meshed))
+    found = bulk(system, block)
+    # The punch is warmer than the bulk by what drives its heat, and so the bulk a little later.
+    assert found == pytest.approx(lumped[-1], rel=0.03)
+    assert block.heat.balance_error.max() < 1e-8
+    assert np.abs(block.heat.terms[:, 5]).max() < 1e-9 * block.heat.terms[0, 0]
+    stored = block.heat.terms[:, 2].sum()
+    assert stored == pytest.approx(meshed * found, rel=0.03)
+    assert block.heat.temperature_strip[-1].min() > found
+
+
+def test_steady_bulk(edited: Edited) -> None:
+    """In the end G T = mu F v exactly; jumps and the steady state come there."""
+    system = assemble(edited("example1-heat", on_track(), *SMALL), heat="reduced")
+    *_, last = jump(system, 20000, tolerance=1e-2)
+    exact = 0.25 * 1e4 * SPEED / LOSS
+    assert bulk(system, last) == pytest.approx(exact, rel=1e-3)
+    state = steady(system)
+    assert state.heat is not None
+    np.testing.assert_allclose(state.heat.strip[0], last.heat.temperature_strip[-1], rtol=2e-3)
+
+
+def test_ambient_is_where_it_begins(edited: Edited) -> None:
+    """Another zero of the temperature shifts all of it."""
+    here, there = (assemble(edited("example1-heat", on_track(initial=t, ambient=t), *SMALL)) for t in (0.0, 300.0))
+    one, other = (list(march(system, 5))[-1] for system in (here, there))
+    apart = other.heat.temperature_strip - 300 - one.heat.temperature_strip
+    assert np.abs(apart).max() < 1e-3 * np.ptp(one.heat.temperature_strip)  # their bases are not the same
+    assert bulk(there, other) - 300 == pytest.approx(bulk(here, one), rel=1e-4)
+    np.testing.assert_allclose(other.heat.terms, one.heat.terms, atol=1e-4 * one.heat.terms[0, 0])
+
+
+def test_goes_on_from_a_checkpoint(edited: Edited, tmp_path: Any) -> None:
+    """The bulk's temperature is in the checkpoint."""
+    system = assemble(edited("example1-heat", on_track(), *SMALL))
+    first = list(march(system, 5))[-1]
+    checkpoint.save(tmp_path, system, first.end)
+    state = checkpoint.load(tmp_path, system)
+    assert state.temperature is not None
+    assert state.temperature.bulk == pytest.approx(bulk(system, first), rel=1e-12)
+    rest, whole = (list(march(system, 8, start=start))[-1] for start in (state, first.end))
+    np.testing.assert_allclose(rest.heat.temperature_strip[-1], whole.heat.temperature_strip[-1], rtol=1e-8)
+
+
+def test_what_does_not_go_with_it(edited: Edited) -> None:
+    with pytest.raises(CaseError, match=r"heat\.track: expected one-way sliding"):
+        edited("example1-heat", lambda tables: tables["heat"].update(track={"heat_capacity": 1e6}))
+    with pytest.raises(CaseError, match=r"heat\.inflow: expected none"):
+        edited("example1-heat", on_track(inflow=3.0))
+    with pytest.raises(CaseError, match=r"heat\.operator: expected 'reduced'"):
+        edited("example1-heat", on_track(operator="full"))
+
+    def held(tables: dict[str, Any]) -> None:
+        on_track()(tables)
+        tables["strip"]["temperatures"] = [{"on": "strip_ends", "temperature": 0}]
+
+    with pytest.raises(CaseError, match=r"heat\.track: expected a strip whose material enters"):
+        assemble(edited("example1-heat", held, *SMALL))

@@ -166,6 +166,21 @@ def test_run_without_root_on_a_read_only_system(tmp_path: Path) -> None:
     assert (tmp_path / "results" / "run" / "summary.json").stat().st_uid == 1000
 
 
+def test_every_command_of_fenwear_is_one_of_the_launcher() -> None:
+    """So that `docker/fenwear COMMAND` is never looked for among the programs of the image."""
+    from fenwear.cli import app
+
+    names = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}  # type: ignore[union-attr]
+    text = (ROOT / "docker" / "fenwear").read_text()
+    usage, known = (
+        text.partition("END\n}")[0],
+        text.partition("inner_directory\n        case $1 in")[2].partition("esac")[0],
+    )
+    for name in names:
+        assert re.search(rf"\b{name}\b", usage), name
+        assert re.search(rf"\b{name}\b", known), name
+
+
 STUB = """#!/bin/sh
 [ "$1" = run ] || exit 0
 for word; do

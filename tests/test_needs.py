@@ -17,7 +17,7 @@ COARSE = ("geometry.degree=1", "geometry.order=1")
 
 def solid(unknowns: float, nodes: float) -> Needs:
     """Return the needs of two equal solids."""
-    body = BodyNeeds(3, unknowns, 150 * unknowns, nodes, nodes, 0.0)
+    body = BodyNeeds(3, unknowns, 150 * unknowns, nodes, nodes, 0.0, 3 * nodes)
     return Needs(body, body, nodes, 1, 2)
 
 
@@ -33,7 +33,7 @@ def test_coarser_elements() -> None:
     """Twice as large: an eighth of the unknowns of a solid, a quarter of its nodes; the answer just fits."""
     found = solid(80_000, 400).coarser(2.0)
     assert (found.punch.unknowns, found.punch.columns, found.nodes) == (10_000, 100, 100)
-    plane = BodyNeeds(2, 400.0, 4e3, 20.0, 20.0, 0.0).coarser(2.0)
+    plane = BodyNeeds(2, 400.0, 4e3, 20.0, 20.0, 0.0, 40.0).coarser(2.0)
     assert (plane.unknowns, plane.columns) == (100, 10)
     large = solid(1e6, 1e4)
     fits = large.fitting(8 * GIB)

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from petsc4py import PETSc
 
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.response import SURFACE_SHARE
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
@@ -37,6 +37,7 @@ class BodyNeeds:
         columns: Solutions: patterns of force times the directions of each.
         patterns: Of force.
         temperatures: Degrees of freedom of the temperature; 0 without heat.
+        surface: Degrees of freedom of the contact surface's displacement.
     """
 
     dim: int
@@ -45,6 +46,7 @@ class BodyNeeds:
     columns: float
     patterns: float
     temperatures: float
+    surface: float
 
     def coarser(self, times: float) -> BodyNeeds:
         """Return the same of elements so many times as large."""
@@ -56,6 +58,7 @@ class BodyNeeds:
             self.columns * surface,
             self.patterns * surface,
             self.temperatures * volume,
+            self.surface * surface,
         )
 
     @property
@@ -68,13 +71,19 @@ class BodyNeeds:
     def memory(self) -> float:
         """Bytes of stiffness, factor and answers."""
         answers = self.patterns * self.dim * self.columns + self.patterns * self.temperatures
-        return NUMBER * (1.5 * self.matrix + WORKING * self.factor + answers)
+        complement = 2 * self.surface**2 if self.by_surface else 0.0
+        return NUMBER * (1.5 * self.matrix + WORKING * self.factor + answers + complement)
+
+    @property
+    def by_surface(self) -> bool:
+        """Whether the body is eliminated down to its surface, and no column is solved for."""
+        return self.temperatures == 0 and SURFACE_SHARE * self.surface**2 <= self.factor
 
     @property
     def seconds(self) -> float:
         """Time of one core."""
         factoring = FACTORING[self.dim] * self.unknowns ** (1.5 if self.dim == 2 else 2.0)
-        return float(factoring + 4 * self.factor * self.columns / SOLVING)
+        return float(factoring + (0.0 if self.by_surface else 4 * self.factor * self.columns / SOLVING))
 
 
 @dataclass(frozen=True)
@@ -146,9 +155,9 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool]) -> Needs:
 
 
 def _body(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> BodyNeeds:
-    size = elastic.stiffness.getSize()[0]
-    entries = elastic.stiffness.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
-    return BodyNeeds(elastic.dim, size, entries, columns, patterns, size / elastic.dim if heat else 0.0)
+    size, surface = elastic.size, elastic.surface_dofs.size
+    temperatures = size / elastic.dim if heat else 0.0
+    return BodyNeeds(elastic.dim, size, elastic.matrix_entries(), columns, patterns, temperatures, surface)
 
 
 def check_memory(placed: Placed, wanted: Needs) -> None:

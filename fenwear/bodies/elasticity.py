@@ -124,6 +124,20 @@ class ElasticBody:
         """Number of degrees of freedom on all ranks."""
         return int(self.dim * self.space.dofmap.index_map.size_global)
 
+    def matrix_entries(self) -> int:
+        """Return about how many entries K has, without assembling it; collective.
+
+        On a grid of quadrilaterals or hexahedra of degree p a cell adds (p² + 2 p)^d pairs of nodes: along an
+        axis p - 1 inner nodes see p + 1 and the one at its end 2 p + 1.
+        """
+        topology, degree = self.body.mesh.topology, self.space.ufl_element().degree
+        if self.body.mesh.basix_cell().name in ("quadrilateral", "hexahedron"):
+            pairs = (degree**2 + 2 * degree) ** topology.dim
+            return int(self.dim**2 * topology.index_map(topology.dim).size_global * pairs)
+        pattern = fem.create_sparsity_pattern(self._form)
+        pattern.finalize()
+        return int(self.dim**2 * self.body.mesh.comm.allreduce(pattern.num_nonzeros))
+
     @cached_property
     def stiffness(self) -> PETSc.Mat:
         """K with all supports eliminated, per thickness, MPa; collective at first use."""

@@ -9,7 +9,9 @@ Each line has the processor time of this process and the time on the clock, s, a
 from __future__ import annotations
 
 import argparse
+import io
 import resource
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -94,6 +96,7 @@ def main() -> None:
     parser.add_argument("--no-heat", action="store_true")
     parser.add_argument("--no-full", action="store_true")
     asked = parser.parse_args()
+    sys.stdout = io.TextIOWrapper(sys.stdout.buffer, line_buffering=True)  # what a long run has found is seen at once
     with timed("meshes, stiffness, pairs"):
         placed = place_case(describe(asked.elements))
     print(f"{len(placed.pair.weights):,} contact nodes, {placed.bodies.punch.stiffness.size[0]:,} and "

@@ -34,7 +34,8 @@ import numpy as np
 import xarray
 
 from fenwear import load_case
-from fenwear.report.figures import peak_figure, pressure_figure, read_history, shape_figure
+from fenwear.report.course import peak_figure
+from fenwear.report.figures import pressure_figure, read_history, shape_figure
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles

@@ -311,11 +311,17 @@ def mesh_command(
 @app.command("plot")
 def plot_command(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
+    formats: Annotated[str, typer.Option("--format", help="Of the figures: png, pdf, svg, with commas.")] = "png",
+    width: Annotated[str, typer.Option(help='Of the figures, such as "85 mm" for a column of a paper.')] = "178 mm",
+    axis: Annotated[str, typer.Option(help="What a run is drawn over: cycles, distance or time.")] = "cycles",
 ) -> None:
-    """Draw a run: figures, pictures of the bodies, animation and report.html, into its folder."""
+    """Draw a run: figures with captions, pictures of the bodies, animation and report.html, into its folder."""
+    from fenwear.report.chosen import chosen_formats, chosen_look
     from fenwear.report.page import write_report
 
-    for path in on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True)):
+    look, endings = chosen_look(width, axis), chosen_formats(formats)
+    paths = on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True, look=look, formats=endings))
+    for path in paths:
         print(path)
 
 

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
-from fenwear.report.figures import FOLDER, directions_present, mean_pressure, pressure_top, read_history
-from fenwear.report.style import DIRECTIONS, contact_axis, panels, reference_line, save_gif
+from fenwear.report.course import directions_present, is_conforming, mean_pressure
+from fenwear.report.figures import FOLDER, read_history
+from fenwear.report.shapes import surfaces_of, worn_range
+from fenwear.report.style import BODY_COLOURS, DIRECTIONS, contact_axis, legend_beside, level_line, panels, save_gif
 from fenwear.report.surface import model_of
 from fenwear.report.surface_animation import SurfaceFrames
 
@@ -31,36 +33,46 @@ def frames_of(history: xarray.Dataset, count: int = FRAMES) -> list[int]:
 
 
 class HistoryFrames:
-    """One figure whose lines are moved from frame to frame."""
+    """One figure whose lines are moved from frame to frame: pressure, and worn depth of each body that wears."""
 
     def __init__(self, history: xarray.Dataset, half_cycles: Sequence[int]) -> None:
         self.history = history
         self.figure: Figure
-        self.figure, (above, below) = panels(2, 2.6)
+        self._surfaces = surfaces_of(history)
+        self.figure, (self._above, *below) = panels(1 + len(self._surfaces), 2.4)
         self._pressure = {}
         for d in directions_present(history):
             name, dashes, colour = DIRECTIONS[d]
-            (self._pressure[d],) = above.plot([], [], dashes, color=colour, label=name)
-        above.set_ylabel("contact pressure (MPa)")
-        above.set_ylim(0, pressure_top(history, half_cycles))
-        above.legend(title="strip moves", loc="upper right", frameon=False)
-        mean = mean_pressure(history)
-        reference_line(above, mean, f"mean {mean:.2f}")
-        (self._shape,) = below.plot([], [], color="0")
-        below.set_ylabel("worn depth (µm)")
-        below.set_ylim(0, 1.05e3 * max(float(history.wear.max()), 1e-12))
-        contact_axis(below)
-        below.set_xlim(float(history.x[0]), float(history.x[-1]))
-        self._title = above.set_title(" ", loc="left")
+            (self._pressure[d],) = self._above.plot([], [], dashes, color=colour, label=name)
+        self._above.set_ylabel("contact pressure (MPa)")
+        # Late states fill the axis; it grows for the peaks of the first ones.
+        self._late = float(history.pressure.sel(half_cycle=list(half_cycles[len(half_cycles) // 2 :])).max())
+        if is_conforming(history):
+            level_line(self._above, mean_pressure(history), "mean")
+        legend_beside(self._above, "strip moves")
+        self._depths = {}
+        for ax, (body, (_, depth, _)) in zip(below, self._surfaces.items(), strict=True):
+            (self._depths[body],) = ax.plot([], [], color=BODY_COLOURS[body])
+            ax.set_ylabel(f"worn depth of\nthe {body} (µm)")
+            top = 1.05e3 * max(float(depth.max()), 1e-12)
+            ax.set_ylim((0, top) if body == "punch" else (top, 0))
+        contact_axis(below[-1])
+        below[-1].set_xlim(*worn_range(history))
+        self._title = self.figure.suptitle(" ", x=0.02, ha="left", fontsize="medium")
 
     def show(self, half_cycle: int) -> None:
         """Move the lines to a half-cycle; the other direction shows its latest one before."""
         until = self.history.sel(half_cycle=slice(None, half_cycle))
+        highest = self._late
         for d, line in self._pressure.items():
             rows = np.flatnonzero(until.direction.values == d)
             if len(rows):
-                line.set_data(until.x.values, until.pressure.values[rows[-1]])
-        self._shape.set_data(until.x.values, 1e3 * until.wear.values[-1])
+                values = until.pressure.values[rows[-1]]
+                highest = max(highest, float(values.max()))
+                line.set_data(until.x.values, values)
+        self._above.set_ylim(0, 1.1 * highest)
+        for body, (x, depth, _) in self._surfaces.items():
+            self._depths[body].set_data(x, 1e3 * depth.sel(half_cycle=slice(None, half_cycle)).values[-1])
         self._title.set_text(f"after half-cycle {half_cycle:,} of {int(self.history.half_cycle[-1]):,}")
 
 

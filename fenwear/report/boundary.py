@@ -56,14 +56,12 @@ def boundary_figure(fields: xarray.Dataset) -> Figure:
         name = f"({closed[0][corner]:g}, {closed[1][corner]:g})"
         around.annotate(name, (distance[corner], 1), xycoords=("data", "axes fraction"), xytext=(2, -10),
                         textcoords="offset points", color=GREY, fontsize="small")  # fmt: skip
-    around.set_title(f"round the punch, half-cycle {fields.attrs['half_cycle']:,}; corners (x, z) in mm", loc="left")
     around.set_xlabel("distance along the boundary from the middle of the contact, to the right and round (mm)")
     x, z = fields.strip_x.values, fields.strip_z.values
     top = np.flatnonzero(z > z.max() - 1e-6 * np.ptp(z))
     top = top[np.argsort(x[top])]
     along.plot(x[top], fields.strip_temperature.values[top], color=BLUE)
     along.axvspan(closed[0].min(), closed[0].max(), color="0.92", zorder=0)
-    along.set_title("along the strip's upper surface; grey: under the punch", loc="left")
     along.set_xlabel("x (mm)")
     for ax in (around, along):
         ax.set_ylabel("temperature (K)")

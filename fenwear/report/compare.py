@@ -12,7 +12,8 @@ import xarray
 
 from fenwear.errors import CaseError, InputError
 from fenwear.report.compare_surfaces import surface_comparison
-from fenwear.report.figures import directions_present, mark_few, read_history
+from fenwear.report.course import directions_present, mark_few
+from fenwear.report.figures import read_history
 from fenwear.report.key_numbers import flat, number_text, read_case, read_summary
 from fenwear.report.style import DIRECTIONS, contact_axis, legend_beside, panels, run_style
 from fenwear.report.surface import model_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xarray
 
 from fenwear.arrays import Array
-from fenwear.report.figures import directions_present, mark_few
+from fenwear.report.course import directions_present, mark_few
 from fenwear.report.style import legend_beside, panels, run_style
 from fenwear.report.surface import centre_of_wear, model_of, radial, surface_of
 

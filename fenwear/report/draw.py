@@ -1,30 +1,60 @@
-"""All figures of a run into its folder, whatever its model is."""
+"""All figures of a run into its folder, whatever its model is, with their captions."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import xarray
 
 from fenwear.report.boundary import boundary_figure
+from fenwear.report.captions import caption
 from fenwear.report.figures import FOLDER, all_figures, read_history
+from fenwear.report.key_numbers import read_case
+from fenwear.report.sections import geometry_figure, stress_figure
+from fenwear.report.style import STANDARD, Look
 from fenwear.report.surface import model_of
 from fenwear.report.surface_figures import surface_figures
+from fenwear.results.disk import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+CAPTIONS = "captions.txt"
+DPI = 200
 
 
-def draw_figures(directory: Path, half_cycles: Sequence[int] = ()) -> list[Path]:
-    """Draw all figures of a run into its folder `figures`; return their paths."""
+def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDARD) -> dict[str, Figure]:
+    """Draw what the fields of the last half-cycle that has them show, by its name."""
+    files = sorted((directory / "fields").glob("half_cycle_*.nc"))
+    if not files:
+        return {}
+    with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
+        drawn = {"geometry": geometry_figure(fields, case, look)}
+        if "punch_stress_xx" in fields:
+            drawn["surface_stress"] = stress_figure(fields, look)
+        if "punch_temperature" in fields:
+            drawn["boundary_temperature"] = boundary_figure(fields)
+    return drawn
+
+
+def draw_figures(
+    directory: Path, half_cycles: Sequence[int] = (), look: Look = STANDARD, formats: Sequence[str] = ("png",)
+) -> list[Path]:
+    """Draw all figures of a run, and their captions, into its folder `figures`; return the paths."""
     folder = directory / FOLDER
     history = read_history(directory)
-    plane = model_of(history) == "plane"
-    drawn = (all_figures if plane else surface_figures)(history, half_cycles)
-    files = sorted((directory / "fields").glob("half_cycle_*.nc"))
-    if files and plane and "temperature" in drawn:
-        with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
-            drawn["boundary_temperature"] = boundary_figure(fields)
+    if model_of(history) == "plane":
+        drawn = all_figures(history, half_cycles, look) | field_figures(directory, read_case(directory), look)
+    else:
+        drawn = surface_figures(history, half_cycles)
     folder.mkdir(exist_ok=True)
-    paths = [folder / f"{name}.png" for name in drawn]
-    for path, figure in zip(paths, drawn.values(), strict=True):
-        figure.savefig(path, dpi=150)
-    return paths
+    paths = []
+    for name, figure in drawn.items():
+        for ending in dict.fromkeys(("png", *formats)):  # the report shows the PNG
+            paths.append(folder / f"{name}.{ending}")
+            figure.savefig(paths[-1], dpi=DPI)
+    captions = folder / CAPTIONS
+    write_text(captions, "".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn))
+    return [*paths, captions]

@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Sized
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
-from fenwear.report.program import program_figure
-from fenwear.report.style import (
-    DIRECTIONS,
-    GREY,
-    contact_axis,
-    direction_style,
-    legend_beside,
-    panels,
-    reference_line,
-    run_style,
-    shades,
+from fenwear.report.course import (
+    convergence_figure,
+    directions_present,
+    friction_figure,
+    heat_balance_figure,
+    is_conforming,
+    mean_pressure,
+    peak_figure,
+    scar_figure,
+    shown_unit,
+    volume_figure,
 )
-from fenwear.results.history import HEAT_TERMS, HISTORY
+from fenwear.report.program import program_figure
+from fenwear.report.shapes import profile_figure, surfaces_of, wear_map_figure, worn_range
+from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, level_line, panels, shades
+from fenwear.results.history import HISTORY
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FOLDER = "figures"
+FOLDER, CAPTIONS = "figures", "captions.txt"
+EARLY = 3.0  # times the largest pressure of later states: what is beyond it has a panel of its own
+DPI = 200
 
 
 def open_history(directory: Path) -> xarray.Dataset:
@@ -64,29 +68,13 @@ def chosen_half_cycles(history: xarray.Dataset, wanted: Sequence[int] = ()) -> l
     # Most of them beyond the end: they were chosen for a longer run.
     if 2 * sum(n <= recorded[-1] for n in wanted) <= len(wanted):
         wanted = [int(n) for n in np.unique(np.geomspace(1, recorded[-1], 6).round().astype(int))]
-    return nearest_half_cycles(history, wanted)
+    return nearest_half_cycles(history, [*wanted, int(recorded[-1])])
 
 
 def nearest_half_cycles(history: xarray.Dataset, wanted: Sequence[int]) -> list[int]:
     """Return the recorded half-cycles nearest to the wanted ones."""
     recorded = history.half_cycle.values
     return sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in wanted})
-
-
-def mean_pressure(history: xarray.Dataset) -> float:
-    """Return the load over the nominal contact, MPa."""
-    last = history.isel(half_cycle=-1)
-    return float((last.pressure * last.weight).sum() / last.weight.sum())
-
-
-def nominal_width(history: xarray.Dataset) -> float:
-    """Return the width of the nominal contact at the end, mm."""
-    return float(history.weight.isel(half_cycle=-1, missing_dims="ignore").sum())
-
-
-def directions_present(history: xarray.Dataset) -> list[int]:
-    """Return the sliding directions of a run, rightward first."""
-    return [d for d in DIRECTIONS if bool((history.direction == d).any())]
 
 
 def cycle_means(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[int, xarray.DataArray]:
@@ -103,205 +91,117 @@ def pressure_top(history: xarray.Dataset, half_cycles: Sequence[int]) -> float:
     return 1.15 * max(late, float(history.pressure.median("half_cycle").max()))
 
 
-def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
-    """Draw the pressure in both directions, at each chosen half-cycle and the one beside it."""
+def early_half_cycles(history: xarray.Dataset, half_cycles: Sequence[int]) -> list[int]:
+    """Return the first half-cycles whose pressures lie far beyond all later ones, as edges of flat punches do."""
+    peaks = {n: float(history.pressure.sel(half_cycle=n).max()) for n in half_cycles}
+    last = max(list(peaks.values())[len(peaks) // 2 :])
+    early = []
+    for n in half_cycles[:-1]:
+        if peaks[n] <= EARLY * last:
+            break
+        early.append(n)
+    return early
+
+
+def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+    """Draw the pressure in both directions, at each chosen half-cycle and the one beside it.
+
+    What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
+    """
     present = directions_present(history)
-    figure, axes = panels(len(present), 3.2, share_y=True)
-    mean, top = mean_pressure(history), pressure_top(history, half_cycles)
-    for ax, d in zip(axes, present, strict=True):
-        one_way = history.isel(half_cycle=np.flatnonzero(history.direction.values == d))
-        nearest = nearest_half_cycles(one_way, half_cycles)
-        for colour, n in shades(nearest):
-            ax.plot(history.x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
-        arrow = "→" if d > 0 else "←"
-        ax.set_title(f"Contact pressure while the strip moves {DIRECTIONS[d][0]} {arrow}", loc="left")
+    rows = {d: history.isel(half_cycle=np.flatnonzero(history.direction.values == d)) for d in present}
+    chosen = {d: nearest_half_cycles(own, half_cycles) for d, own in rows.items()}
+    early = {d: early_half_cycles(own, chosen[d]) for d, own in rows.items()}
+    has_early = any(early.values())
+    figure, axes = panels(len(present) + has_early, 3.0, look=look)
+    conforming = is_conforming(history)
+    for ax, d in zip(axes, present, strict=False):
+        for colour, n in shades(chosen[d]):
+            drawn = axes[-1] if n in early[d] else ax
+            ax_line = {"color": colour, "label": look.name(history, n), "gid": str(n)}
+            drawn.plot(history.x, rows[d].pressure.sel(half_cycle=n), linestyle="-" if d > 0 else "--", **ax_line)
+        if conforming:
+            mean = mean_pressure(history)
+            level_line(ax, mean, f"mean {mean:.4g} MPa")
+    for ax in axes:
         ax.set_ylabel("contact pressure p (MPa)")
-        ax.set_ylim(0, top)
-        reference_line(ax, mean, f"mean {mean:.2f}")
-        highest = float(one_way.pressure.sel(half_cycle=nearest).max())
-        if highest > top:
-            ax.annotate(f"cut off: the first peaks reach {highest:.0f} MPa", (0.5, 1), xycoords="axes fraction",
-                        ha="center", va="top", color=GREY, fontsize="small")  # fmt: skip
-        legend_beside(ax, "half-cycle")
-    contact_axis(axes[-1])
-    return figure
-
-
-def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
-    """Draw the mean of the pressures in the two directions of a cycle, with the mean over the contact."""
-    figure, (ax,) = panels(1, 3.6)
-    means = cycle_means(history, half_cycles)
-    mean = mean_pressure(history)
-    for colour, c in shades(list(means)):
-        ax.plot(history.x, means[c], color=colour, label=f"{c:,}")
-    late = list(means)[len(means) // 2 :]
-    top = 1.15 * max([float(means[c].max()) for c in late] + [2 * mean])
-    ax.set_ylim(0, top)
-    reference_line(ax, mean, f"mean {mean:.2f}")
-    ax.set_title("Mean of the pressures in the two directions of a cycle", loc="left")
-    ax.set_ylabel("(p⁺ + p⁻) / 2 (MPa)")
-    legend_beside(ax, "cycle")
-    contact_axis(ax)
-    return figure
-
-
-def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
-    """Draw what is worn off the punch, and off the strip where it wears, at the chosen half-cycles."""
-    strip_wears = "wear_strip" in history
-    figure, axes = panels(1 + strip_wears, 3.6)
-    surfaces = [("Worn shape: the punch's surface above its start, w = 0", history.x, history.wear)]
-    if strip_wears:
-        title = "Worn shape: the strip's surface below its start, on its material"
-        surfaces.append((title, history.x_strip, history.wear_strip))
-    for ax, (title, x, depth) in zip(axes, surfaces, strict=True):
-        for colour, n in shades(half_cycles):
-            ax.plot(x, 1e3 * depth.sel(half_cycle=n), color=colour, label=f"{n:,}")
-        ax.set_title(title, loc="left")
-        legend_beside(ax, "after half-cycle")
-    axes[0].set_ylabel("worn depth w (µm)")
-    axes[0].set_ylim(bottom=0)
-    if strip_wears:
-        axes[1].set_ylabel("worn depth, downwards (µm)")
-        axes[1].set_ylim(top=0, bottom=1.05e3 * max(float(history.wear_strip.max()), 1e-12))
-        left, right = _worn_range(history)
-        axes[1].set_xlim(left, right)
-    contact_axis(axes[-1])
-    return figure
-
-
-def _worn_range(history: xarray.Dataset) -> tuple[float, float]:
-    """Return the ends of the punch's contact and of the strip's scar, mm."""
-    worn = history.x_strip.values[history.wear_strip.values.max(axis=0) > 0]
-    x = np.concatenate([worn, history.x.values])
-    return float(x.min()), float(x.max())
-
-
-def peak_figure(history: xarray.Dataset) -> Figure:
-    """Draw over the half-cycles: largest pressure, width in contact and, with heat, largest temperature."""
-    hot = "max_temperature" in history
-    figure, axes = panels(3 if hot else 2, 2.5)
-    over = {
-        "max_pressure": ("Largest contact pressure", "pressure (MPa)"),
-        "contact_width": ("Width in contact", "width (mm)"),
-        "max_temperature": ("Largest temperature of the contact surfaces, at the end of each half-cycle",
-                            "temperature (K)"),
-    }  # fmt: skip
-    for ax, (name, (title, label)) in zip(axes, over.items(), strict=False):
-        by_direction(ax, history, name)
-        ax.set_title(title, loc="left")
-        ax.set_ylabel(label)
-    mean = mean_pressure(history)
-    reference_line(axes[0], mean, f"mean {mean:.2f}")
-    reference_line(axes[0], 2 * mean, f"twice the mean {2 * mean:.2f}")
-    nominal = nominal_width(history)
-    reference_line(axes[1], nominal, f"nominal width {nominal:g}")
-    for ax in axes[:2]:
         ax.set_ylim(bottom=0)
-    axes[1].set_ylim(top=1.15 * nominal)
-    axes[0].legend(title="strip moves", frameon=False)
-    half_cycle_axis(axes[-1], history)
-    return figure
-
-
-def convergence_figure(history: xarray.Dataset) -> Figure:
-    """Draw over the half-cycles: the change against one cycle ago and the distance to the optimal pressure."""
-    figure, axes = panels(2, 2.7)
-    over = {
-        "periodicity": "Periodicity: largest change of pressure against one cycle ago",
-        "optimum_distance": "Distance to the optimum: largest difference to the optimal pressure",
-    }
-    for ax, (name, title) in zip(axes, over.items(), strict=True):
-        by_direction(ax, history, name)
-        ax.set_title(title, loc="left")
-        ax.set_ylabel("over mean pressure (-)")
-    axes[0].set_yscale("log")
-    axes[1].set_ylim(bottom=0)
-    axes[0].legend(title="strip moves", frameon=False)
-    half_cycle_axis(axes[-1], history)
-    return figure
-
-
-def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
-    """Draw the temperature along both contact surfaces at the chosen half-cycles."""
-    figure, axes = panels(2, 3.0)
-    for ax, body in zip(axes, ("punch", "strip"), strict=True):
-        for colour, n in shades(half_cycles):
-            ax.plot(history.x, history[f"temperature_{body}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
-        ax.set_title(f"Temperature of the {body}'s contact surface", loc="left")
-        ax.set_ylabel("temperature (K)")
-        legend_beside(ax, "after half-cycle")
+        legend_beside(ax, look.of_one)
     contact_axis(axes[-1])
     return figure
 
 
-def heat_balance_figure(history: xarray.Dataset) -> Figure:
-    """Draw where the friction heat of each half-cycle goes."""
-    figure, (ax,) = panels(1, 3.8)
-    friction = history.heat_friction
-    ax.plot(history.half_cycle, friction, color="0", linewidth=2.5, label="made by friction")
-    names = {
-        "convected": "lost to the surroundings",
-        "held": "lost where temperature is held",
-        "stored": "gained by both bodies",
-        "debris": "carried off by debris",
-        "carried": "carried out by the strip",
-    }
-    assert names.keys() == HEAT_TERMS.keys() - {"friction"}
-    threshold = 1e-6 * float(np.abs(friction).max())
-    for number, (name, text) in enumerate(names.items()):
-        values = history[f"heat_{name}"]
-        if float(np.abs(values).max()) > threshold:
-            ax.plot(history.half_cycle, values, label=text, **run_style(number))
-        else:
-            ax.plot([], [], " ", label=f"{text}: none")
-    ax.set_title("Heat of each half-cycle: what friction makes is the sum of the others", loc="left")
-    ax.set_ylabel("heat per half-cycle (mJ)")
-    legend_beside(ax, "")
-    half_cycle_axis(ax, history)
+def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+    """Draw the mean of the pressures in the two directions of a cycle."""
+    means = cycle_means(history, half_cycles)
+    peaks = {c: float(mean.max()) for c, mean in means.items()}
+    late = max(list(peaks.values())[len(peaks) // 2 :])
+    early = [c for c in means if peaks[c] > EARLY * late]
+    figure, axes = panels(2 if early else 1, 3.0, look=look)
+    for colour, c in shades(list(means)):
+        ax = axes[-1] if c in early else axes[0]
+        ax.plot(history.x, means[c], color=colour, label=look.name(history, 2 * c), gid=str(c))
+    if is_conforming(history):
+        mean = mean_pressure(history)
+        level_line(axes[0], mean, f"mean {mean:.4g} MPa")
+    for ax in axes:
+        ax.set_ylabel("(p⁺ + p⁻) / 2 (MPa)")
+        ax.set_ylim(bottom=0)
+        legend_beside(ax, look.of_one)
+    contact_axis(axes[-1])
     return figure
 
 
-def all_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str, Figure]:
+def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+    """Draw what is worn off the bodies at the chosen half-cycles; the strip's depth downwards."""
+    surfaces = surfaces_of(history)
+    figure, axes = panels(len(surfaces), 3.0, look=look)
+    for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
+        for colour, n in shades(half_cycles):
+            values = 1e3 * depth.sel(half_cycle=n).values
+            ax.plot(x, values, color=colour, label=look.name(history, n), gid=str(n))
+        ax.set_ylabel(f"worn depth of the {body} (µm)")
+        top = 1.05e3 * max(float(depth.max()), 1e-12)
+        ax.set_ylim((0, top) if body == "punch" else (top, 0))
+        legend_beside(ax, look.of_one)
+    axes[-1].set_xlim(*worn_range(history))
+    contact_axis(axes[-1])
+    return figure
+
+
+def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+    """Draw the temperature along both contact surfaces at the chosen half-cycles."""
+    figure, axes = panels(2, 3.0, look=look)
+    for ax, body in zip(axes, ("punch", "strip"), strict=True):
+        values = history[f"temperature_{body}"]
+        for colour, n in shades(half_cycles):
+            ax.plot(history.x, values.sel(half_cycle=n), color=colour, label=look.name(history, n), gid=str(n))
+        ax.set_ylabel(f"temperature of the {body} ({shown_unit(values.attrs.get('units', 'K'))})")
+        legend_beside(ax, look.of_one)
+    contact_axis(axes[-1])
+    return figure
+
+
+def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look = STANDARD) -> dict[str, Figure]:
     """Draw every figure that the history has data for, by its name."""
     chosen = chosen_half_cycles(history, wanted)
-    drawn = {"shape": shape_figure(history, chosen), "pressure": pressure_figure(history, chosen)}
+    drawn = {
+        "profiles": profile_figure(history, chosen, look),
+        "shape": shape_figure(history, chosen, look),
+        "wear_map": wear_map_figure(history, look),
+        "pressure": pressure_figure(history, chosen, look),
+    }
     if cycle_means(history, chosen) and len(directions_present(history)) == 2:
-        drawn["mean_pressure"] = mean_pressure_figure(history, chosen)
-    drawn["peaks"] = peak_figure(history)
+        drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
+    drawn["peaks"] = peak_figure(history, look)
+    if "sliding_distance" in history:
+        drawn["volume"] = volume_figure(history, Look(look.width, "distance"))
+        drawn["scar"] = scar_figure(history, look)
+        drawn["friction"] = friction_figure(history, look)
     if "load_factor" in history:
         drawn["program"] = program_figure(history)
-    drawn["convergence"] = convergence_figure(history)
+    drawn["convergence"] = convergence_figure(history, look)
     if "max_temperature" in history:
-        drawn["temperature"] = temperature_figure(history, chosen)
-        drawn["heat_balance"] = heat_balance_figure(history)
+        drawn["temperature"] = temperature_figure(history, chosen, look)
+        drawn["heat_balance"] = heat_balance_figure(history, look)
     return drawn
-
-
-def mark_few(points: Sized) -> dict[str, Any]:
-    """Return the style of a line of so few points that without marks nothing may be seen."""
-    return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
-
-
-def by_direction(ax: Axes, history: xarray.Dataset, name: str) -> None:
-    """Draw a variable over the half-cycles, a line for each direction."""
-    for d in directions_present(history):
-        text, dashes, colour = direction_style(history, d)
-        rows = history.direction.values == d
-        ax.plot(
-            history.half_cycle[rows],
-            history[name][rows],
-            dashes,
-            color=colour,
-            label=text,
-            **mark_few(rows.nonzero()[0]),
-        )
-
-
-def half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
-    """Label the axis of half-cycles: logarithmic where wear alone slows down, linear with heat's own pace."""
-    first, last = int(history.half_cycle[0]), int(history.half_cycle[-1])
-    if last > 10_000 or "max_temperature" not in history:
-        ax.set_xscale("log")
-    if last > first:
-        ax.set_xlim(first, last)
-    ax.set_xlabel("half-cycle n")

@@ -38,7 +38,7 @@ LABELS = {
     "temperature_punch_K": "temperature of the punch",
     "temperature_strip_K": "temperature of the strip",
     "heat_mJ": "heat of the last half-cycle",
-    "periodicity": "periodicity: change of pressure against one cycle ago, over the mean pressure",
+    "periodicity": "periodicity: change of pressure against one cycle ago, over the pressure scale",
     "growth_rate_per_s": "growth rate of disturbances of the final state",
     "largest_equilibrium_error": "largest error of the force and moment balance, over the load",
     "largest_heat_balance_error": "largest error of the heat balance, over its largest term",

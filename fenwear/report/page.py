@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -12,12 +12,14 @@ from typing import Any
 import xarray
 
 from fenwear.errors import CaseError, OutputError
+from fenwear.report.captions import caption
 from fenwear.report.draw import draw_figures
 from fenwear.report.figures import FOLDER, chosen_half_cycles, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
 from fenwear.report.stick import write_stick_report
+from fenwear.report.style import STANDARD, Look
 from fenwear.report.surface import model_of
 from fenwear.report.turned import Turned, turned_map
 from fenwear.results.disk import write_text, writing
@@ -25,43 +27,19 @@ from fenwear.results.history import CASE, HISTORY
 from fenwear.results.sheet import BODIES, LINES, shown
 
 REPORT = "report.html"
-SECTIONS = {"shape": "Worn shape", "pressure": "Pressure", "mean_pressure": "Mean pressure of both directions",
-            "program": "Test program: what acted",
-            "peaks": "Peaks over the half-cycles", "temperature": "Temperature along the contact",
-            "boundary_temperature": "Temperature along the boundaries",
-            "pressure_map": "Pressure on the contact surface", "wear_map": "Worn depth of the punch",
-            "wear_strip_map": "Worn depth of the strip", "temperature_map": "Temperature of the punch's surface",
-            "temperature_strip_map": "Temperature of the strip's surface", "cuts_along": "Along the sliding",
-            "cuts_across": "Across the sliding"}  # fmt: skip
+SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "volume",
+            "scar", "friction", "surface_stress", "temperature", "boundary_temperature", "pressure_map",
+            "wear_strip_map", "temperature_map", "temperature_strip_map", "cuts_along", "cuts_across")  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
-ALT = {
-    "shape": "Worn depth of the punch, and of the strip where it wears, in micrometres along the contact, "
-    "a line for each chosen half-cycle.",
-    "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, "
-    "a line for each chosen half-cycle.",
-    "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
-    "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
-    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
-    "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
-    "half-cycles.",
-    "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each chosen "
-    "half-cycle.",
-    "boundary_temperature": "Temperature round the punch from the middle of its contact on, and along the strip's "
-    "upper surface, at the last half-cycle with fields.",
-    "pressure_map": "Maps of the contact pressure in megapascals, one for each chosen half-cycle.",
-    "wear_map": "Maps of the worn depth of the punch over its largest, one for each chosen half-cycle.",
-    "wear_strip_map": "Maps of the worn depth of the strip over its largest, one for each chosen half-cycle.",
-    "temperature_map": "Maps of the temperature of the punch's contact surface, one for each chosen half-cycle.",
-    "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch, one for each chosen "
-    "half-cycle.",
-    "cuts_along": "Pressure, worn depths and temperatures along the sliding, a line for each chosen half-cycle.",
-    "cuts_across": "Pressure, worn depths and temperatures across the sliding, a line for each chosen half-cycle.",
-    "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
-}
 
 
 def write_report(
-    directory: Path, log: Callable[[str], None] = lambda message: None, *, complete: bool = False
+    directory: Path,
+    log: Callable[[str], None] = lambda message: None,
+    *,
+    complete: bool = False,
+    look: Look = STANDARD,
+    formats: Sequence[str] = ("png",),
 ) -> list[Path]:
     """Draw a run's figures and write its report.html; return the files.
 
@@ -69,20 +47,24 @@ def write_report(
         directory: The folder of the run.
         log: Called with a message where pictures of the bodies cannot be drawn.
         complete: Draw the animation and the pictures of the bodies, too, which takes longer.
+        look: Width and axis of the figures.
+        formats: Of the files, "png", "pdf" and "svg".
 
     Raises:
         CaseError: the folder holds no run.
         OutputError: a figure or the page cannot be written.
     """
     with writing(directory):
-        return _write_report(directory, log, complete)
+        return _write_report(directory, log, complete, look, formats)
 
 
-def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -> list[Path]:
+def _write_report(
+    directory: Path, log: Callable[[str], None], complete: bool, look: Look, formats: Sequence[str]
+) -> list[Path]:
     case = read_case(directory)
     if case.get("contact", {}).get("law") == "coulomb":
         return write_stick_report(directory)
-    paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()))
+    paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()), look, formats)
     if complete:
         from fenwear.report.animation import draw_animation
 
@@ -92,7 +74,7 @@ def _write_report(directory: Path, log: Callable[[str], None], complete: bool) -
         except DrawingError as error:
             log(f"warning: {error}")
     report = directory / REPORT
-    write_text(report, page(directory))
+    write_text(report, page(directory, look))
     return [*paths, report]
 
 
@@ -141,7 +123,7 @@ class Places:
     rows: list[Row]
 
 
-def page(directory: Path) -> str:
+def page(directory: Path, look: Look = STANDARD) -> str:
     """Return report.html of a run whose figures are drawn."""
     history, summary = read_history(directory), read_summary(directory)
     images, turned = _images(directory), _turned(history)
@@ -156,19 +138,19 @@ def page(directory: Path) -> str:
         warnings=summary.get("warnings", ()),
         tables=_tables(summary, history),
         places=_places(summary),
-        figures=[_figure(images, name, text) for name, text in SECTIONS.items()],
+        figures=[_figure(images, name, caption(name, history, look)) for name in SECTIONS if name in images],
         turned=turned and turned.html,
         nonce=turned and turned.nonce,
         bodies=_bodies(images),
         animations=_animations(images),
         change=_change(summary),
-        scale="the mean pressure" if model_of(history) == "plane" else "the pressure where the load is carried",
+        scale="the pressure scale",
         retries=summary.get("retries", {}),
-        convergence=_figure(images, "convergence", "Periodicity and optimum"),
+        convergence=_figure(images, "convergence", caption("convergence", history, look)),
         equilibrium_error=summary.get("largest_equilibrium_error"),
         heat_error=_heat_error(summary, history),
         heat=_heat(summary),
-        heat_balance=_figure(images, "heat_balance", "Heat balance"),
+        heat_balance=_figure(images, "heat_balance", caption("heat_balance", history, look)),
         stability=_stability(summary, history),
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
@@ -283,11 +265,11 @@ def _images(directory: Path) -> dict[str, Path]:
     return {path.name.removesuffix(".png"): path for path in found if path.stat().st_mtime >= since}
 
 
-def _figure(images: dict[str, Path], name: str, caption: str, alt: str = "") -> Picture | None:
+def _figure(images: dict[str, Path], name: str, text: str, alt: str = "") -> Picture | None:
     if name not in images:
         return None
     path = images[name]
-    return picture(path.read_bytes(), path.suffix[1:], caption, alt or ALT[name])
+    return picture(path.read_bytes(), path.suffix[1:], text, alt or text)
 
 
 KINDS = {

@@ -26,7 +26,8 @@ def program_figure(history: xarray.Dataset) -> Figure:
         shown.remove("load_factor")
     figure, axes = panels(max(1, len(shown)), 2.4)
     for ax, name in zip(axes, shown or ["load_factor"], strict=True):
-        ax.plot(history.time, history[name], color="0", marker=".", markersize=3, linewidth=1)
+        held = "steps-pre" if name in ("speed", "ambient") else "default"  # constant since the record before
+        ax.plot(history.time, history[name], color="0", marker=".", markersize=3, linewidth=1, drawstyle=held)
         unit = {"mm s-1": " (mm/s)"}.get(str(history[name].attrs.get("units")), "") if name == "speed" else ""
         ax.set_ylabel(f"{ACTED[name]}{unit}")
         low, high = float(history[name].min()), float(history[name].max())

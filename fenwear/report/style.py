@@ -3,48 +3,106 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray
+
+from fenwear.arrays import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from xarray import Dataset
 
 WIDTH = 7.0  # inches
+NARROW = 5.0  # inches: below it letters are smaller
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
-# Okabe and Ito's colours, without the yellow that fades in print; the dashes tell them apart in black and white.
-COLOURS = (BLUE, RED, GREEN, "#CC79A7", "#56B4E9", "#000000", "#E69F00")
+# After Okabe and Ito, without what fades on white paper; the dashes tell them apart in black and white.
+COLOURS = (BLUE, RED, GREEN, "#AA4499", "#000000", "#8C6D00", "#117A8B")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 DIRECTIONS = {1: ("rightward", "-", BLUE), -1: ("leftward", "--", RED)}
+BODY_COLOURS = {"punch": BLUE, "strip": RED}
+LIGHTEST = 0.72  # of viridis: what is lighter fades on white
 FORWARD = {1: "forward", -1: "backward"}  # of solids and rings: along or around
 ALONG_CONTACT = "position along the contact x (mm)"
+AXES = {"cycles": ("cycles", "cycle"), "distance": ("sliding distance (m)", "sliding distance (m)"),
+        "time": ("time (s)", "time (s)")}  # fmt: skip
 
 
-def direction_style(history: Dataset, direction: int) -> tuple[str, str, str]:
+@dataclass(frozen=True)
+class Look:
+    """What a user chooses of the figures.
+
+    Attributes:
+        width: Of a figure, inches.
+        axis: What a run is told by: "cycles", "distance" or "time".
+    """
+
+    width: float = WIDTH
+    axis: str = "cycles"
+
+    def course(self, history: xarray.Dataset) -> Array:
+        """Return where each recorded half-cycle ends on the axis (k,)."""
+        if self.axis == "time":
+            return history.time.values
+        if self.axis == "distance" and "sliding_distance" in history:
+            return 1e-3 * history.sliding_distance.values
+        if "cycles" in history:
+            return history.cycles.values
+        return history.half_cycle.values / len(np.unique(history.direction.values))
+
+    @property
+    def label(self) -> str:
+        """What stands below the axis."""
+        return AXES[self.axis][0]
+
+    @property
+    def of_one(self) -> str:
+        """What a single value of it is called."""
+        return AXES[self.axis][1]
+
+    def name(self, history: xarray.Dataset, half_cycle: int) -> str:
+        """Return a half-cycle in words of the axis, such as its cycle."""
+        row = int(np.flatnonzero(history.half_cycle.values == half_cycle)[0])
+        value = float(self.course(history)[row])
+        return f"{value:,.0f}" if value >= 1000 else f"{value:.4g}"
+
+
+STANDARD = Look()
+
+
+def direction_style(history: xarray.Dataset, direction: int) -> tuple[str, str, str]:
     """Return name, dashes and colour of a sliding direction in a run."""
     name, dashes, colour = DIRECTIONS[direction]
     return (name if history.attrs.get("model", "plane") == "plane" else FORWARD[direction]), dashes, colour
 
 
-def panels(count: int, height: float, *, share_x: bool = True, share_y: bool = False) -> tuple[Figure, list[Axes]]:
-    """Return a figure of panels below each other, each as high as given, inches."""
+def panels(
+    count: int, height: float, *, share_x: bool = True, share_y: bool = False, look: Look = STANDARD
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of lettered panels below each other, each as high as given for the full width, inches."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
-    with rc_context({"axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": "medium"}):
-        figure = Figure(figsize=(WIDTH, height * count), layout="constrained")
-        axes = figure.subplots(count, 1, sharex=share_x, sharey=share_y, squeeze=False)
-        return figure, list(axes[:, 0])
+    size = 10.0 if look.width >= NARROW else 8.0
+    settings = {"axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": "medium", "font.size": size}
+    with rc_context({**settings, "pdf.fonttype": 42, "svg.fonttype": "none"}):
+        scale = min(1.0, 0.35 + 0.65 * look.width / WIDTH)
+        figure = Figure(figsize=(look.width, scale * height * count), layout="constrained")
+        axes = list(figure.subplots(count, 1, sharex=share_x, sharey=share_y, squeeze=False)[:, 0])
+        if count > 1:
+            for ax, letter in zip(axes, "abcdefgh", strict=False):
+                ax.set_title(f"({letter})", loc="left")
+        return figure, axes
 
 
 def shades(values: Sequence[int]) -> list[tuple[Any, int]]:
     """Return a colour for each value, dark to light, even in grey."""
     from matplotlib import colormaps
 
-    lightness = np.linspace(0.0, 0.85, max(len(values), 2))
+    lightness = np.linspace(0.0, LIGHTEST, max(len(values), 2))
     return [(colormaps["viridis"](shade), n) for shade, n in zip(lightness, values, strict=False)]
 
 
@@ -54,8 +112,18 @@ def run_style(number: int) -> dict[str, Any]:
 
 
 def legend_beside(ax: Axes, title: str) -> None:
-    """Name the lines to the right of a panel, where none of them runs."""
-    ax.legend(title=title, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    """Name the lines beside a panel, or below it where it is narrow: none of them runs there."""
+    figure: Any = ax.figure
+    if figure.get_size_inches()[0] >= NARROW:
+        ax.legend(title=title or None, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    else:
+        ax.legend(title=title or None, loc="lower center", bbox_to_anchor=(0.5, 1.02), frameon=False, ncols=3,
+                  fontsize="small", title_fontsize="small", handlelength=1.5, columnspacing=1.0)  # fmt: skip
+
+
+def level_line(ax: Axes, height: float, name: str) -> None:
+    """Draw a dotted level that the legend names."""
+    ax.axhline(height, color=GREY, linewidth=1.0, linestyle=":", label=name)
 
 
 def reference_line(ax: Axes, height: float, name: str, at: float = 0.0) -> None:

@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray
 
-from fenwear.report.figures import (
+from fenwear.report.course import (
     by_direction,
-    chosen_half_cycles,
     convergence_figure,
     directions_present,
     half_cycle_axis,
     heat_balance_figure,
     mark_few,
     mean_pressure,
-    nearest_half_cycles,
     nominal_width,
-    pressure_top,
 )
+from fenwear.report.figures import chosen_half_cycles, nearest_half_cycles, pressure_top
 from fenwear.report.maps import cuts_figure, map_figure, quantities
 from fenwear.report.program import program_figure
 from fenwear.report.style import direction_style, legend_beside, panels, reference_line, run_style, shades

@@ -247,6 +247,7 @@ def write_fields(
         given = (body.displacement, body.out_of_plane, body.stress, body.von_mises, body.temperature, body.heat_flux)
         functions = [f for f in given if f is not None]
         data.update(_gathered(name, elastic, functions))
+        data.update(_groups(elastic))
     time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
     data.update(_contact_surfaces(system, worn, pressure))
@@ -332,6 +333,25 @@ def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) ->
                 "long_name": f"{text} of the {name}" + (f", {component}" if component else ""),
             }
             data[f"{name}_{field}{'_' if component else ''}{component}"] = (point, joined[:, k], attributes)
+    return data
+
+
+def _groups(elastic: ElasticBody) -> dict[str, Any]:
+    """Return where the named groups of a plane body's boundary are: lines (count, 2, 2), points (count, 1, 2); mm."""
+    if elastic.dim != 2:
+        return {}
+    body, mesh, data = elastic.body, elastic.body.mesh, {}
+    own = mesh.topology.index_map(1).size_local
+    for group, tag in sorted(body.curves.items()):
+        facets = body.facet_tags.find(tag)
+        ends = dolfinx.mesh.entities_to_geometry(mesh, 1, facets[facets < own])[:, :2]
+        lines = np.concatenate(mesh.comm.allgather(mesh.geometry.x[ends][:, :, :2]))
+        name = f"{body.name}_group_{group}"
+        data[name] = ((f"{name}_line", "end", "axis"), lines, {"units": "mm"})
+    for group, points in sorted(body.points.items()):
+        name = f"{body.name}_group_{group}"
+        where = np.asarray(points)[:, None, :2]
+        data[name] = ((f"{name}_line", "point", "axis"), where, {"units": "mm", "long_name": f"points of {group}"})
     return data
 
 

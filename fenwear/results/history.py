@@ -43,8 +43,8 @@ VARIABLES = {
     "max_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
     "contact_width": (("half_cycle",), "mm", "width in contact"),
     "worn_area": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
-    "optimum_distance": (("half_cycle",), "1", "largest distance to the optimal pressure over the mean pressure"),
-    "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the mean pressure"),
+    "optimum_distance": (("half_cycle",), "1", "largest distance to the optimal pressure over the pressure scale"),
+    "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the pressure scale"),
     "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
     "retries": (("half_cycle",), "1", "solves that took a second attempt, in another way or in smaller steps"),
     "weight": (("half_cycle", "x"), "mm", "length that each contact node stands for, on the mesh of the half-cycle"),
@@ -113,10 +113,15 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
     if system.case.model.kind != "plane":
         return surface_columns(system)
     text = "position along the contact, from the centre of the geometry"
-    columns = {"x": Column(("x",), pair.x, {"units": "mm", "long_name": text})}
+    columns = {
+        "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
+        "height": Column(("x",), pair.punch.x[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
+    }
     if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
         columns["x_strip"] = Column(("x_strip",), pair.strip.x[:, 0], {"units": "mm", "long_name": along})
+        unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
+        columns["height_strip"] = Column(("x_strip",), pair.strip.x[:, 1], unworn)
     return columns
 
 
@@ -213,6 +218,7 @@ class HistoryWriter:
             file.attrs["title"] = system.case.title or "fenwear run"
             file.attrs["Conventions"] = "CF-1.11"
             file.attrs["case"] = system.case.to_toml()
+            file.attrs["conforming"] = int(conforming(system.pair))
             file.attrs["versions"] = json.dumps(versions())
             sizes = self._sizes()
             file.dimensions = {"half_cycle": None, **sizes}

@@ -8,28 +8,32 @@ import numpy as np
 import pytest
 import xarray
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from fenwear import CaseError, load_case
 from fenwear.report.animation import draw_animation, frames_of
+from fenwear.report.chosen import chosen_formats, chosen_look
+from fenwear.report.course import convergence_figure, heat_balance_figure, peak_figure, scar_figure, volume_figure
 from fenwear.report.draw import draw_figures
 from fenwear.report.figures import (
     all_figures,
     chosen_half_cycles,
-    convergence_figure,
-    heat_balance_figure,
+    early_half_cycles,
     mean_pressure_figure,
     open_history,
-    peak_figure,
     pressure_figure,
     read_history,
     shape_figure,
     temperature_figure,
 )
+from fenwear.report.sections import element_edges
+from fenwear.report.shapes import profile_figure, wear_map_figure
+from fenwear.report.style import COLOURS, Look, shades
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
-SHOWN = {"shape", "pressure", "peaks", "convergence"}
+SHOWN = {"shape", "profiles", "wear_map", "pressure", "peaks", "volume", "scar", "friction", "convergence"}
 
 
 @pytest.fixture(scope="module", params=["example1", "example1-heat", "monotonic-lz20"])
@@ -44,9 +48,8 @@ def history(folder: Path) -> xarray.Dataset:
 
 
 def _lines(ax: Axes) -> dict[int, np.ndarray]:
-    """Return the data of the lines that are labelled with a number."""
-    named = {str(line.get_label()).replace(",", ""): line for line in ax.lines}
-    return {int(label): np.asarray(line.get_ydata()) for label, line in named.items() if label.isdigit()}
+    """Return the data of the lines of half-cycles by their numbers."""
+    return {int(line.get_gid()): np.asarray(line.get_ydata()) for line in ax.lines if line.get_gid()}
 
 
 def _expected(history: xarray.Dataset) -> set[str]:
@@ -60,6 +63,8 @@ def test_all_figures_are_images(folder: Path, history: xarray.Dataset) -> None:
     before = {p.name: np.asarray(Image.open(p)) for p in (folder / "figures").glob("*.png")}
     figures_at = load_case(folder / "case.toml").output.figures_at
     for path in draw_figures(folder, figures_at):
+        if path.suffix != ".png":
+            continue
         np.testing.assert_array_equal(np.asarray(Image.open(path)), before[path.name])
 
 
@@ -67,9 +72,9 @@ def test_curves_along_the_contact_are_the_history(history: xarray.Dataset) -> No
     """What is drawn is what was computed: pressure of each direction, their mean in a cycle, depth in micrometres."""
     axes = pressure_figure(history, [10, 20]).axes
     directions = [d for d in (1, -1) if (history.direction == d).any()]
-    assert len(axes) == len(directions)
-    for ax, d in zip(axes, directions, strict=True):
-        assert len(_lines(ax)) == 2
+    assert len(axes) >= len(directions)
+    assert sum(len(_lines(ax)) for ax in axes) == 2 * len(directions)
+    for ax, d in zip(axes, directions, strict=False):
         for number, drawn in _lines(ax).items():
             row = history.sel(half_cycle=number)
             assert row.direction == d
@@ -97,7 +102,7 @@ def test_curves_over_the_half_cycles_are_the_history(history: xarray.Dataset) ->
         for ax, name in zip(figure.axes, names, strict=True):
             for line, d in zip(ax.lines, directions, strict=False):
                 rows = history.direction.values == d
-                np.testing.assert_array_equal(line.get_xdata(), history.half_cycle[rows])
+                np.testing.assert_array_equal(line.get_xdata(), history.cycles[rows])
                 np.testing.assert_array_equal(line.get_ydata(), history[name][rows])
 
 
@@ -114,17 +119,111 @@ def test_curves_of_heat_are_the_history(history: xarray.Dataset) -> None:
 
 
 def test_axes_say_what_and_in_which_unit(history: xarray.Dataset) -> None:
-    """Every panel has a title and a label with its unit; lines differ by more than colour over the half-cycles."""
+    """Every panel has a label with its unit and no sentence in it; panels have letters, lines dashes."""
     figures = all_figures(history)
     assert set(figures) == _expected(history)
     for name, figure in figures.items():
-        for ax in figure.axes:
-            assert ax.get_title(loc="left")
-            assert "(" in ax.get_ylabel()
-        assert figure.axes[-1].get_xlabel()
+        panels = [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
+        for ax, letter in zip(panels, "abc", strict=False):
+            assert ax.get_title(loc="left") == (f"({letter})" if len(panels) > 1 else "")
+            assert "(" in ax.get_ylabel() or ax.get_ylabel() == "cycles"
+        assert panels[-1].get_xlabel()
         if name in ("peaks", "convergence"):
             styles = [line.get_linestyle() for line in figure.axes[0].lines if line.get_label()[0] != "_"]
             assert len(set(styles)) == len(styles)
+
+
+@pytest.mark.parametrize("folder", ["example1-heat"], indirect=True)
+@pytest.mark.parametrize(("width", "axis"), [("85 mm", "cycles"), ("178 mm", "distance")])
+def test_nothing_collides(history: xarray.Dataset, axis: str, width: str) -> None:
+    """At any width no text of a figure overlaps another one, and none is cut off."""
+    look = chosen_look(width, axis)
+    for name, figure in all_figures(history, look=look).items():
+        assert figure.get_size_inches()[0] == pytest.approx(float(width.split(maxsplit=1)[0]) / 25.4)
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        renderer = canvas.get_renderer()
+        inside = figure.bbox.padded(1)
+        texts = [ax.yaxis.label for ax in figure.axes] + [ax.xaxis.label for ax in figure.axes]
+        texts += [ax._left_title for ax in figure.axes]  # type: ignore[attr-defined]
+        texts += [text for ax in figure.axes if ax.get_legend() for text in ax.get_legend().get_texts()]
+        boxes = [t.get_window_extent(renderer) for t in texts if t.get_text() and t.get_visible()]
+        for k, box in enumerate(boxes):
+            assert inside.containsx(box.x0), (name, k)
+            assert inside.containsx(box.x1), (name, k)
+            assert not any(box.overlaps(other) for other in boxes[k + 1 :]), (name, k)
+
+
+def test_first_peaks_are_never_cut_off(history: xarray.Dataset) -> None:
+    """States far beyond all later ones have their own panel; every line lies within its axis; the last is shown."""
+    flat = history.copy(deep=True)
+    flat.pressure.values[:2, 0] *= 50
+    chosen = chosen_half_cycles(flat)
+    assert chosen[-1] == flat.half_cycle.values[-1]
+    assert early_half_cycles(flat, chosen)[:1] == [1]
+    for data in (history, flat):
+        figure = pressure_figure(data, chosen)
+        for ax in figure.axes:
+            for line in ax.lines:
+                assert np.max(line.get_ydata()) <= ax.get_ylim()[1]
+    assert len(figure.axes) == 1 + len(np.unique(history.direction))
+
+
+def test_no_colour_fades_on_white() -> None:
+    """Each has a contrast of 2 to white at least, and lines of bodies and directions of 3 (WCAG for graphics)."""
+    from matplotlib.colors import to_rgb
+
+    def contrast(colour: object) -> float:
+        rgb = np.array(to_rgb(colour))  # type: ignore[arg-type]
+        linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        return float(1.05 / (linear @ [0.2126, 0.7152, 0.0722] + 0.05))
+
+    assert min(contrast(colour) for colour in COLOURS) > 3
+    assert min(contrast(colour) for colour, _ in shades(range(6))) > 2
+
+
+def test_profiles_and_maps(history: xarray.Dataset) -> None:
+    """Heights are the unworn ones and the depth; the map begins at zero; volumes over the distance."""
+    (ax,) = profile_figure(history, [20]).axes
+    np.testing.assert_allclose(_lines(ax)[20], 1e3 * history.wear[-1], rtol=1e-9, atol=1e-9)  # of a flat punch
+    map_of = wear_map_figure(history, Look(axis="distance")).axes[0].collections[0]
+    values = np.asarray(map_of.get_array())
+    assert not values[0].any()
+    np.testing.assert_allclose(values[1:], 1e3 * history.wear, rtol=1e-12)
+    line = volume_figure(history, Look(axis="distance")).axes[0].lines[0]
+    np.testing.assert_allclose(line.get_xdata(), 1e-3 * history.sliding_distance, rtol=1e-12)
+    np.testing.assert_array_equal(line.get_ydata(), history.total_volume)
+    np.testing.assert_array_equal(scar_figure(history).axes[1].lines[0].get_ydata(), history.scar_width)
+
+
+@pytest.mark.parametrize("folder", ["monotonic-lz20"], indirect=True)
+def test_formats_and_looks(folder: Path) -> None:
+    """PDF and SVG beside PNG, with captions for all; what cannot be is said."""
+    paths = draw_figures(folder, (), Look(85 / 25.4, "time"), chosen_formats("pdf,svg"))
+    names = {path.stem for path in paths if path.suffix == ".pdf"}
+    assert {"geometry", "surface_stress", "profiles"} <= names
+    assert names == {path.stem for path in paths if path.suffix == ".svg"}
+    assert all(path.read_bytes().startswith(b"%PDF") for path in paths if path.suffix == ".pdf")
+    captions = (folder / "figures" / "captions.txt").read_text("utf-8")
+    assert all(f"{name}: " in captions for name in names)
+    assert "over the time" in captions
+    for wrong in ("gif", "", "png;pdf"):
+        with pytest.raises(CaseError, match="--format"):
+            chosen_formats(wrong)
+    for width, axis, option in (("5 K", "time", "--width"), ("1 m", "time", "--width"), ("85 mm", "x", "--axis")):
+        with pytest.raises(CaseError, match=option):
+            chosen_look(width, axis)
+
+
+def test_edges_of_elements() -> None:
+    """Of two elements of degree 2, each four squares, the outlines alone."""
+    grid = np.arange(15).reshape(3, 5)
+    cells = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1)
+    ordered = np.concatenate([cells[:, :2].reshape(-1, 4), cells[:, 2:].reshape(-1, 4)])
+    edges = {tuple(edge) for edge in element_edges(ordered, 4).tolist()}
+    assert len(edges) == 14
+    assert (2, 7) in edges
+    assert (1, 6) not in edges
 
 
 def test_animation(folder: Path, history: xarray.Dataset) -> None:

@@ -11,7 +11,8 @@ import pytest
 import xarray
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
-from fenwear.report.figures import mean_pressure, nominal_width, open_history
+from fenwear.report.course import mean_pressure, nominal_width
+from fenwear.report.figures import open_history
 from fenwear.results.history import free_directory, make_directory
 from fenwear.run import run_case
 

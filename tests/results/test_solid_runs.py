@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -151,3 +152,18 @@ def test_retried_half_cycles(tmp_path: Path, name: str, monkeypatch: pytest.Monk
     assert sum(summary["retries"].values()) == 1
     # What a rotation wears depends a little on the pressure, which the parts follow in smaller steps.
     np.testing.assert_allclose(data.worn_volume, usual.worn_volume, rtol=1e-12 if name == "ball-on-flat" else 1e-2)
+
+
+def test_two_ranks(fenwear: Callable[..., Any], tmp_path: Path) -> None:
+    """Two ranks write the same history as one, to 1e-9 of the largest value of each variable."""
+    settings = (*SETTINGS["pin-on-disc"], "run.half_cycles=6")
+    options = [word for setting in settings for word in ("--set", setting)]
+    for ranks in (1, 2):
+        done = fenwear("run", "pin-on-disc", "-q", "-o", tmp_path / str(ranks), *options, ranks=ranks)
+        assert done.returncode == 0, done.stderr
+    one, two = (history(tmp_path / str(ranks)) for ranks in (1, 2))
+    assert one.sizes == two.sizes
+    np.testing.assert_array_equal(one.facets, two.facets)
+    for name in ("x", "y", "along", "across", "pressure", "wear", "weight", "worn_volume", "scar_length", "scar_width"):
+        scale = float(np.abs(one[name]).max())
+        np.testing.assert_allclose(two[name], one[name], rtol=0, atol=1e-9 * scale, err_msg=name)

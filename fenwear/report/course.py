@@ -1,0 +1,209 @@
+"""Figures over a run: peaks, convergence, worn volume and rate, scars, forces, heat."""
+
+from __future__ import annotations
+
+from collections.abc import Sized
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+
+from fenwear.report.style import (
+    BODY_COLOURS,
+    DIRECTIONS,
+    STANDARD,
+    Look,
+    direction_style,
+    legend_beside,
+    level_line,
+    panels,
+    run_style,
+)
+from fenwear.results.history import HEAT_TERMS
+from fenwear.results.sheet import BODIES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MANY = 100.0  # last over first of a logarithmic axis, at least
+
+
+def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw largest pressure, width in contact and, with heat, largest temperature."""
+    hot = "max_temperature" in history
+    figure, axes = panels(3 if hot else 2, 2.5, look=look)
+    unit = history.max_temperature.attrs.get("units", "K") if hot else "K"
+    over = {
+        "max_pressure": "largest pressure (MPa)",
+        "contact_width": "width in contact (mm)",
+        "max_temperature": f"largest temperature ({shown_unit(unit)})",
+    }
+    for ax, (name, label) in zip(axes, over.items(), strict=False):
+        by_direction(ax, history, name, look)
+        ax.set_ylabel(label)
+    if is_conforming(history):
+        mean = mean_pressure(history)
+        level_line(axes[0], mean, f"mean {mean:.4g}")
+        level_line(axes[1], nominal_width(history), f"nominal {nominal_width(history):.4g}")
+    for ax in axes[:2]:
+        ax.set_ylim(bottom=0)
+        legend_beside(ax, "strip moves")
+    if hot:
+        legend_beside(axes[2], "strip moves")
+    run_axis(axes[-1], history, look)
+    return figure
+
+
+def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw the change against one cycle ago and the distance to the optimal pressure."""
+    figure, axes = panels(2, 2.7, look=look)
+    over = {"periodicity": "change in a cycle (-)", "optimum_distance": "distance to the optimum (-)"}
+    for ax, (name, label) in zip(axes, over.items(), strict=True):
+        by_direction(ax, history, name, look)
+        ax.set_ylabel(label)
+        legend_beside(ax, "strip moves")
+    axes[0].set_yscale("log")
+    axes[1].set_ylim(bottom=0)
+    run_axis(axes[-1], history, look)
+    return figure
+
+
+def volume_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw the worn volume and the specific wear rate of the bodies that wear."""
+    figure, axes = panels(2, 2.7, look=look)
+    x = look.course(history)
+    for body, end in BODIES.items():
+        if f"total_volume{end}" not in history:
+            continue
+        colour = BODY_COLOURS[body]
+        axes[0].plot(x, history[f"total_volume{end}"], color=colour, label=body, **mark_few(x))
+        axes[1].plot(x, history[f"wear_rate{end}"], color=colour, label=f"{body}, current", **mark_few(x))
+        axes[1].plot(x, history[f"mean_wear_rate{end}"], color=colour, linestyle="--", label=f"{body}, mean")
+    axes[0].set_ylabel("worn volume (mm³)")
+    axes[1].set_ylabel("specific wear rate\n(mm³/(N m))")
+    for ax in axes:
+        ax.set_ylim(bottom=0)
+        legend_beside(ax, "")
+    run_axis(axes[-1], history, look, logarithmic=False)
+    return figure
+
+
+def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw the largest worn depths and the widths of the scars."""
+    figure, axes = panels(2, 2.7, look=look)
+    x = look.course(history)
+    for body, end in BODIES.items():
+        if f"max_wear{end}" not in history:
+            continue
+        colour = BODY_COLOURS[body]
+        axes[0].plot(x, 1e3 * history[f"max_wear{end}"], color=colour, label=body, **mark_few(x))
+        axes[1].plot(x, history[f"scar_width{end}"], color=colour, label=f"{body}, at 1 %", **mark_few(x))
+        axes[1].plot(x, history[f"scar_width_5{end}"], color=colour, linestyle="--", label=f"{body}, at 5 %")
+    axes[0].set_ylabel("largest worn depth (µm)")
+    axes[1].set_ylabel("scar width (mm)")
+    for ax in axes:
+        ax.set_ylim(bottom=0)
+        legend_beside(ax, "")
+    run_axis(axes[-1], history, look)
+    return figure
+
+
+def friction_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw normal and friction force and the work of friction."""
+    figure, axes = panels(2, 2.4, look=look)
+    x = look.course(history)
+    for number, (name, text) in enumerate((("normal_force", "normal"), ("friction_force", "friction"))):
+        axes[0].plot(x, history[name], label=text, **run_style(number), **mark_few(x))
+    axes[0].set_ylabel("force (N)")
+    axes[1].plot(x, 1e-3 * history.friction_work, color="0", **mark_few(x))
+    axes[1].set_ylabel("work of friction (J)")
+    legend_beside(axes[0], "")
+    for ax in axes:
+        ax.set_ylim(bottom=0)
+    run_axis(axes[-1], history, look, logarithmic=False)
+    return figure
+
+
+def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw where the friction heat of each half-cycle goes."""
+    figure, (ax,) = panels(1, 3.8, look=look)
+    friction, x = history.heat_friction, look.course(history)
+    ax.plot(x, friction, color="0", linewidth=2.5, label="made by friction")
+    names = {
+        "convected": "lost to the surroundings",
+        "held": "lost where temperature is held",
+        "stored": "gained by both bodies",
+        "debris": "carried off by debris",
+        "carried": "carried out by the strip",
+    }
+    assert names.keys() == HEAT_TERMS.keys() - {"friction"}
+    threshold = 1e-6 * float(np.abs(friction).max())
+    for number, (name, text) in enumerate(names.items()):
+        values = history[f"heat_{name}"]
+        if float(np.abs(values).max()) > threshold:
+            ax.plot(x, values, label=text, **run_style(number))
+        else:
+            ax.plot([], [], " ", label=f"{text}: none")
+    ax.set_ylabel("heat per half-cycle (mJ)")
+    legend_beside(ax, "")
+    run_axis(ax, history, look)
+    return figure
+
+
+def mean_pressure(history: xarray.Dataset) -> float:
+    """Return the load over the nominal contact, MPa."""
+    last = history.isel(half_cycle=-1)
+    return float((last.pressure * last.weight).sum() / last.weight.sum())
+
+
+def nominal_width(history: xarray.Dataset) -> float:
+    """Return the width of the nominal contact at the end, mm."""
+    return float(history.weight.isel(half_cycle=-1, missing_dims="ignore").sum())
+
+
+def is_conforming(history: xarray.Dataset) -> bool:
+    """Return whether the unworn surfaces lie on each other: only then is load over nominal contact a pressure."""
+    return bool(history.attrs.get("conforming", 0))
+
+
+def directions_present(history: xarray.Dataset) -> list[int]:
+    """Return the sliding directions of a run, rightward first."""
+    return [d for d in DIRECTIONS if bool((history.direction == d).any())]
+
+
+def shown_unit(unit: str) -> str:
+    """Return a unit as figures show it."""
+    return {"degC": "°C"}.get(unit, unit)
+
+
+def mark_few(points: Sized) -> dict[str, Any]:
+    """Return the style of a line of so few points that without marks nothing may be seen."""
+    return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
+
+
+def by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Look = STANDARD) -> None:
+    """Draw a variable over the run, a line for each direction."""
+    x = look.course(history)
+    for d in directions_present(history):
+        text, dashes, colour = direction_style(history, d)
+        rows = history.direction.values == d
+        ax.plot(x[rows], history[name][rows], dashes, color=colour, label=text, **mark_few(rows.nonzero()[0]))
+
+
+def run_axis(ax: Axes, history: xarray.Dataset, look: Look, *, logarithmic: bool = True) -> None:
+    """Label the axis of the run: logarithmic where wear alone slows down, linear with heat's own pace."""
+    x = look.course(history)
+    first, last = float(x[0]), float(x[-1])
+    slows_down = int(history.half_cycle[-1]) > 10_000 or "max_temperature" not in history
+    if logarithmic and slows_down and first > 0 and last > MANY * first:
+        ax.set_xscale("log")
+        ax.set_xlim(first, last)
+    elif last > first:
+        ax.set_xlim(0 if not logarithmic else first, last)
+    ax.set_xlabel(look.label)
+
+
+def half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
+    """Label the axis of cycles of a figure of solids or rings."""
+    run_axis(ax, history, STANDARD)

@@ -1,0 +1,165 @@
+"""Figures of the bodies: geometry with mesh, supports, loads and coordinates; stresses along both contact surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.case.units import convert
+from fenwear.report.style import BLUE, GREEN, GREY, RED, STANDARD, Look, contact_axis, legend_beside, panels, run_style
+from fenwear.results.sheet import BODIES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COMPONENTS = {"xx": "σ xx", "zz": "σ zz", "xz": "σ xz"}
+CLOSE_UP = 0.75  # of the contact's width: what a close view has of the bodies above and below
+PLATE: Any = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1}
+FILLS = {"punch": "#d6e4f0", "strip": "#f3e3d6"}
+
+
+def stress_figure(fields: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw the components of the stress and von Mises' stress along the contact surfaces of both bodies."""
+    figure, axes = panels(2, 3.0, look=look)
+    contact = fields.punch_contact_x.values
+    margin = 0.25 * np.ptp(contact)
+    for ax, body in zip(axes, BODIES, strict=True):
+        x = fields[f"{body}_contact_x"].values
+        nodes = _contact_nodes(fields, body)
+        order = np.argsort(x)
+        for number, (part, text) in enumerate(COMPONENTS.items()):
+            values = fields[f"{body}_stress_{part}"].values[nodes][order]
+            ax.plot(x[order], values, label=text, **run_style(number))
+        values = fields[f"{body}_von_mises"].values[nodes][order]
+        ax.plot(x[order], values, label="von Mises", **run_style(len(COMPONENTS)))
+        ax.set_ylabel(f"stress of the {body} (MPa)")
+        legend_beside(ax, "")
+    contact_axis(axes[-1])
+    axes[-1].set_xlim(contact.min() - margin, contact.max() + margin)
+    return figure
+
+
+def _contact_nodes(fields: xarray.Dataset, body: str) -> NDArray[np.int64]:
+    """Return which nodes of a body its contact nodes are."""
+    from scipy.spatial import KDTree
+
+    points = np.column_stack([fields[f"{body}_{a}"].values for a in "xz"])
+    return KDTree(points).query(np.column_stack([fields[f"{body}_contact_{a}"].values for a in "xz"]))[1]
+
+
+def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look = STANDARD) -> Figure:
+    """Draw both bodies with their elements, supports, loads and coordinates: whole, and near the contact."""
+    from matplotlib.lines import Line2D
+
+    figure, axes = panels(2, 4.2, share_x=False, look=look)
+    x, z = fields.punch_contact_x.values, fields.punch_contact_z.values
+    width = float(np.ptp(x))
+    for ax in axes:
+        for body in BODIES:
+            _elements(ax, fields, body)
+            _ends(ax, fields, body, case, named=ax is axes[0])
+        ax.plot(x, z, color=GREEN, linewidth=2.0)
+        ax.set_aspect("equal", adjustable="box")
+        ax.set_xlabel("x (mm)")
+        ax.set_ylabel("z (mm)")
+    low, high = float(z.min()) - CLOSE_UP * width, float(z.min()) + CLOSE_UP * width
+    axes[1].set_xlim(x.min() - 0.5 * width, x.max() + 0.5 * width)
+    axes[1].set_ylim(low, high)
+    _sliding(axes[1], float(x.mean()), low, width)
+    named = {
+        "contact": Line2D([], [], color=GREEN, linewidth=2.0),
+        "held": Line2D([], [], color=RED, linewidth=2.5),
+        "loaded": Line2D([], [], color=BLUE, linewidth=2.5),
+    }
+    axes[0].legend(named.values(), named.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    return figure
+
+
+def _elements(ax: Axes, fields: xarray.Dataset, body: str) -> None:
+    """Draw the elements of a body: the edges of its linear cells that lie on an element's boundary."""
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    cells = fields[f"{body}_cells"].values
+    points = np.column_stack([fields[f"{body}_{a}"].values for a in "xz"])
+    parts = int(fields[f"{body}_cells"].attrs["degree"]) ** 2  # linear cells of an element
+    ax.add_collection(PolyCollection(points[cells], facecolors=FILLS[body], edgecolors="none", rasterized=True))
+    lines = element_edges(cells, parts)
+    ax.add_collection(LineCollection(list(points[lines]), colors=GREY, linewidths=0.3))
+    ax.update_datalim(points)
+    ax.autoscale_view()
+
+
+def element_edges(cells: NDArray[np.int64], parts: int) -> NDArray[np.int64]:
+    """Return the edges (e, 2) that belong to one linear cell alone of the `parts` of its element.
+
+    Args:
+        cells: Corners of the linear cells (count, 4), those of an element one after the other.
+        parts: Linear cells of an element.
+    """
+    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    element = np.repeat(np.arange(len(cells)) // parts, cells.shape[1])
+    keep = edges[:, 0] != edges[:, 1]  # of triangles the last corner stands twice
+    keyed, counts = np.unique(np.column_stack([element, edges])[keep], axis=0, return_counts=True)
+    return np.unique(keyed[counts == 1, 1:], axis=0)
+
+
+def _ends(ax: Axes, fields: xarray.Dataset, body: str, case: Mapping[str, Any], *, named: bool) -> None:
+    """Draw what holds a body and what loads it."""
+    size = 0.05 * float(np.hypot(*(np.ptp(fields[f"{body}_{a}"].values) for a in "xz")))
+    for support in case.get(body, {}).get("supports", ()):
+        lines = _group(fields, body, support)
+        for line in lines:
+            ax.plot(*line.T, color=RED, linewidth=2.5, marker="^" if len(line) == 1 else None, zorder=3)
+        if len(lines) and named:
+            _name(ax, np.concatenate(lines), "held: " + ", ".join(f"u{axis}" for axis in support["fix"]), RED)
+    for load in case.get(body, {}).get("loads", ()):
+        lines = _group(fields, body, load)
+        for line in lines:
+            ax.plot(*line.T, color=BLUE, linewidth=2.5, marker="o" if len(line) == 1 else None, zorder=3)
+        way = np.array([convert(part, unit) for part, unit in _vector(load)])
+        if len(lines) and np.linalg.norm(way) > 0:
+            points = np.concatenate(lines)
+            step = size * way / np.linalg.norm(way)
+            for end in points[np.unique(np.linspace(0, len(points) - 1, 5).round().astype(int))]:
+                ax.annotate("", end, end - step, arrowprops={"arrowstyle": "-|>", "color": BLUE}, zorder=4)
+
+
+def _vector(load: Mapping[str, Any]) -> list[tuple[Any, str]]:
+    key, unit = ("force", "N") if load.get("force") is not None else ("traction", "MPa")
+    return [(part, unit) for part in load[key]]
+
+
+def _name(ax: Axes, points: Array, text: str, colour: str) -> None:
+    """Write a name beside what is held, clear of it."""
+    right = points[points[:, 0] > points[:, 0].max() - 1e-6 * (1 + np.ptp(points[:, 0]))]
+    upright = np.ptp(right[:, 1]) > 0 or len(points) == 1
+    x, z = right.mean(axis=0) if upright else points.mean(axis=0)
+    offset = (6, 0) if upright else (0, -6)
+    ax.annotate(text, (x, z), offset, textcoords="offset points", color=colour, fontsize="small", zorder=5,
+                ha="left" if upright else "center", va="center" if upright else "top", clip_on=True,
+                annotation_clip=True, bbox=PLATE)  # fmt: skip
+
+
+def _group(fields: xarray.Dataset, body: str, part: Mapping[str, Any]) -> list[Array]:
+    """Return the lines (2, 2) or points (1, 2) of the group that a support or a load is on, mm."""
+    if part.get("at") is not None:
+        return [np.array([[convert(c, "mm") for c in part["at"]]])]
+    name = f"{body}_group_{part['on']}"
+    return list(fields[name].values) if name in fields else []
+
+
+def _sliding(ax: Axes, x: float, z: float, width: float) -> None:
+    """Draw the axes and the way of the strip."""
+    ax.annotate("", (x + 0.25 * width, z + 0.12 * width), (x - 0.25 * width, z + 0.12 * width),
+                arrowprops={"arrowstyle": "<|-|>", "color": "0"}, zorder=5)  # fmt: skip
+    ax.annotate("strip slides", (x, z + 0.14 * width), ha="center", va="bottom", fontsize="small", bbox=PLATE, zorder=5)
+    for end, text in (((0.16, 0.06), "x"), ((0.06, 0.20), "z")):
+        ax.annotate("", end, (0.06, 0.06), xycoords="axes fraction", textcoords="axes fraction",
+                    arrowprops={"arrowstyle": "-|>", "color": "0"}, zorder=6)  # fmt: skip
+        ax.text(*end, text, transform=ax.transAxes, bbox=PLATE, zorder=6)

@@ -1,0 +1,74 @@
+"""Figures of the worn surfaces: profiles of both bodies, initial and worn, and wear over place and time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+
+from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, panels, shades
+from fenwear.results.sheet import BODIES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def surfaces_of(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
+    """Return abscissae, worn depths and unworn heights (mm) of the surfaces that wear, by the body."""
+    found = {}
+    for body, end in BODIES.items():
+        if f"wear{end}" in history and (body == "punch" or f"x{end}" in history):
+            x = history[f"x{end}"].values
+            height = history[f"height{end}"].values if f"height{end}" in history else np.zeros_like(x)
+            found[body] = (x, history[f"wear{end}"], height)
+    return found
+
+
+def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+    """Draw the surfaces as a profilometer sees them, the height over x: unworn, and worn at the chosen half-cycles.
+
+    Depths are drawn along z: right where slopes are small, as those of worn surfaces are.
+    """
+    surfaces = surfaces_of(history)
+    figure, axes = panels(len(surfaces), 3.0, look=look)
+    for ax, (body, (x, depth, height)) in zip(axes, surfaces.items(), strict=True):
+        zero = height.min() if body == "punch" else height.max()
+        ax.plot(x, 1e3 * (height - zero), color="0", linestyle="--", linewidth=1.2, label="unworn")
+        sign = 1 if body == "punch" else -1
+        for colour, n in shades(half_cycles):
+            z = height - zero + sign * depth.sel(half_cycle=n).values
+            ax.plot(x, 1e3 * z, color=colour, label=look.name(history, n), gid=str(n))
+        ax.set_ylabel(f"height of the {body} (µm)")
+        legend_beside(ax, look.of_one)
+    left, right = worn_range(history)
+    axes[-1].set_xlim(left, right)
+    contact_axis(axes[-1])
+    return figure
+
+
+def worn_range(history: xarray.Dataset) -> tuple[float, float]:
+    """Return the ends of the punch's contact and of the strip's scar, mm."""
+    ends = [history.x.values]
+    if "wear_strip" in history and "x_strip" in history:
+        ends.append(history.x_strip.values[history.wear_strip.values.max(axis=0) > 0])
+    x = np.concatenate(ends)
+    return float(x.min()), float(x.max())
+
+
+def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw the worn depth over place and run, a panel for each body that wears."""
+    surfaces = surfaces_of(history)
+    figure, axes = panels(len(surfaces), 3.0, look=look)
+    course = look.course(history)
+    for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
+        rows, values = np.concatenate([[0.0], course]), np.vstack([np.zeros(len(x)), 1e3 * depth.values])
+        drawn = ax.pcolormesh(x, rows, values, shading="gouraud", cmap="Blues", vmin=0, rasterized=True)
+        bar = figure.colorbar(drawn, ax=ax)
+        bar.set_label(f"worn depth of the {body} (µm)")
+        ax.set_ylabel(look.label)
+    left, right = worn_range(history)
+    axes[-1].set_xlim(left, right)
+    contact_axis(axes[-1])
+    return figure

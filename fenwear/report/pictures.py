@@ -19,6 +19,8 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from fenwear.report.magnification import magnification
+from fenwear.report.solid_pictures import draw_solids
 from fenwear.report.style import FORWARD, save_gif
 
 if TYPE_CHECKING:
@@ -107,8 +109,6 @@ def draw_here(directory: Path) -> list[Path]:
     paths = []
     model = datasets[0].attrs.get("model", "plane")
     if model != "plane":
-        from fenwear.report.solid_pictures import draw_solids
-
         paths = draw_solids(datasets, folder, SHOWN)
         if model == "solid":
             return paths
@@ -152,15 +152,6 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
     # Displacement that is magnified fits surfaces which lie on each other, not the gap between curved ones.
     curved = any(np.abs(surface - contact).max() > FLAT * width for surface in surfaces)
     return View(box, contact, 1.0 if curved else magnification(largest, width), ranges)
-
-
-def magnification(largest: float, width: float) -> float:
-    """Return a round factor that shows the largest displacement as about a tenth of the width."""
-    if largest <= 0:
-        return 1.0
-    target = 0.1 * width / largest
-    power = 10.0 ** np.floor(np.log10(target))
-    return float(max(step * power for step in (1, 2, 5) if step * power <= target))
 
 
 def deformed(data: xarray.Dataset, body: str, view: View) -> NDArray[np.float64]:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
+from fenwear.report.magnification import magnification
 from fenwear.report.style import GREY
 
 if TYPE_CHECKING:
@@ -84,9 +85,7 @@ def draw_solids(datasets: Sequence[xarray.Dataset], folder: Path, shown: dict[st
         folder: For the pictures.
         shown: Name, unit and colours of each field.
     """
-    from fenwear.report.pictures import magnification
-
-    view = solid_view(datasets, shown, magnification)
+    view = solid_view(datasets, shown)
     paths = []
     for field in view.ranges:
         for data in datasets:
@@ -112,7 +111,7 @@ def displacement(data: xarray.Dataset, body: str) -> Array:
     return np.column_stack([np.zeros(size) if c is None else c for c in columns])
 
 
-def solid_view(datasets: Sequence[xarray.Dataset], shown: dict[str, Any], magnification: Any) -> SolidView:
+def solid_view(datasets: Sequence[xarray.Dataset], shown: dict[str, Any]) -> SolidView:
     """Return the view that fits all half-cycles."""
     first = datasets[0]
     x = points(first, "punch", "_contact")

@@ -17,7 +17,6 @@ import traceback
 from collections.abc import Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -25,29 +24,12 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
 from fenwear.errors import FenwearError, InterruptedRunError, OutputError
-from fenwear.sweeps.evaluate import Values, Workshop
+from fenwear.sweeps.evaluate import Workshop
 from fenwear.sweeps.plan import Of, Variant, in_pieces
-from fenwear.sweeps.store import keep
+from fenwear.sweeps.store import Outcome, keep
 
 WORTH = 8.0  # s of work for one process from which on several are started: each takes about 2 s to begin
 _workshop = Workshop()  # of a worker: what its last variant was computed on
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a variant.
-
-    Attributes:
-        place: Of the variant in the sweep.
-        values: Its results; None where it failed.
-        trouble: Why it failed.
-        seconds: That it took.
-    """
-
-    place: tuple[int, ...]
-    values: Values | None
-    trouble: str
-    seconds: float
 
 
 def compute(piece: Sequence[Variant], of: Of, folder: Path | None) -> list[Outcome]:

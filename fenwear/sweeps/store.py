@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray
@@ -17,14 +18,28 @@ from fenwear.results.disk import writing
 from fenwear.sweeps.evaluate import MEANINGS, Values, meaning
 from fenwear.sweeps.plan import Plan
 
-if TYPE_CHECKING:
-    from fenwear.sweeps.engines import Outcome
-
 VARIANTS, DATASET, TABLE = "variants", "sweep.nc", "sweep.csv"
 SECONDS = "seconds"
 NODES = ("x", "y", "weight", "direction")  # coordinates where they are the same in all variants
 SAME = 1e-9  # of their range
 Place = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a variant.
+
+    Attributes:
+        place: Of the variant in the sweep.
+        values: Its results; None where it failed.
+        trouble: Why it failed.
+        seconds: That it took.
+    """
+
+    place: Place
+    values: Values | None
+    trouble: str
+    seconds: float
 
 
 def keep(folder: Path, name: str, values: Values, seconds: float) -> None:

@@ -14,9 +14,9 @@ from fenwear.parallel import on_root
 from fenwear.results.disk import writing
 from fenwear.results.history import make_directory, write_case
 from fenwear.sweeps.axes import Axis, make_axis
-from fenwear.sweeps.engines import Outcome, outcomes
+from fenwear.sweeps.engines import outcomes
 from fenwear.sweeps.plan import Plan, make_plan
-from fenwear.sweeps.store import VARIANTS, gathered, kept, write
+from fenwear.sweeps.store import VARIANTS, Outcome, gathered, kept, write
 
 Progress = Callable[[int, int], None]
 

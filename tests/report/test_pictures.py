@@ -11,6 +11,7 @@ import pytest
 import xarray
 from PIL import Image
 
+from fenwear.report.magnification import magnification
 from fenwear.report.pictures import (
     FIELDS,
     DrawingError,
@@ -18,7 +19,6 @@ from fenwear.report.pictures import (
     deformed,
     draw_pictures,
     field_files,
-    magnification,
 )
 
 

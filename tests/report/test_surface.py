@@ -18,7 +18,7 @@ from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.figures import read_history
 from fenwear.report.maps import LEVELS, map_figure, quantities
 from fenwear.report.page import numbers_of
-from fenwear.report.pictures import SHOWN, draw_pictures, magnification
+from fenwear.report.pictures import SHOWN, draw_pictures
 from fenwear.report.solid_pictures import deformed, displacement, points, solid_view
 from fenwear.report.surface import Surface, centre_of_wear, model_of, radial, surface_of
 from fenwear.report.surface_figures import conforms, surface_figures
@@ -228,7 +228,7 @@ def test_deformed_bodies_touch(folders: dict[str, Path]) -> None:
     (path,) = (folder / "fields").glob("*.nc")
     with xarray.open_dataset(path, engine="h5netcdf") as opened:
         data = opened.load()
-    view = solid_view([data], SHOWN, magnification)
+    view = solid_view([data], SHOWN)
     assert view.factor > 1
     np.testing.assert_allclose(view.along, [0, 1, 0], atol=1e-9)
     heights = {}

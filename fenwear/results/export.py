@@ -97,8 +97,8 @@ def _chosen(history: xarray.Dataset, record: str, at: str) -> list[int]:
     if missing:
         near = min(kept, key=lambda number: abs(number - int(missing[0])))
         text = (
-            f"{RECORDS[record]} {missing[0]} was not kept: the nearest that was is {near}; "
-            f"kept are {len(kept)} from {kept[0]} to {kept[-1]}"
+            f"{RECORDS[record]} {missing[0]} was not kept, but {near} was, the nearest of {len(kept)} "
+            f"from {kept[0]} to {kept[-1]}"
         )
         raise CaseError(InputError("--at", text))
     return sorted({rows[word] for word in plain})

@@ -85,8 +85,9 @@ def _chosen(history: xarray.Dataset, record: str, at: str) -> list[int]:
     Raises:
         CaseError: one was not kept, or is no number.
     """
-    kept = history[record].values.tolist()
-    rows = {str(number): row for row, number in enumerate(kept)} | {"first": 0, "last": len(kept) - 1}
+    kept: list[int] = [int(number) for number in history[record].values]
+    rows = {str(number): row for row, number in enumerate(kept)}
+    rows |= {"first": 0, "last": len(kept) - 1}
     words = [word.strip() for word in at.split(",") if word.strip()]
     plain = [word.lstrip("0") or "0" if word.isdecimal() else word for word in words]
     wrong = [word for word in plain if not (word.isdecimal() or word in ENDS)]
@@ -95,7 +96,8 @@ def _chosen(history: xarray.Dataset, record: str, at: str) -> list[int]:
         raise CaseError(InputError("--at", text))
     missing = [word for word in plain if word not in rows]
     if missing:
-        near = min(kept, key=lambda number: abs(number - int(missing[0])))
+        wanted = int(missing[0])
+        near = min(kept, key=lambda number: abs(number - wanted))
         text = (
             f"{RECORDS[record]} {missing[0]} was not kept, but {near} was, the nearest of {len(kept)} "
             f"from {kept[0]} to {kept[-1]}"
@@ -125,7 +127,7 @@ def _loops(history: xarray.Dataset, record: str, rows: Sequence[int]) -> list[Co
 def _profile(history: xarray.Dataset, record: str, dimension: str, rows: Sequence[int]) -> list[Column]:
     """Return the places on a surface, its unworn height where known, and what there is of each chosen record."""
     places = [name for name in history.variables if history[name].dims == (dimension,)]
-    columns = [(_heading(history, name), history[name].values.tolist()) for name in places]
+    columns: list[Column] = [(_heading(history, name), history[name].values.tolist()) for name in places]
     end = "_strip" if dimension.endswith("_strip") else ""
     for row in rows:
         number = int(history[record].values[row])

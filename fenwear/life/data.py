@@ -217,7 +217,7 @@ class _Reader:
                 raise ValueError(f"expected a unit such as {to}, got a pure number")
             zero, one = (convert(f"{number} {unit}".strip(), to) for number in (0, 1))
         except ValueError as error:
-            message = str(error).replace(f"got '0 {unit}'", f"got {unit!r}")  # of the unit alone: no row has that number
+            message = str(error).replace(f"got '0 {unit}'", f"got {unit!r}")  # no row has that number
             raise self._fail(f"column {name!r}", f"unit: {message}") from None
         return values * (one - zero) + zero
 

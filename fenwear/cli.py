@@ -325,6 +325,23 @@ def plot_command(
         print(path)
 
 
+@app.command("export")
+def export_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The folder of the CSV files; by default DIR/export.")
+    ] = None,
+    at: Annotated[
+        str, typer.Option(metavar="NUMBERS", help="Kept half-cycles of the profiles, first and last too, with commas.")
+    ] = "first,last",
+) -> None:
+    """Write a run as CSV: a line for each kept half-cycle, and the profiles of both bodies."""
+    from fenwear.results.export import export
+
+    for path in on_root(MPI.COMM_WORLD, lambda: export(directory, output, at)):
+        print(path)
+
+
 @app.command("compare")
 def compare_command(
     directories: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The folders of several runs.")],

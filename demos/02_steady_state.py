@@ -23,8 +23,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import FenwearError, assemble, jump, load_case, steady, vary
-from fenwear.cycle import cycles_to_reach
+from fenwear import FenwearError, assemble, cycles_to_reach, jump, load_case, steady, vary
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
 settings = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"] if COARSE else []

@@ -168,7 +168,7 @@ for value, found in law[2]:
     print(f"b = {value:3g}: largest pressure {found.pressure.max() / mean:.3f} times the mean")
 
 # %%
-print("cycles until the pressures are within 1 % of the mean pressure:")
+print("cycles until the pressures are within 1 % of the pressure scale:")
 for factor in (0.5, 1.0, 2.0):
     varied = vary(system, f"wear.punch.coefficient={factor * 3.93e-8}")
     found = steady(varied)

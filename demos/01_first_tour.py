@@ -176,7 +176,7 @@ plt.show()
 # ## The key numbers
 #
 # `summary.json` has them, each with its unit in its name. Two are checks: the balance of forces and moments, relative
-# to the load, and the periodicity, the change of pressure against one cycle ago over the mean pressure.
+# to the load, and the periodicity, the change of pressure against one cycle ago over the pressure scale.
 
 # %%
 keys = ("half_cycles", "stop", "mean_pressure_MPa", "wear_mm", "rightward", "leftward", "periodicity")

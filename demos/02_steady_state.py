@@ -23,8 +23,7 @@ import time
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import FenwearError, assemble, jump, load_case, steady, vary
-from fenwear.cycle import cycles_to_reach
+from fenwear import FenwearError, assemble, cycles_to_reach, jump, load_case, steady, vary
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
 settings = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"] if COARSE else []
@@ -169,7 +168,7 @@ for value, found in law[2]:
     print(f"b = {value:3g}: largest pressure {found.pressure.max() / mean:.3f} times the mean")
 
 # %%
-print("cycles until the pressures are within 1 % of the mean pressure:")
+print("cycles until the pressures are within 1 % of the pressure scale:")
 for factor in (0.5, 1.0, 2.0):
     varied = vary(system, f"wear.punch.coefficient={factor * 3.93e-8}")
     found = steady(varied)

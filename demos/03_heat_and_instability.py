@@ -27,8 +27,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import assemble, load_case, march, steady, vary
-from fenwear.cycle import critical_speed, growth_rate
+from fenwear import assemble, critical_speed, growth_rate, load_case, march, steady, vary
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles
 settings = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"] if COARSE else []

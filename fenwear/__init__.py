@@ -14,17 +14,25 @@ from typing import Any
 __version__ = "0.2.0"
 
 __all__ = [
+    "Block",
     "Case",
     "CaseError",
     "ConvergenceError",
     "FenwearError",
+    "Steady",
     "Tribosystem",
     "assemble",
+    "critical_speed",
+    "cycles_to_reach",
+    "export",
+    "growth_rate",
     "jump",
     "load_case",
     "make_case",
     "march",
+    "read_history",
     "register_law",
+    "run_case",
     "steady",
     "sweep",
     "vary",
@@ -41,9 +49,17 @@ _HOMES = {
     "Tribosystem": "assembly",
     "assemble": "assembly",
     "vary": "assembly",
+    "Block": "cycle",
+    "Steady": "cycle",
+    "critical_speed": "cycle",
+    "cycles_to_reach": "cycle",
+    "growth_rate": "cycle",
     "jump": "cycle",
     "march": "cycle",
     "steady": "cycle",
+    "run_case": "run",
+    "export": "results.export",
+    "read_history": "report.figures",
     "sweep": "sweeps",
 }
 
@@ -55,3 +71,8 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     return getattr(import_module(f"fenwear.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """Return the public names, for completion."""
+    return sorted(__all__)

@@ -172,14 +172,23 @@ def _coordinates(system: Tribosystem) -> dict[str, Any]:
 
 
 def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
-    """Print the state as soon as it is there: the way to it may take longer."""
+    """Print the state as soon as it is there: the way to it may take longer.
+
+    The load over the whole surface is a pressure only where the surfaces lie on each other before they wear.
+    """
+    from fenwear.cycle.state import pressure_scale
+    from fenwear.results.scar import conforming
+
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
     words = system.sliding.field.words
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
         print(f"  strip moves {words[d]:9} largest pressure {p.max():8.3f} MPa, "
               f"contact {part.format(width)}")  # fmt: skip
-    print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
+    if conforming(system.pair):
+        print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
+    scale = pressure_scale(system, state.phase_pressure)
+    print(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
     if state.heat is not None:
         punch, strip = state.heat.punch.max(), state.heat.strip.max()
@@ -192,9 +201,9 @@ def _print_way(rate: float, cycles: int | None, seconds: dict[str, float], in_al
     if rate > 0:
         print(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
     elif cycles is None:
-        print("  pressure within 1 % of the mean pressure: not within ten million cycles from the initial shape")
+        print("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
     else:
-        print(f"  pressure within 1 % of the mean pressure after about {cycles:,} cycles from the initial shape")
+        print(f"  pressure within 1 % of the pressure scale after about {cycles:,} cycles from the initial shape")
     print(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
           f"steady state {_duration(seconds['steady'])}, the way there {_duration(seconds['way_there'])}")  # fmt: skip
 
@@ -322,6 +331,23 @@ def plot_command(
     look, endings = chosen_look(width, axis), chosen_formats(formats)
     paths = on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True, look=look, formats=endings))
     for path in paths:
+        print(path)
+
+
+@app.command("export")
+def export_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The folder of the CSV files; by default DIR/export.")
+    ] = None,
+    at: Annotated[
+        str, typer.Option(metavar="NUMBERS", help="Kept half-cycles of the profiles, first and last too, with commas.")
+    ] = "first,last",
+) -> None:
+    """Write a run as CSV: a line for each kept half-cycle, and the profiles of both bodies."""
+    from fenwear.results.export import export
+
+    for path in on_root(MPI.COMM_WORLD, lambda: export(directory, output, at)):
         print(path)
 
 

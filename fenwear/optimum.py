@@ -21,7 +21,7 @@ from fenwear.interface import RigidEquilibrium
 TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Optimum:
     """The optimal state of one-way sliding.
 
@@ -36,6 +36,12 @@ class Optimum:
     velocity: dict[str, float]
     residual: float
     tilt: Array
+
+    def __repr__(self) -> str:
+        """Say in a line what it is."""
+        velocity = ", ".join(f"{name} = {value:.5g}" for name, value in self.velocity.items())
+        n, most = len(self.pressure), self.pressure.max()
+        return f"<Optimum: {n} contact nodes, largest pressure {most:.5g} MPa, {velocity}>"
 
 
 def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) -> None:

@@ -35,7 +35,7 @@ from fenwear.results.history import (
 )
 from fenwear.signals import Signals
 from fenwear.stick.run import run_stick
-from fenwear.watch import Watch
+from fenwear.watch import Watch, stroke_warnings
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
@@ -174,6 +174,7 @@ class _Run:
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
         self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
+        self.warnings += stroke_warnings(system)
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())

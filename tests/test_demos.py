@@ -25,6 +25,7 @@ NAMES = [
     "07_fretting",
     "08_measurement_to_life",
     "09_solids",
+    "10_partial_slip",
 ]
 SECONDS = 1800  # ends what hangs, however busy the machine
 

@@ -27,7 +27,7 @@ PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy mach
 # What docker/fenwear does with its words: fenwear's own commands are its, others run as they are.
 SHIM = f"""#!/bin/sh
 case $1 in
-  run|steady|optimum|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|info|new|schema)
+  run|steady|optimum|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|export|info|new|schema)
     exec {sys.executable} -m fenwear "$@" ;;
   *) exec "$@" ;;
 esac

@@ -121,5 +121,28 @@ def test_public_names() -> None:
     """Everything that the package offers by name is there, with a docstring; nothing else is."""
     for name in fenwear.__all__:
         assert getattr(fenwear, name).__doc__
+    assert dir(fenwear) == sorted(fenwear.__all__)
     with pytest.raises(AttributeError, match="no attribute 'wobble'"):
         fenwear.wobble  # noqa: B018
+
+
+def test_one_line_says_what_it_is(assembled: Callable[..., Any]) -> None:
+    """In a notebook: never pages of numbers; and results know where their nodes lie."""
+    system = assembled("example1", "geometry.degree=1", "geometry.parameters.elements_along_contact=4")
+    state, (block,) = fenwear.steady(system), fenwear.march(system, 2)
+    optimum = system.optimum(1)
+    for thing, word in (
+        (system, "33 contact nodes"),
+        (system.case, "<Case 'Example 1: a tilting punch, pin 20 mm above the contact, without heat': plane, "),
+        (state, "<Steady: 33 contact nodes, 2 half-cycles, largest pressure "),
+        (block, "<Block: 2 records of half-cycles 1 to 2, "),
+        (optimum, "<Optimum: "),
+    ):
+        assert word.replace("33", str(len(system.pair.x))) in repr(thing)
+        assert str(thing) == repr(thing)
+        assert len(repr(thing)) < 160
+        assert "\n" not in repr(thing)
+    for result in (state, block):
+        assert (result.x == system.pair.x).all()
+        assert result.x.shape == result.pressure[0].shape
+        assert (result.coordinates == system.pair.punch.x).all()

@@ -18,7 +18,9 @@ from fenwear.clipped import contact_ends
 from fenwear.errors import MeshQualityError
 from fenwear.report.page import page
 from fenwear.run import run_case
-from fenwear.watch import hot, initial_warnings, pressed, steady_warnings
+from fenwear.stick.cycle import Records
+from fenwear.stick.setup import make_rig
+from fenwear.watch import elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
 
 Assembled = Callable[..., Tribosystem]
 FLAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
@@ -165,3 +167,46 @@ def test_jumps_end_with_whole_cycles(tmp_path: Path) -> None:
     settings = (*FLAT, "run.half_cycles=5", "run.integration=jump", "output.report=false")
     summary, _ = run(tmp_path, "example2", *settings)
     assert (summary["stop"], summary["half_cycles"]) == ("all half-cycles done", 4)
+
+
+FRETTING = ("geometry.parameters.elements_along_contact=30", "motion.positions=1")
+
+
+def pressed_by(assembled: Assembled, load: float, amplitude: float) -> Tribosystem:
+    """Return the fretting case under a load in N, with an amplitude in µm."""
+    force = f'punch.loads=[{{on="punch_top", force=["0 N", "-{load} N"]}}]'
+    return assembled("fretting", FRETTING[0], "motion.positions=5", force, f"motion.amplitude={amplitude} um")
+
+
+def test_elastic_way_against_stick(assembled: Assembled) -> None:
+    """Reference: with stick the work of a cycle is 4 mu P (A - way), the way that the bodies follow friction."""
+    load, amplitude = 120.0, 20.0
+    settings = (f"motion.amplitude={amplitude} um", *FRETTING)
+    rig = make_rig(load_case("fretting-partial-slip", settings))
+    work = Records.joined(rig.cycle(rig.beginning())[1]).energy(rig.weights)
+    way = 1e-3 * amplitude - work / (4 * 0.9 * load)
+    assert elastic_way(pressed_by(assembled, load, amplitude)) == pytest.approx(way, rel=0.15)
+
+
+def test_stroke_taken_up(assembled: Assembled) -> None:
+    """The case itself slides as a whole: 3 %; a stroke that the bodies take up in part, or wholly, is told."""
+    assert stroke_warnings(pressed_by(assembled, 18.5, 25)) == []
+    assert stroke_warnings(pressed_by(assembled, 18.5, 7)) == []
+    (text,) = stroke_warnings(pressed_by(assembled, 18.5, 5))
+    assert 'contact.law = "coulomb"' in text
+    assert "amplitude of 5 µm" in text
+    assert text in initial_warnings(pressed_by(assembled, 18.5, 5))
+    (text,) = stroke_warnings(pressed_by(assembled, 120, 3))
+    share = float(text.split(" % of the amplitude")[0].split()[-1])
+    assert share > 100
+
+
+@pytest.mark.parametrize("name", ["example1", "rounded-punch"])
+def test_long_strokes_are_not_told(assembled: Assembled, name: str) -> None:
+    """Strokes of millimetres."""
+    assert stroke_warnings(assembled(name, *(FLAT if name == "example1" else ()))) == []
+
+
+def test_frictionless_stroke_is_not_told(assembled: Assembled) -> None:
+    """Nothing follows where there is no friction."""
+    assert stroke_warnings(assembled("fretting", *CYLINDER, "motion.amplitude=1 um")) == []

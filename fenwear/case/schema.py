@@ -864,6 +864,12 @@ class Case(_Part):
     run: Run = Field(description="how far, and how")
     output: Output = Field(default=Output(), description="what is kept")
 
+    def __repr__(self) -> str:
+        """Say in a line what it is; `to_toml` has all of it."""
+        return f"<Case {self.title!r}: {self.model.kind}, {self.motion.kind}, {self.run.half_cycles} half-cycles>"
+
+    __str__ = __repr__
+
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
     _written: Written = Written()
 

@@ -66,7 +66,7 @@ class HalfCycleHeat:
         return HalfCycleHeat(later.temperature_punch, later.temperature_strip, terms, iterations, bulk)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Block:
     """k consecutive records of half-cycles, of n contact nodes.
 
@@ -114,6 +114,21 @@ class Block:
 
     def __len__(self) -> int:
         return len(self.half_cycle)
+
+    def __repr__(self) -> str:
+        """Say in a line what it is."""
+        first, last, nodes = self.half_cycle[0], self.half_cycle[-1], self.pressure.shape[1]
+        return f"<Block: {len(self)} records of half-cycles {first} to {last}, {nodes} contact nodes>"
+
+    @property
+    def x(self) -> Array:
+        """Abscissae of the contact nodes (n,), mm."""
+        return self.system.pair.x
+
+    @property
+    def coordinates(self) -> Array:
+        """Coordinates of the contact nodes (n, 2) or (n, 3), mm, as those of a steady state."""
+        return self.system.pair.punch.x
 
     @property
     def time(self) -> Array:

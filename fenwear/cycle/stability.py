@@ -114,7 +114,7 @@ def stationary_growth(
         pressure: Of each phase in the last cycle (phases, n), MPa.
         surfaces: Temperatures of the punch's and the strip's surface at the end of the run (n,), K.
         phase: The one that would come next.
-        change: Largest change of pressure in the last cycle over the mean pressure.
+        change: Largest change of pressure in the last cycle over the pressure scale.
     """
     if not change < 1:
         return None, "the last cycle is the first, or not like the one before"
@@ -132,7 +132,7 @@ def stationary_growth(
     drift = change / system.motion.period
     if drift > APART * abs(rate):
         return None, (
-            f"the pressures still change by {drift:.3g} of their mean a second, and its disturbances by {rate:.3g}"
+            f"the pressures still change by {drift:.3g} of their scale a second, and its disturbances by {rate:.3g}"
         )
     return rate, ""
 

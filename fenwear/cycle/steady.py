@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +43,7 @@ ZERO = 1e-12  # of the largest: a velocity that is rounding
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class SteadyHeat:
     """The temperatures of the cyclic steady state.
 
@@ -55,8 +55,12 @@ class SteadyHeat:
     punch: Array
     strip: Array
 
+    def __repr__(self) -> str:
+        """Say in a line what it is."""
+        return f"<SteadyHeat: largest temperature {max(self.punch.max(), self.strip.max()):.5g} K>"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, repr=False)
 class Steady:
     """The cyclic steady state; for one-way sliding the steady state, equal to the optimum.
 
@@ -72,6 +76,7 @@ class Steady:
         iterations: Newton iterations.
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
+        coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
     """
 
     directions: tuple[int, ...]
@@ -85,6 +90,17 @@ class Steady:
     iterations: int
     seconds: float
     heat: SteadyHeat | None = None
+    coordinates: Array = field(kw_only=True)
+
+    @property
+    def x(self) -> Array:
+        """Abscissae of the contact nodes (n,), mm."""
+        return self.coordinates[:, 0]
+
+    def __repr__(self) -> str:
+        """Say in a line what it is."""
+        n, most = len(self.coordinates), self.pressure.max()
+        return f"<Steady: {n} contact nodes, {len(self.directions)} half-cycles, largest pressure {most:.5g} MPa>"
 
 
 class _SteadyInequality:
@@ -307,6 +323,7 @@ def _result(
         contact.iterations,
         seconds,
         None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure, middle),
+        coordinates=system.pair.punch.x,
     )
 
 

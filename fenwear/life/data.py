@@ -174,6 +174,8 @@ class _Reader:
             match = _HEADING.fullmatch(cell)
             if match is None or match["name"] not in known:
                 message = f"not known; expected some of {', '.join(known)}, each with its unit, such as 'depth (um)'"
+                if ";" in cell:
+                    message = "has a semicolon; expected commas between columns, and points in numbers"
                 raise self._fail(f"column {cell.strip()!r}", message)
             name = match["name"]
             if name in names:
@@ -215,7 +217,8 @@ class _Reader:
                 raise ValueError(f"expected a unit such as {to}, got a pure number")
             zero, one = (convert(f"{number} {unit}".strip(), to) for number in (0, 1))
         except ValueError as error:
-            raise self._fail(f"column {name!r}", f"unit: {error}") from None
+            message = str(error).replace(f"got '0 {unit}'", f"got {unit!r}")  # no row has that number
+            raise self._fail(f"column {name!r}", f"unit: {message}") from None
         return values * (one - zero) + zero
 
     def _after(

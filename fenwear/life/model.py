@@ -24,7 +24,7 @@ from fenwear.life.keys import with_values
 BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
 ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop
-NEAR_THE_END = 0.01  # of the mean pressure: where the run-in is over
+NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
 
 
 @dataclass(frozen=True)
@@ -217,7 +217,7 @@ class Model:
         return steady_snapshot(system, state.phase_pressure, state.velocity)
 
     def run_in(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
-        """Return after how many cycles the pressure is within 1 % of the mean pressure of its end; infinite if never.
+        """Return after how many cycles the pressure is within 1 % of the pressure scale of its end; infinite if never.
 
         Raises:
             ConvergenceError: there is no steady state.

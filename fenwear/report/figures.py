@@ -26,6 +26,7 @@ from fenwear.report.program import program_figure
 from fenwear.report.shapes import profile_figure, surfaces_of, wear_map_figure, worn_range
 from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, level_line, panels, shades
 from fenwear.results.history import HISTORY
+from fenwear.results.reading import open_history
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,19 +34,6 @@ if TYPE_CHECKING:
 FOLDER, CAPTIONS = "figures", "captions.txt"
 EARLY = 3.0  # times the largest pressure of later states: what is beyond it has a panel of its own
 DPI = 200
-
-
-def open_history(directory: Path) -> xarray.Dataset:
-    """Open history.nc of a run.
-
-    Raises:
-        CaseError: there is none, or it cannot be read.
-    """
-    path = directory / HISTORY
-    try:
-        return xarray.open_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise CaseError(InputError(str(path), f"no readable history of a run: {error}")) from None
 
 
 def read_history(directory: Path) -> xarray.Dataset:

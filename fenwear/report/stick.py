@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
-from fenwear.report.figures import FOLDER, open_history
+from fenwear.report.figures import FOLDER
 from fenwear.report.html_page import picture, render
 from fenwear.report.key_numbers import read_summary
 from fenwear.report.style import BLUE, GREY, RED, contact_axis, legend_beside, panels, reference_line, shades
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
+from fenwear.results.reading import open_history
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -58,7 +58,7 @@ MEANINGS = {
     "largest_temperature": Meaning((), "K", "largest temperature of the contact"),
     "angle": Meaning(("half_cycle", "node"), "rad", "angle chi between the normal and the wear velocity"),
     "half_cycles": Meaning((), "", "half-cycles done"),
-    "periodicity": Meaning((), "", "largest change of pressure against the cycle before, over the mean pressure"),
+    "periodicity": Meaning((), "", "largest change of pressure against the cycle before, over the pressure scale"),
     "iterations": Meaning((), "", "Newton iterations"),
 }
 

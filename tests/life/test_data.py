@@ -61,6 +61,8 @@ ROWS = "1, 1\n2, 2\n3, 3\n"
         ("after (m), wear (mm)\n" + ROWS, r"column 'wear \(mm\)': not known; expected some of x, after, depth"),
         ("after (m), volume\n" + ROWS, "column 'volume': has no unit"),
         ("after (m), volume (kg)\n" + ROWS, "column 'volume': unit: .*another kind"),
+        ("after (m), volume (mm3)\n" + ROWS, "column 'volume': unit: .*, got 'mm3', whose unit is not known"),
+        ("after (cycles); volume (mm^3)\n1; 0,3\n", "has a semicolon; expected commas between columns"),
         ("after (m), volume (1)\n" + ROWS, "column 'volume': unit: expected a unit such as mm"),
         ("after (m), volume (mm^3), volume (mm^3)\n1,1,1\n", "column 'volume': given twice"),
         ("after (m), x (mm)\n" + ROWS, "no measured column"),

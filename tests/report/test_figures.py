@@ -21,7 +21,6 @@ from fenwear.report.figures import (
     chosen_half_cycles,
     early_half_cycles,
     mean_pressure_figure,
-    open_history,
     pressure_figure,
     read_history,
     shape_figure,
@@ -30,6 +29,7 @@ from fenwear.report.figures import (
 from fenwear.report.sections import element_edges
 from fenwear.report.shapes import profile_figure, wear_map_figure
 from fenwear.report.style import COLOURS, Look, shades
+from fenwear.results.reading import open_history
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")

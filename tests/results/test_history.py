@@ -12,8 +12,8 @@ import xarray
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
 from fenwear.report.course import mean_pressure, nominal_width
-from fenwear.report.figures import open_history
 from fenwear.results.history import free_directory, make_directory
+from fenwear.results.reading import open_history
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")

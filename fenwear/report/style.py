@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 WIDTH = 7.0  # inches
 NARROW = 5.0  # inches: below it letters are smaller
+ROW = 60  # letters that a row of names takes where the figure is narrow
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 # After Okabe and Ito, without what fades on white paper; the dashes tell them apart in black and white.
 COLOURS = (BLUE, RED, GREEN, "#AA4499", "#000000", "#8C6D00", "#117A8B")
@@ -117,7 +118,9 @@ def legend_beside(ax: Axes, title: str) -> None:
     if figure.get_size_inches()[0] >= NARROW:
         ax.legend(title=title or None, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     else:
-        ax.legend(title=title or None, loc="lower center", bbox_to_anchor=(0.5, 1.02), frameon=False, ncols=3,
+        longest = max((len(str(text)) for text in ax.get_legend_handles_labels()[1]), default=1)
+        columns = min(3, max(1, ROW // (longest + 8)))  # a sample of the line takes the width of some letters, too
+        ax.legend(title=title or None, loc="lower center", bbox_to_anchor=(0.5, 1.02), frameon=False, ncols=columns,
                   fontsize="small", title_fontsize="small", handlelength=1.5, columnspacing=1.0)  # fmt: skip
 
 

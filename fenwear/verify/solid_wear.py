@@ -50,7 +50,7 @@ def pin(around: int) -> Tribosystem:
 def pin_on_disc() -> Result:
     """Pin radius a at d = 1.25 a: 1.110698, 1.082460, 0.900749 of beta~ F omega d dt."""
     rows: list[Row] = []
-    for around, bound in ((2, 0.015), (3, 0.008)):
+    for around, bound in ((3, 0.008), (4, 0.006)):
         system = pin(around)
         x, weights = system.pair.punch.x, system.pair.weights
         arm = weights * np.hypot(x[:, 0], x[:, 1]) / (1.25 * PIN)

@@ -17,7 +17,7 @@ import bases
 import cases
 
 from fenwear import CaseError, assemble, make_case
-from fenwear.case.dependence import evaluate, parse_expression
+from fenwear.case.dependence import VARIABLES, evaluate, parse_expression
 from fenwear.errors import FenwearError, InputError
 
 
@@ -158,7 +158,7 @@ def test_expressions_compute_or_are_refused(text: str, tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     seen: list[str] = []
     _watched.append(seen)
-    nodes = {"T": np.zeros(1000), "p": np.linspace(0, 100, 1000), "v": np.asarray(10.0)}
+    nodes = dict.fromkeys(VARIABLES, np.asarray(10.0)) | {"T": np.zeros(1000), "p": np.linspace(0, 100, 1000)}
     begin = time.process_time()  # of the processor: the same on a busy machine
     message, shape = "", (0,)
     try:

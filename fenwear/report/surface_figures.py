@@ -14,6 +14,7 @@ from fenwear.report.course import (
     directions_present,
     half_cycle_axis,
     heat_balance_figure,
+    is_conforming,
     mark_few,
     mean_pressure,
     nominal_width,
@@ -52,11 +53,6 @@ def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict
     return drawn
 
 
-def conforms(history: xarray.Dataset) -> bool:
-    """Return whether the unworn surfaces lie on each other, so that the load over their area says something."""
-    return bool(history.attrs.get("conforming", 1))
-
-
 def series_figure(history: xarray.Dataset) -> Figure:
     """Draw over the half-cycles: largest pressure, area in contact, depth and size of the scars, and temperature."""
     sizes = [n for n in ("scar_length", "scar_width") if n in history or f"{n}_strip" in history]
@@ -66,13 +62,13 @@ def series_figure(history: xarray.Dataset) -> Figure:
     by_direction(pressure, history, "max_pressure")
     pressure.set_title("Largest contact pressure", loc="left")
     pressure.set_ylabel("pressure (MPa)")
-    if conforms(history):
+    if is_conforming(history):
         mean = mean_pressure(history)
         reference_line(pressure, mean, f"mean {mean:.2f}")
     by_direction(area, history, "contact_area")
     area.set_title("Area in contact", loc="left")
     area.set_ylabel("area (mm²)")
-    if conforms(history):
+    if is_conforming(history):
         nominal = nominal_width(history)
         reference_line(area, nominal, f"nominal area {nominal:.4g}")
         area.set_ylim(top=1.15 * nominal)
@@ -119,7 +115,7 @@ def ring_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) ->
         ax.set_title(f"Contact pressure while the strip turns {name}", loc="left")
         ax.set_ylabel("contact pressure p (MPa)")
         ax.set_ylim(0, pressure_top(history, half_cycles))
-        if conforms(history):  # named in the legend: lines that wear evenly run along it
+        if is_conforming(history):  # named in the legend: lines that wear evenly run along it
             mean = mean_pressure(history)
             ax.axhline(mean, color="0.5", linewidth=0.8, linestyle=":", label=f"mean {mean:.2f}")
         legend_beside(ax, "half-cycle")

@@ -225,7 +225,6 @@ class HistoryWriter:
             if system.case.model.kind != "plane":
                 file.attrs["Conventions"] = "CF-1.11 UGRID-1.0"
                 file.attrs["model"] = system.case.model.kind
-                file.attrs["conforming"] = int(conforming(system.pair))
             for name, column in self._columns.items():
                 variable = file.create_variable(name, column.dimensions, column.values.dtype)
                 variable[...] = column.values

@@ -16,7 +16,7 @@ from fenwear.stick import Imposed, StickInterface, StickState, advance, untouche
 from fenwear.stick.final import final_shape, stick_zone
 from fenwear.stick.jump import jump
 from fenwear.stick.setup import make_rig
-from fenwear.verify.bodies import two_block_case
+from fenwear.verify.stick import pressed_half_planes
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 RADIUS, LOAD = 6.0, 120.0  # of the cylinder of the built-in case, mm; N/mm
@@ -253,28 +253,4 @@ def spence() -> Result:
 @cache
 def unlike_half_planes() -> StickInterface:
     """Return two large blocks of unlike materials in plane strain; collective."""
-    far, ratio, elements, core = 600.0, 1.6, 80, 0.28
-    count = round(np.log(far / (core / elements) * (ratio - 1)) / np.log(ratio))
-    sizes = {
-        "width": 2 * far,
-        "punch_height": far,
-        "strip_height": far,
-        "core": core,
-        "across": elements,
-        "outer": count,
-        "spread": ratio,
-        "growth": ratio,
-        "punch_layers": count,
-        "strip_layers": count,
-    }
-    case = two_block_case(
-        {"young": 1e5, "poisson": 0.1},
-        {"young": 1e8, "poisson": 0.3},
-        sizes,
-        contact={"friction": 0.25},
-        punch={
-            "supports": [{"on": "punch_sides", "fix": ["x"]}],
-            "loads": [{"on": "punch_far", "force": [0, -LOAD]}],
-        },
-    )
-    return StickInterface(build_bodies(case), make_sliding(case), case)
+    return pressed_half_planes({"young": 1e5, "poisson": 0.1}, {"young": 1e8, "poisson": 0.3}, 0.25, 0.28, 80)

@@ -25,13 +25,20 @@ FORCES = np.linspace(0.05, 0.5, 10)  # Q / (mu P) of the steps
 @cache
 def half_planes(elements: int = 80) -> StickInterface:
     """Return two blocks of steel in plane strain, so large that they are half-planes; collective."""
+    return pressed_half_planes(STEEL, STEEL, FRICTION, CORE, elements)
+
+
+def pressed_half_planes(
+    upper: dict[str, float], lower: dict[str, float], friction: float, core: float, elements: int
+) -> StickInterface:
+    """Return two blocks under LOAD, so large that they are half-planes, with elements on a core; collective."""
     ratio = 1.6
-    count = round(np.log(FAR / (CORE / elements) * (ratio - 1)) / np.log(ratio))
+    count = round(np.log(FAR / (core / elements) * (ratio - 1)) / np.log(ratio))
     sizes = {
         "width": 2 * FAR,
         "punch_height": FAR,
         "strip_height": FAR,
-        "core": CORE,
+        "core": core,
         "across": elements,
         "outer": count,
         "spread": ratio,
@@ -40,10 +47,10 @@ def half_planes(elements: int = 80) -> StickInterface:
         "strip_layers": count,
     }
     case = two_block_case(
-        STEEL,
-        STEEL,
+        upper,
+        lower,
         sizes,
-        contact={"friction": FRICTION},
+        contact={"friction": friction},
         punch={
             "supports": [{"on": "punch_sides", "fix": ["x"]}],
             "loads": [{"on": "punch_far", "force": [0, -LOAD]}],

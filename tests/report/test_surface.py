@@ -15,13 +15,14 @@ from matplotlib.text import Text
 from fenwear import load_case
 from fenwear.report.animation import draw_animation
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
+from fenwear.report.course import is_conforming
 from fenwear.report.figures import read_history
 from fenwear.report.maps import LEVELS, map_figure, quantities
 from fenwear.report.page import numbers_of
 from fenwear.report.pictures import SHOWN, draw_pictures
 from fenwear.report.solid_pictures import deformed, displacement, points, solid_view
 from fenwear.report.surface import Surface, centre_of_wear, model_of, radial, surface_of
-from fenwear.report.surface_figures import conforms, surface_figures
+from fenwear.report.surface_figures import surface_figures
 from fenwear.report.turned import AROUND, turned_figure
 from fenwear.run import run_case
 
@@ -111,7 +112,7 @@ def test_the_map_to_turn(folder: Path) -> None:
         shown = step["args"][0]["intensity"][0][: history.sizes["node"]]
         np.testing.assert_allclose(shown, history.pressure.sel(half_cycle=n), rtol=1e-4, atol=1e-4)
     area = _area(np.array([pressure["x"], pressure["y"]]).T, corners.T)
-    if conforms(history):
+    if is_conforming(history):
         assert area == pytest.approx(float(history.weight[-1].sum()), rel=5e-3)
 
 
@@ -136,7 +137,7 @@ def test_every_figure(folder: Path) -> None:
             assert ax.get_ylabel() or ax.get_xlabel() or not ax.get_visible() or name.endswith("_map"), name
         said = " ".join(str(text.get_text()) for text in figure.findobj(Text))
         assert "rightward" not in said
-        assert ("mean 6" not in said) or conforms(history)
+        assert ("mean 6" not in said) or is_conforming(history)
 
 
 def test_titles_of_maps_do_not_meet(folders: dict[str, Path]) -> None:

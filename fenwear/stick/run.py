@@ -20,7 +20,7 @@ from fenwear.results.history import free_directory, make_directory, write_case, 
 from fenwear.stick.cycle import Rig
 from fenwear.stick.jump import Cycle, jump, march
 from fenwear.stick.results import Row, dataset, row_of, summary_of, write_history
-from fenwear.stick.setup import Fineness, fine_enough, make_rig
+from fenwear.stick.setup import Fineness, fine_enough, make_rig, reaches_border
 from fenwear.versions import versions
 
 Log = Callable[[str], None]
@@ -47,8 +47,6 @@ def run_stick(
         ConvergenceError: a time step failed; the results up to it are in the folder.
         OutputError: a file cannot be written.
     """
-    if case.model.kind != "plane":
-        raise CaseError(InputError("model.kind", "results are written of plane models so far; Python takes solids"))
     begin = time.perf_counter()
     rig = make_rig(case, comm)
     check_touching(rig)
@@ -59,7 +57,7 @@ def run_stick(
     begin = time.perf_counter()
     rig, fineness = fine_enough(rig, case)
     rows, last, failure = _follow(rig, case, told=told and comm.rank == 0)
-    warnings = [*doubts(case), *_warnings(last, fineness)]
+    warnings = [*doubts(case), *_warnings(rig, last, fineness)]
     for warning in warnings:
         log(f"warning: {warning}")
     if last is None:
@@ -124,7 +122,7 @@ def _cycles(rig: Rig, case: Case, cycles: int) -> Iterator[Cycle]:
     return march(rig, cycles)
 
 
-def _warnings(last: Cycle | None, fineness: Fineness) -> list[str]:
+def _warnings(rig: Rig, last: Cycle | None, fineness: Fineness) -> list[str]:
     """Return what the user should know of the run."""
     found = []
     if not fineness.enough:
@@ -144,7 +142,6 @@ def _warnings(last: Cycle | None, fineness: Fineness) -> list[str]:
     if slipping.any():
         share = float(np.mean(slipping))
         found.append(f"gross sliding: in {100 * share:.0f} % of the last cycle's time steps nothing sticks")
-    edge = (records.pressure[:, [0, -1]] > 0).any()
-    if edge:
+    if reaches_border(rig, records.pressure):
         found.append("the contact reaches the end of its meshed surface; expected a wider one")
     return found

@@ -99,12 +99,8 @@ def reaches_border(rig: Rig, pressure: Array) -> bool:
         rig: The bodies.
         pressure: Of some time steps (k, n), MPa.
     """
-    punch = rig.interface.bodies.punch
-    held = np.zeros(len(punch.load))
-    held[punch.supported] = 1.0
-    at_trace = punch.trace.pick(held[:, None])[:, :, 0].any(axis=1)
-    border = border_nodes(punch.surface)
-    free = border[~np.asarray(at_trace)[punch.surface.nodes[border]]]
+    border = border_nodes(rig.interface.middle.pair.punch)
+    free = border[~rig.interface.held_nodes()[border]]
     return bool((pressure[:, free] > 0).any())
 
 

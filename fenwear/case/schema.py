@@ -72,6 +72,12 @@ Temperature = Annotated[float, *_quantity("K")]
 CONDUCTANCE = "N/(mm*s*K)"
 Conductance = Annotated[float, *_quantity(CONDUCTANCE)]
 Angle = Annotated[float, *_quantity("rad")]
+PROPERTIES = {  # of a material, that may depend on the temperature, with their units
+    "young": "MPa",
+    "conductivity": "N/(s*K)",
+    "heat_capacity": "mm^2/(s^2*K)",
+    "expansion": "1/K",
+}
 Axis = Literal["x", "y", "z"]
 Vector = tuple[Number, Number, Number]
 Kind = Literal["stress", "strain", "axisymmetric", "solid"]  # of a model: what tells strains and rigid modes
@@ -147,25 +153,6 @@ class Model(_Part):
     def axes(self) -> tuple[Axis, ...]:
         """The axes of vectors."""
         return ("x", "y", "z") if self.kind == "solid" else ("x", "z")
-
-
-class Material(_Part):
-    """An isotropic, linear-elastic material; the thermal values are needed with heat only."""
-
-    young: Annotated[Stress, Field(gt=0)] = Field(description="Young's modulus E")
-    poisson: Annotated[Number, Field(gt=-1, le=0.5)] = Field(description="Poisson's ratio nu")
-    conductivity: Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None = Field(
-        default=None, description="thermal conductivity k; 1 W/(m K) = 1"
-    )
-    heat_capacity: Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = Field(
-        default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
-    )
-    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
-        default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
-    )
-    expansion: Annotated[float, *_quantity("1/K")] | None = Field(
-        default=None, description="linear thermal expansion alpha"
-    )
 
 
 class Support(_Part):
@@ -302,11 +289,21 @@ class Dependence(_Part):
         """Whether it changes as long as a run goes on: with the worn depth, or with what has been slid."""
         return self.depends_on("depth") or self.depends_on("s")
 
-    def values(self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str) -> Array:
+    def scale(self, unit: str) -> float:
+        """Return what turns its values into a unit.
+
+        Raises:
+            ValueError: its own unit is of another kind.
+        """
+        return convert(f"1 {self.unit}", unit) if self.unit else 1.0
+
+    def values(
+        self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str, least: float = 0.0
+    ) -> Array:
         """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
 
         Raises:
-            CaseError: it is negative or not finite somewhere; `key` is the case's key.
+            CaseError: it is less than `least` or not finite somewhere; `key` is the case's key.
         """
         if self.table is not None:
             values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
@@ -314,17 +311,18 @@ class Dependence(_Part):
             values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
         elif self.law is not None:
             try:
-                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES}, shape)
+                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES if name in state}, shape)
             except ValueError as error:
                 raise CaseError(InputError(key, str(error))) from error
         else:
             values = evaluate(parse_expression(self.expression or ""), state, shape)
-        wrong = ~(np.isfinite(values) & (values >= 0))
+        wrong = ~(np.isfinite(values) & (values >= least))
         if wrong.any():
             node = int(np.flatnonzero(wrong)[0])
-            named = [name for name in VARIABLES if name in ("T", "p", "v") or self.depends_on(name)]
+            named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
             at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
-            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at}"))
+            wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
+            raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
         return values * factor
 
 
@@ -338,6 +336,78 @@ def _constant_or_dependence(constant: Any) -> Any:
         Annotated[constant, Tag("number")] | Annotated[Dependence, Tag("dependence")],
         Discriminator(_form),
     ]
+
+
+_Conductivity = Annotated[float, *_quantity("N/(s*K)"), Field(gt=0)] | None
+_HeatCapacity = Annotated[float, *_quantity("mm^2/(s^2*K)"), Field(gt=0)] | None
+_Expansion = Annotated[float, *_quantity("1/K")] | None
+
+
+class Material(_Part):
+    """An isotropic, linear-elastic material; the thermal values are needed with heat only.
+
+    All but nu and rho may depend on the temperature T, by an expression or a table.
+    """
+
+    young: _constant_or_dependence(Annotated[Stress, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="Young's modulus E"
+    )
+    poisson: Annotated[Number, Field(gt=-1, le=0.5)] = Field(description="Poisson's ratio nu")
+    conductivity: _constant_or_dependence(_Conductivity) = Field(  # type: ignore[valid-type]
+        default=None, description="thermal conductivity k; 1 W/(m K) = 1"
+    )
+    heat_capacity: _constant_or_dependence(_HeatCapacity) = Field(  # type: ignore[valid-type]
+        default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
+    )
+    density: Annotated[float, *_quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
+        default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
+    )
+    expansion: _constant_or_dependence(_Expansion) = Field(  # type: ignore[valid-type]
+        default=None,
+        description="linear thermal expansion alpha; where it depends on T, the mean from heat.initial to T",
+    )
+
+    @model_validator(mode="after")
+    def _of_temperature_alone(self) -> Self:
+        for name in self.dependent:
+            value = getattr(self, name)
+            others = [one for one in VARIABLES if one != "T" and value.depends_on(one)]
+            if others or value.regions is not None:
+                got = "regions" if value.regions is not None else others[0]
+                raise ValueError(f"{name}: expected an expression or a table of the temperature T alone, got {got}")
+            try:
+                value.scale(PROPERTIES[name])
+            except ValueError as error:
+                raise ValueError(f"{name}: unit: {error}") from None
+        return self
+
+    @property
+    def dependent(self) -> list[str]:
+        """Names of the properties that depend on the temperature."""
+        return [name for name in PROPERTIES if isinstance(getattr(self, name), Dependence)]
+
+    def at(self, temperature: float, key: str = "materials") -> Material:
+        """Return the material as it is at one temperature, K, with constants.
+
+        Raises:
+            CaseError: a property is not finite there, or not positive; `key` is the material's.
+        """
+        found = {name: float(self.values(name, np.array([temperature]), key)[0]) for name in self.dependent}
+        return self.model_copy(update=found) if found else self
+
+    def values(self, name: str, temperature: Array, key: str) -> Array:
+        """Return a property at temperatures (n,), 0 where it is not given.
+
+        Raises:
+            CaseError: as `at`.
+        """
+        value = getattr(self, name)
+        if not isinstance(value, Dependence):
+            return np.full(temperature.shape, value or 0.0)
+        least = -np.inf if name == "expansion" else np.nextafter(0.0, 1.0)
+        return value.values(
+            {"T": temperature}, temperature.shape, value.scale(PROPERTIES[name]), f"{key}.{name}", least
+        )
 
 
 class Contact(_Part):
@@ -716,6 +786,11 @@ class Heat(_Part):
         )
     )
 
+    property_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.02,
+        description="change of a material's property with the temperature, over itself, after which the bodies are "
+        "made anew with it",
+    )
     # Finer than 1e-8 the basis, found by squares, would be made of rounding.
     reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
         default=3e-5, description="of the reduced operator's basis, relative"
@@ -940,6 +1015,18 @@ class Case(_Part):
         return problems
 
     @property
+    def initial_materials(self) -> dict[str, Material]:
+        """The materials as they are at the initial temperature, with constants."""
+        start = 0.0 if self.heat is None else self.heat.initial
+        return {name: material.at(start, f"materials.{name}") for name, material in self.materials.items()}
+
+    @property
+    def warming(self) -> bool:
+        """Whether a property of a material that is used depends on the temperature."""
+        used = {*self.punch.regions.values(), *self.strip.regions.values()}
+        return any(self.materials[name].dependent for name in used)
+
+    @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
         return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
@@ -966,6 +1053,12 @@ class Case(_Part):
                 f"{key}: depends on the temperature T, which a case without the table heat does not know"
                 for key, value in given.items()
                 if isinstance(value, Dependence) and value.law is None and value.depends_on("T")
+            ]
+            problems += [
+                f"materials.{name}.{key}: depends on the temperature T, which a case without the table heat does not "
+                "know"
+                for name, material in self.materials.items()
+                for key in material.dependent
             ]
         problems += self._region_problems()
         friction = self.contact.friction

@@ -89,7 +89,7 @@ def surface_stress(case: Case, records: Records) -> Array:
     names = set(case.strip.regions.values())
     if len(names) > 1 or case.model.kind != "plane":
         return np.full(records.strain.shape, np.nan)
-    material = case.materials[names.pop()]
+    material = case.initial_materials[names.pop()]
     young, nu = material.young, material.poisson
     if case.model.law == "strain":
         return young / (1 - nu**2) * records.strain - nu / (1 - nu) * records.pressure

@@ -81,11 +81,7 @@ def run_case(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     if case.contact.law == "coulomb":
-        if resume:
-            raise CaseError(
-                InputError("--resume", "runs with contact.law = 'coulomb' start anew: they keep no checkpoint")
-            )
-        return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
+        return run_stick(case, name, output, log, resume=resume, progress=progress, comm=comm, last=last)
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
     if not resume:

@@ -21,6 +21,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
+from fenwear.case import Case
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import SUMS, Totals
@@ -70,7 +71,7 @@ def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
         for body, taken in zip(system.bodies.heat, system.bodies.warmed, strict=True):
             _write_function(comm, new, f"{WARMED}_{body.body.name}", body.function(taken))
     comm.Barrier()
-    on_root(comm, lambda: _swap(directory))
+    on_root(comm, lambda: swap(directory))
 
 
 def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function) -> None:
@@ -127,7 +128,7 @@ def followed(directory: Path, system: Tribosystem) -> Worn | None:
     Raises:
         CaseError: there is no checkpoint, or it is of another case.
     """
-    arrays = on_root(system.comm, lambda: _read(_find(directory), system))
+    arrays = on_root(system.comm, lambda: _read(find(directory), system))
     return Worn(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
 
 
@@ -140,14 +141,19 @@ def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
         CaseError: there is no checkpoint, or it is damaged.
     """
     comm, bodies = system.comm, system.bodies.heat
-    folder = on_root(comm, lambda: _find(directory))
+    folder = on_root(comm, lambda: find(directory))
     if bodies is None or not on_root(comm, (folder / f"{WARMED}_punch.bp").exists):
         return None
     punch, strip = (_read_temperature(folder, body, WARMED) for body in bodies)
     return punch, strip
 
 
-def _swap(directory: Path) -> None:
+def swap(directory: Path) -> None:
+    """Let the new checkpoint take the place of the one before; for one rank.
+
+    Raises:
+        OutputError: it cannot.
+    """
     new, current, old = (directory / name for name in (NEW, FOLDER, OLD))
     with writing(current):
         shutil.rmtree(old, ignore_errors=True)
@@ -164,7 +170,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
     comm = system.comm
-    folder = on_root(comm, lambda: _find(directory))
+    folder = on_root(comm, lambda: find(directory))
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if system.bodies.heat is not None:
@@ -190,15 +196,21 @@ def _read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -
         readable = False
     values = function.x.array[: body.owned].copy()
     if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):
-        raise _damaged(folder)
+        raise damaged(folder)
     return values
 
 
-def _damaged(folder: Path) -> CaseError:
+def damaged(folder: Path) -> CaseError:
+    """Return the error of a checkpoint that cannot be read."""
     return CaseError(InputError("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
 
 
-def _find(directory: Path) -> Path:
+def find(directory: Path) -> Path:
+    """Return the folder of a run's checkpoint.
+
+    Raises:
+        CaseError: there is none.
+    """
     for name in (FOLDER, OLD):  # killed between two renames only the old one is left
         if (directory / name / ARRAYS).is_file():
             return directory / name
@@ -208,7 +220,7 @@ def _find(directory: Path) -> Path:
 def reached(directory: Path) -> int | None:
     """Return the half-cycle of the checkpoint in a run's folder; None where there is none to go on from."""
     try:
-        return int(_arrays(_find(directory))["half_cycle"])
+        return int(_arrays(find(directory))["half_cycle"])
     except CaseError:
         return None
 
@@ -219,15 +231,20 @@ def _arrays(folder: Path) -> dict[str, Any]:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
             return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
-        raise _damaged(folder) from None
+        raise damaged(folder) from None
 
 
-def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
+def check_case(folder: Path, case: Case) -> None:
+    """Make sure that a checkpoint is of this case.
+
+    Raises:
+        CaseError: it is of another one, whose differences are named, or damaged.
+    """
     try:
         saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
     except (OSError, ValueError):
-        raise _damaged(folder) from None
-    present = _flat(tomllib.loads(system.case.to_toml()))
+        raise damaged(folder) from None
+    present = _flat(tomllib.loads(case.to_toml()))
     keys = sorted({*saved, *present})
     problems = [
         InputError(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")
@@ -236,13 +253,17 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
     ]
     if problems:
         raise CaseError([InputError("--resume", "the checkpoint is of another case"), *problems])
+
+
+def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
+    check_case(folder, system.case)
     arrays = _arrays(folder)
     for names in (WEAR, FOLLOWED):
         for name, unworn in _depths(names, system.unworn()).items():
             if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
-                raise _damaged(folder)
+                raise damaged(folder)
     if arrays["totals"].shape != (len(SUMS),) or arrays["energy"].shape != system.pair.weights.shape:
-        raise _damaged(folder)
+        raise damaged(folder)
     return arrays
 
 

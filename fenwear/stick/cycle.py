@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -101,11 +101,23 @@ class Rig:
         program: Of a cycle.
         wear: By local slip.
         friction: mu (n,).
+        watch: Called before every time step: may raise InterruptedRunError.
     """
 
-    def __init__(self, interface: StickInterface, program: Program, wear: LocalWear, friction: Array) -> None:
+    def __init__(
+        self,
+        interface: StickInterface,
+        program: Program,
+        wear: LocalWear,
+        friction: Array,
+        watch: Callable[[], None] = lambda: None,
+    ) -> None:
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
-        self.weights = interface.middle.pair.weights
+        self.weights, self.watch = interface.middle.pair.weights, watch
+
+    def watched(self, watch: Callable[[], None]) -> Rig:
+        """Return the same, watched."""
+        return Rig(self.interface, self.program, self.wear, self.friction, watch)
 
     def unworn(self) -> Worn:
         """Return the worn depths at the start: none."""
@@ -148,6 +160,7 @@ class Rig:
 
     def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
         """Return the state after a time step, and its record; the shape stays."""
+        self.watch()
         position, imposed = self.imposed(step, at.worn)
         state = advance(self.interface, at.contact, at.imposed, imposed, self.friction, position)
         number = (at.next_step + 1) % len(self.program.steps)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,6 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.results.disk import check_room, writing
-from fenwear.results.history import HISTORY
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.jump import Cycle
@@ -114,19 +111,6 @@ def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
     }
     attributes = {"title": case.title, "law": "coulomb", "friction": float(rig.friction[0])}
     return xarray.Dataset(data, coordinates, attributes)
-
-
-def write_history(directory: Path, data: xarray.Dataset) -> None:
-    """Write history.nc.
-
-    Raises:
-        OutputError: it cannot be written.
-    """
-    path = directory / HISTORY
-    check_room(directory, int(data.nbytes))
-    large = [name for name, values in data.data_vars.items() if values.ndim == 3]
-    with writing(path):
-        data.to_netcdf(path, engine="h5netcdf", encoding={name: {"zlib": True, "complevel": 1} for name in large})
 
 
 def summary_of(data: xarray.Dataset, worn: Worn) -> dict[str, Any]:

@@ -60,7 +60,7 @@ def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None =
 
 def with_steps(rig: Rig, case: Case, steps: int) -> Rig:
     """Return the same with other time steps."""
-    return Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction)
+    return Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction, rig.watch)
 
 
 def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:

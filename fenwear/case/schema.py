@@ -242,6 +242,9 @@ class Case(Part):
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes,
             "run.integration: expected 'explicit' or 'jump'": self.run.integration == "implicit",
+            "stick.force: expected none for a motion that turns": (
+                self.stick.force is not None and isinstance(self.motion, Oscillation)
+            ),
         }
         return [f"{problem} with contact.law = 'coulomb'" for problem, so in wrong.items() if so]
 

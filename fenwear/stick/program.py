@@ -112,7 +112,7 @@ def _bulk_strain(case: Case) -> float:
     names = set(case.strip.regions.values())
     if len(names) > 1:
         raise CaseError(InputError("stick.bulk_stress", "expected a strip of one material"))
-    material = case.initial_materials[names.pop()]
+    material = case.materials[names.pop()]
     stiffer = 1 - material.poisson**2 if case.model.law == "strain" else 1.0
     return stress * stiffer / material.young
 

@@ -63,14 +63,23 @@ def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
     comm, new = system.comm, directory / NEW
     on_root(comm, lambda: _begin(new, system, state))
     if state.temperature is not None:
-        for basis, function in zip(state.temperature.bases, state.temperature.functions(), strict=True):
-            path = new / f"temperature_{basis.body.body.name}.bp"
-            size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
-            on_root(comm, partial(check_room, new, size))
-            with writing_together(comm, path):
-                adios4dolfinx.write_function_on_input_mesh(path, function)
+        write_temperatures(new, comm, state.temperature)
     comm.Barrier()
     on_root(comm, lambda: swap(directory))
+
+
+def write_temperatures(folder: Path, comm: MPI.Comm, state: HeatState) -> None:
+    """Write the temperatures of both bodies into a folder; collective.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    for basis, function in zip(state.bases, state.functions(), strict=True):
+        path = folder / f"temperature_{basis.body.body.name}.bp"
+        size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
+        on_root(comm, partial(check_room, folder, size))
+        with writing_together(comm, path):
+            adios4dolfinx.write_function_on_input_mesh(path, function)
 
 
 def _begin(new: Path, system: Tribosystem, state: RunState) -> None:
@@ -149,7 +158,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     temperature = None
     if system.bodies.heat is not None:
         bulk = None if np.isnan(arrays[BULK]) else float(arrays[BULK])
-        read = [_read_temperature(folder, body) for body in system.bodies.heat]
+        read = [read_temperature(folder, body) for body in system.bodies.heat]
         temperature = HeatState.nodal(system.bodies.heat, read, bulk)
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
@@ -160,8 +169,12 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, *numbers)
 
 
-def _read_temperature(folder: Path, body: HeatBody) -> Array:
-    """Return the temperatures of this rank's own nodes of a body; collective."""
+def read_temperature(folder: Path, body: HeatBody) -> Array:
+    """Return the temperatures of this rank's own nodes of a body; collective.
+
+    Raises:
+        CaseError: they cannot be read.
+    """
     comm, function = body.body.mesh.comm, body.function(body.initial())
     readable = True
     try:

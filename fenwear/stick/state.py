@@ -82,6 +82,11 @@ class StickState:
     parts: int = 1
 
     @property
+    def heat(self) -> Array:
+        """Work of friction in the step over the area of each node (n,), N/mm."""
+        return -(self.traction * self.slip).sum(axis=1)
+
+    @property
     def closed(self) -> Mask:
         """Which nodes carry pressure (n,)."""
         return self.pressure > 0

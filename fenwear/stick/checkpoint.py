@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, OutputError
-from fenwear.parallel import on_root
 from fenwear.heat.field import HeatState
+from fenwear.parallel import on_root
 from fenwear.results.checkpoint import (
     ARRAYS,
     CASE,

@@ -49,6 +49,8 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
         raise CaseError(
             InputError("model.kind", "`steady` of contact with stick is for plane models; Python takes solids")
         )
+    if case.heat is not None:
+        raise CaseError(InputError("heat", "expected none for `steady` of contact with stick: `run` and jumps take it"))
     rig = make_rig(case)
     check_touching(rig)
     found = final_shape(rig, stick_zone(rig))

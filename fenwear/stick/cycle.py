@@ -204,38 +204,45 @@ class Rig:
         if self.heat is None or at.temperature is None or at.heating is None:
             state, warm, heating = self._advance(at, imposed, position), None, None
         else:
-            state, imposed, warm, heating = self._with_heat(self.heat, at, step, imposed, position)
+            state, imposed, warm, heating = self._with_heat(
+                self.heat, (at.temperature, at.heating), at, step, imposed, position
+            )
         return RigState(state, imposed, at.worn, (at.next_step + 1) % len(self.program.steps), warm, heating)
 
     def _advance(self, at: RigState, imposed: Imposed, position: Position) -> StickState:
         return advance(self.interface, at.contact, at.imposed, imposed, self.friction, position)
 
     def _with_heat(
-        self, heat: StickHeat, at: RigState, step: TimeStep, imposed: Imposed, position: Position
+        self,
+        heat: StickHeat,
+        warmth: tuple[Array, Array],
+        at: RigState,
+        step: TimeStep,
+        imposed: Imposed,
+        position: Position,
     ) -> tuple[StickState, Imposed, Array, Array]:
         """Return contact, what is imposed, temperature and heat of friction of a step in which they belong together.
 
         Raises:
             ConvergenceError: they do not come together.
         """
-        number, temperature, n = at.next_step, at.temperature, len(self.weights)
-        assert temperature is not None and at.heating is not None
+        number, n = at.next_step, len(self.weights)
         pressure = float(at.contact.pressure.max())
         flux = float((self.friction * at.contact.pressure).max()) * self.reach / step.duration
         units = np.repeat([1 / max(flux, 1e-300), 1 / max(pressure, 1e-300)], n)
 
         def once(x: Array) -> tuple[Array, tuple[StickState, Imposed], bool]:
             q, p = np.split(x / units, 2)
-            warm, _ = heat.step(number, temperature, q, heat.conductance(p))
+            warm, _ = heat.step(number, warmth[0], q, heat.conductance(p))
             expanded = replace(imposed, loaded=heat.expanded(imposed.loaded, warm, step.offset))
             state = self._advance(at, expanded, position)
             made = state.heat / step.duration
             return units * np.concatenate([made, state.pressure]), (state, expanded), False
 
-        start = units * np.concatenate([at.heating, at.contact.pressure])
+        start = units * np.concatenate([warmth[1], at.contact.pressure])
         state, expanded = fixed_point(once, start, lambda change, _: float(np.abs(change).max()) < CLOSE, APART)
-        made = state.heat / step.duration
-        warm, _ = heat.step(number, temperature, made, heat.conductance(state.pressure))
+        made = np.asarray(state.heat / step.duration)
+        warm, _ = heat.step(number, warmth[0], made, heat.conductance(state.pressure))
         return state, expanded, warm, made
 
     def half_cycle(self, at: RigState) -> tuple[RigState, Records]:

@@ -1,4 +1,4 @@
-"""Heat of friction by the local slip: into both bodies in every time step, and as thermal expansion back to the contact.
+"""Heat of friction by the local slip: into both bodies in every time step, and back to the contact as expansion.
 
 A node that slips makes the heat q = -t . s / dt for its area, with the slip s of its time step dt. Both bodies
 conduct it on their reduced bases (see `heat.exchange`), and what they expand by at the end of the step, in every
@@ -96,18 +96,43 @@ class StickHeat:
         """Return the contact temperatures of punch and strip (2, n), K."""
         return np.array(self.exchange.contact_temperatures(self.exchange.at(temperature)))
 
-    def after_cycles(self, temperature: Array, cycles: float, course: Course) -> Array:
-        """Return the temperatures (dim,) after so many cycles of the same heat, in one implicit Euler step.
+    def surface_changes(self, changes: Array) -> Array:
+        """Return the changes of both contact temperatures (2, n) by changes of the temperatures (dim,), K."""
+        return np.array(self.exchange.contact_changes(changes))
 
-        (I + N (I - P)) s' = s + N b, with the cycle's map s -> P s + b.
-        """
-        exchange, dim = self.exchange, len(temperature)
-        through, source = np.eye(dim), np.zeros(dim)
-        for number, heat, conductance in zip(course.numbers, course.heat, course.conductance, strict=True):
+    def through(self, course: Course) -> CycleMap:
+        """Return what a cycle of this heat makes of the temperatures at its start."""
+        exchange, dim = self.exchange, sum(len(basis) for basis in self.exchange.bases)
+        through: Array = np.eye(dim)
+        source: Array = np.zeros(dim)
+        for k, number in enumerate(course.numbers):
+            heat: Array = course.heat[k]
+            conductance: Array = course.conductance[k]
             through, _ = exchange.change(number, conductance, changes=through)
             source = exchange.half_cycle(exchange.at(source), number, heat, conductance)[0].values
-        matrix = np.eye(dim) + cycles * (np.eye(dim) - through)
-        return np.asarray(scipy.linalg.solve(matrix, temperature + cycles * source))
+        return CycleMap(through, source)
+
+
+@dataclass(frozen=True)
+class CycleMap:
+    """What a cycle of constant heat makes of temperatures, s -> P s + b, with P (dim, dim) and b (dim,)."""
+
+    through: Array
+    source: Array
+
+    def after(self, temperature: Array, cycles: float) -> Array:
+        """Return the temperatures after so many cycles in one implicit Euler step: (I + N (I - P)) s' = s + N b."""
+        return np.asarray(scipy.linalg.solve(self._matrix(cycles), temperature + cycles * self.source))
+
+    def error(self, before: Array, after: Array, rate: Array, cycles: float) -> Array:
+        """Return about the error of such a step (dim,), by the trapezoidal rule with the rate of change before it."""
+        now = self.through @ after + self.source - after
+        missing = after - before - cycles / 2 * (rate + now)
+        return np.asarray(scipy.linalg.solve(self._matrix(cycles), missing))
+
+    def _matrix(self, cycles: float) -> Array:
+        eye = np.eye(len(self.source))
+        return np.asarray(eye + cycles * (eye - self.through))
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ near dF/dy: the slip of each node, times its pressure's answer to depth while th
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
-is computed again until both belong together. Bodies that warm up faster than they wear are then at their periodic
-temperatures; how they get there in the first jumps is of first order.
+is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
 """
 
 from __future__ import annotations
@@ -46,7 +45,8 @@ class Cycle:
         worn: Depths at its shape.
         half_cycles: Records of its half-cycles.
         rate: Depths that a cycle wears there.
-        error: Estimated error of the depths of the jump that led there, over what it wore; 0 where there was none.
+        error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
+            of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
         end: State at its end; after a march's cycle its wear is taken off. What comes next follows from it.
         length: Cycles of the next jump, as wished.
@@ -97,7 +97,7 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
     Args:
         rig: The bodies and what is done to them.
         cycles: How many in all.
-        tolerance: Largest estimated error of the depths of one jump over what it wears.
+        tolerance: Largest estimated error of one jump.
         start: The one to go on after; by default the unworn one, which is yielded.
 
     Raises:
@@ -139,17 +139,19 @@ def _rate(rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None 
         at, _ = rig.half_cycle(at)
     if heat is not None and before is None:
         at = replace(at, temperature=heat.initial())
-    if heat is None or before is None or before.warm is None:
+    if heat is None or before is None or before.warm is None or before.end.temperature is None:
         return _recorded(rig, at, worn, number)
-    found, course = before, _course(before, len(program.steps))
-    warm = heat.after_cycles(before.warm, number - before.number, course)
+    cycles, rate = number - before.number, before.end.temperature - before.warm
+    over = heat.through(_course(before, len(program.steps)))
+    warm = over.after(before.warm, cycles)
     for _ in range(MOST_HEATINGS):
         found = _recorded(rig, replace(at, temperature=warm), worn, number)
-        course = _course(found, len(program.steps))
-        again = heat.after_cycles(before.warm, number - before.number, course)
-        change, warmest = np.abs(heat.surfaces(again) - heat.surfaces(warm)).max(), np.abs(heat.surfaces(again)).max()
-        if change <= SAME_HEAT * warmest:
-            return found
+        over = heat.through(_course(found, len(program.steps)))
+        again = over.after(before.warm, cycles)
+        warmest = float(np.abs(heat.surfaces(again)).max())
+        if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
+            wrong = heat.surface_changes(over.error(before.warm, again, rate, cycles))
+            return replace(found, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
         warm = again
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
@@ -190,7 +192,7 @@ def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     area = np.concatenate([pair.weights, pair.strip.weights])
     scale = area @ (end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing) / max(scale, 1e-300))
-    return replace(then, error=error)
+    return replace(then, error=max(error, then.error))
 
 
 def _derivative(rig: Rig, now: Cycle) -> Array:

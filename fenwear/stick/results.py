@@ -13,6 +13,7 @@ from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.heat_results import HEAT_VARIABLES, heat_summary, heat_values
 from fenwear.stick.jump import Cycle
 
 # name: (dimensions, units, long_name)
@@ -73,6 +74,7 @@ def row_of(rig: Rig, case: Case, cycle: Cycle) -> Row:
         "stick_width": float(weights @ records.sticking.all(axis=0)),
         "contact_width": float(((records.pressure > 0) @ weights).max()),
         "jump_error": cycle.error,
+        **heat_values(cycle, order),
     }
     return Row(cycle.number, values)
 
@@ -98,7 +100,7 @@ def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
     pair = rig.interface.middle.pair
     data = {
         name: (dimensions, np.array([row.values[name] for row in rows]), {"units": units, "long_name": text})
-        for name, (dimensions, units, text) in VARIABLES.items()
+        for name, (dimensions, units, text) in {**VARIABLES, **({} if rig.heat is None else HEAT_VARIABLES)}.items()
     }
     steps = rig.program.steps
     coordinates: dict[str, Any] = {
@@ -135,4 +137,5 @@ def summary_of(data: xarray.Dataset, worn: Worn) -> dict[str, Any]:
         "worn_area_punch_mm2": float(data.weight.values @ worn.punch),
         "largest_energy_balance_error": float(data.energy_balance_error.max()),
         "largest_jump_error": float(data.jump_error.max()),
+        **heat_summary(data),
     }

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.stick.interface import Loaded, StickInterface
@@ -82,7 +84,7 @@ class StickState:
     parts: int = 1
 
     @property
-    def heat(self) -> Array:
+    def heat(self) -> NDArray[Any]:
         """Work of friction in the step over the area of each node (n,), N/mm."""
         return -(self.traction * self.slip).sum(axis=1)
 

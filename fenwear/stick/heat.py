@@ -87,7 +87,7 @@ class StickHeat:
             for expansion, part in zip(self.expansions, np.split(temperature, [self._split]), strict=True)
         )
         if self._interface.moves and offset:  # the field stays under the punch, the material moves through it
-            x = self._interface.strip_abscissae
+            x = self._interface.middle.pair.strip.trace[:, 0]
             order = np.argsort(x)
             strip = np.stack([np.interp(x + offset, x[order], column[order]) for column in strip.T], axis=1)
         return replace(loaded, on_punch=loaded.on_punch + punch, on_strip=loaded.on_strip + strip)

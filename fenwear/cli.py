@@ -14,6 +14,7 @@ import typer
 from mpi4py import MPI
 
 import fenwear
+from fenwear import completion
 from fenwear.case import Case, builtin_cases, doubts, load_case
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
@@ -31,9 +32,22 @@ app = typer.Typer(
 
 DEFAULT_CASE = "example1-heat"
 
-CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (TOML) or the name of a built-in case.")]
+CaseArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CASE",
+        help="A case file (TOML) or the name of a built-in case.",
+        autocompletion=completion.cases,
+    ),
+]
 SetOption = Annotated[
-    list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help='Override a key: --set motion.amplitude="2 mm"',
+        autocompletion=completion.settings,
+    ),
 ]
 FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
@@ -542,7 +556,12 @@ def sweep_command(
 @app.command("info")
 def info_command(
     key: Annotated[
-        str | None, typer.Argument(metavar="KEY", help="Explain this key of the case file, or this table.")
+        str | None,
+        typer.Argument(
+            metavar="KEY",
+            help="Explain this key of the case file, or this table.",
+            autocompletion=completion.keys,
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

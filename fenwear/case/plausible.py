@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
-from fenwear.case.schema import Case, Dependence, Written
+from fenwear.case.laws import Dependence
+from fenwear.case.schema import Case, Written
 
 HOT = 2000.0  # K: most metals have melted, and no friction couple is used there
 NUMBER_AND_UNIT = re.compile(r"\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*(.*?)\s*", re.DOTALL)

@@ -13,7 +13,7 @@ The wear at the end, which the next jump begins with, gives the error by the tra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,6 +42,8 @@ class Cycle:
         rate: Depths that a cycle wears there.
         error: Estimated error of the depths of the jump that led there, over what it wore; 0 where there was none.
         first_step: Number of the time step that its records begin with.
+        end: State at its end; after a march's cycle its wear is taken off. What comes next follows from it.
+        length: Cycles of the next jump, as wished.
     """
 
     number: int
@@ -50,6 +52,8 @@ class Cycle:
     rate: Worn
     error: float
     first_step: int
+    end: RigState
+    length: int = 1
 
     @property
     def records(self) -> Records:
@@ -57,43 +61,49 @@ class Cycle:
         return Records.joined(self.half_cycles)
 
 
-def march(rig: Rig, cycles: int, start: RigState | None = None) -> Iterator[Cycle]:
+def march(rig: Rig, cycles: int, start: Cycle | None = None) -> Iterator[Cycle]:
     """Yield every cycle; the wear of each half-cycle is taken off at its end; collective.
+
+    Args:
+        rig: The bodies and what is done to them.
+        cycles: How many in all.
+        start: The one to go on after; by default none is done.
 
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    at = start or rig.beginning()
-    for number in range(cycles):
+    at = rig.beginning() if start is None else start.end
+    for number in range(0 if start is None else start.number + 1, cycles):
         parts, begin = [], at.worn
         for _ in range(rig.program.half_cycles):
             first = at.next_step
             at, records = rig.half_cycle(at)
             at = replace(at, worn=at.worn + rig.worn_in(records, first))
             parts.append(records)
-        yield Cycle(number, begin, parts, at.worn - begin, 0.0, 0)
+        yield Cycle(number, begin, parts, at.worn - begin, 0.0, 0, at)
 
 
-def jump(rig: Rig, cycles: int, tolerance: float, watch: Callable[[int], None] = lambda _: None) -> Iterator[Cycle]:
+def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) -> Iterator[Cycle]:
     """Yield the cycle at the end of every jump, the unworn one first; collective.
 
     Args:
         rig: The bodies and what is done to them.
         cycles: How many in all.
         tolerance: Largest estimated error of the depths of one jump over what it wears.
-        watch: Called with the number of cycles done before every evaluation.
+        start: The one to go on after; by default the unworn one, which is yielded.
 
     Raises:
         ConvergenceError: the shortest jump did not converge.
     """
-    at, now = _rate(rig, rig.beginning(), rig.unworn(), 0, 0.0)
-    yield now
-    length = 1
+    now = start
+    if now is None:
+        now = _rate(rig, rig.beginning(), rig.unworn(), 0, 0.0)
+        yield now
+    length = now.length
     while now.number < cycles:
         tried = min(length, cycles - now.number)
-        watch(now.number)
         try:
-            after, then = _attempt(rig, at, now, tried)
+            then = _attempt(rig, now, tried)
         except ConvergenceError:
             if tried == 1:
                 raise
@@ -105,11 +115,11 @@ def jump(rig: Rig, cycles: int, tolerance: float, watch: Callable[[int], None] =
             continue
         if tried == length or factor < 1:
             length = max(1, int(np.ceil(tried * min(MOST, max(LEAST, factor)))))
-        at, now = after, then
+        now = replace(then, length=length)
         yield now
 
 
-def _rate(rig: Rig, at: RigState, worn: Worn, number: int, error: float) -> tuple[RigState, Cycle]:
+def _rate(rig: Rig, at: RigState, worn: Worn, number: int, error: float) -> Cycle:
     """Return the cycle at a shape, after half a cycle that leads to it."""
     at = replace(at, worn=worn)
     for _ in range(1 if rig.program.half_cycles == 2 else rig.program.half_cycles):
@@ -117,10 +127,10 @@ def _rate(rig: Rig, at: RigState, worn: Worn, number: int, error: float) -> tupl
     first = at.next_step
     at, parts = rig.cycle(at)
     records = Records.joined(parts)
-    return at, Cycle(number, worn, parts, rig.worn_in(records, first), error, first)
+    return Cycle(number, worn, parts, rig.worn_in(records, first), error, first, at)
 
 
-def _attempt(rig: Rig, at: RigState, now: Cycle, cycles: int) -> tuple[RigState, Cycle]:
+def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     """Return the cycle after a jump."""
     n = len(now.worn.punch)
 
@@ -134,16 +144,16 @@ def _attempt(rig: Rig, at: RigState, now: Cycle, cycles: int) -> tuple[RigState,
     factor = scipy.linalg.lu_factor(matrix)
     begin, rate = whole(now.worn), whole(now.rate)
     first = scipy.linalg.lu_solve(factor, rate)
-    at, middle = _rate(rig, at, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, 0.0)
+    middle = _rate(rig, now.end, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, 0.0)
     second = scipy.linalg.lu_solve(factor, whole(middle.rate) - 2 * first)
     end = np.maximum(begin + cycles * (1.5 * first + 0.5 * second), begin)
-    at, then = _rate(rig, at, parted(end), now.number + cycles, 0.0)
+    then = _rate(rig, middle.end, parted(end), now.number + cycles, 0.0)
     missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
     area = np.concatenate([pair.weights, pair.strip.weights])
     scale = area @ (end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing) / max(scale, 1e-300))
-    return at, replace(then, error=error)
+    return replace(then, error=error)
 
 
 def _derivative(rig: Rig, now: Cycle) -> Array:

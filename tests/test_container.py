@@ -319,11 +319,16 @@ def test_completion_of_the_launcher(words: list[str], expected: list[str], built
         "#!/bin/sh\n"
         f'case $1 in image) exit {0 if built else 1} ;; build) touch "$0.built" ;; run) ;; *) exit 0 ;; esac\n'
         "while [ $# -gt 0 ]; do\n"
-        '    case $1 in --workdir) at=$2 ;; COMP_WORDS=*) text=${1#*=} ;; COMP_CWORD=*) echo "$at ${1#*=} $text" ;; esac\n'
+        "    case $1 in --workdir) at=$2 ;; COMP_WORDS=*) text=${1#*=} ;;\n"
+        '    COMP_CWORD=*) echo "$at ${1#*=} $text" ;; esac\n'
         "    shift\ndone\n"
     )
     engine.chmod(0o755)
-    variables = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "FENWEAR_ENGINE": "docker", "XDG_CACHE_HOME": str(tmp_path)}
+    variables = {
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        "FENWEAR_ENGINE": "docker",
+        "XDG_CACHE_HOME": str(tmp_path),
+    }
     command = ["bash", "-c", COMPLETE, "bash", str(ROOT), str(len(words) - 1), *words]
     env = {**os.environ, **variables}
     done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=PATIENCE, check=True)

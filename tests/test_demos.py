@@ -15,10 +15,9 @@ import pytest
 jupytext = pytest.importorskip("jupytext")
 nbclient = pytest.importorskip("nbclient")
 pytest.importorskip("ipykernel")
-
-from jupyter_client.asynchronous import AsyncKernelClient
-from jupyter_client.channels import AsyncZMQSocketChannel
-from jupyter_client.manager import AsyncKernelManager
+asynchronous, channels, manager = (
+    pytest.importorskip(f"jupyter_client.{name}") for name in ("asynchronous", "channels", "manager")
+)
 
 ROOT = Path(__file__).parents[1]
 DEMOS = ROOT / "demos"
@@ -37,7 +36,7 @@ NAMES = [
 SECONDS = 1800  # ends what hangs, however busy the machine
 
 
-class _Channel(AsyncZMQSocketChannel):
+class _Channel(channels.AsyncZMQSocketChannel):
     """Asks anew every second: asyncio can miss that a message has come, which then lies there until the timeout."""
 
     async def get_msg(self, timeout: float | None = None) -> dict[str, Any]:
@@ -51,11 +50,11 @@ class _Channel(AsyncZMQSocketChannel):
                     raise
 
 
-class _Client(AsyncKernelClient):
+class _Client(asynchronous.AsyncKernelClient):
     shell_channel_class = iopub_channel_class = control_channel_class = _Channel
 
 
-class _Manager(AsyncKernelManager):
+class _Manager(manager.AsyncKernelManager):
     client_factory = _Client
 
 

@@ -14,7 +14,9 @@ from typing import Any
 import furo
 
 SCRIPT, STYLE = "scripts/page.js", "styles/dark.css"
-DARK = re.compile(r'^ *body\[data-theme="dark"\] \{(?P<colours>[^{}]*--color-background-primary:[^{}]*)\}', re.MULTILINE)
+DARK = re.compile(
+    r'^ *body\[data-theme="dark"\] \{(?P<colours>[^{}]*--color-background-primary:[^{}]*)\}', re.MULTILINE
+)
 
 
 def _script(folder: Path) -> str:
@@ -32,7 +34,9 @@ def _style(folder: Path) -> str:
     if found is None or re.search(r"prefers-color-scheme: *dark\)[^}]*--color-background-primary", text):
         return ""
     body = 'body[data-theme="auto"]'
-    shown = f"html {body} .only-light {{ display: none !important; }}\n{body} .only-dark {{ display: block !important; }}"
+    shown = (
+        f"html {body} .only-light {{ display: none !important; }}\n{body} .only-dark {{ display: block !important; }}"
+    )
     return (
         f"@media not print {{\n@media (prefers-color-scheme: dark) {{\n{body} {{{found['colours']}}}\n{shown}\n}}\n}}\n"
     )

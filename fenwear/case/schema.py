@@ -6,6 +6,7 @@ the punch) is checked where the geometry is read, and reported with the same key
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,12 +14,15 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import Body, Geometry, Material, Model
+from fenwear.case.bodies import Body, Geometry, Model
 from fenwear.case.course import Output, Program, Run
 from fenwear.case.laws import Contact, Dependence, Stick, Wear
+from fenwear.case.materials import Material
 from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
 from fenwear.case.quantities import Part
 from fenwear.case.thermal import Heat
+
+OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,23 @@ class Case(Part):
         return problems
 
     @property
+    def in_degrees(self) -> bool:
+        """Whether a temperature of it was written in degrees, not in kelvin."""
+        return self.heat is not None and any(OFFSET.search(text) for text in self.written.united.values())
+
+    @property
+    def initial_materials(self) -> dict[str, Material]:
+        """The materials as they are at the initial temperature, with constants."""
+        start = 0.0 if self.heat is None else self.heat.initial
+        return {name: material.at(start, f"materials.{name}") for name, material in self.materials.items()}
+
+    @property
+    def warming(self) -> bool:
+        """Whether a property of a material that is used depends on the temperature."""
+        used = {*self.punch.regions.values(), *self.strip.regions.values()}
+        return any(self.materials[name].dependent for name in used)
+
+    @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
         return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
@@ -154,6 +175,12 @@ class Case(Part):
                 f"{key}: depends on the temperature T, which a case without the table heat does not know"
                 for key, value in given.items()
                 if isinstance(value, Dependence) and value.law is None and value.depends_on("T")
+            ]
+            problems += [
+                f"materials.{name}.{key}: depends on the temperature T, which a case without the table heat does not "
+                "know"
+                for name, material in self.materials.items()
+                for key in material.dependent
             ]
         problems += self._region_problems()
         friction = self.contact.friction
@@ -218,7 +245,10 @@ class Case(Part):
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
             "contact.solver: expected 'condensed'": self.contact.solver == "full",
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
-            "heat: expected none": self.heat is not None,
+            "heat: expected none in a solid": self.heat is not None and self.model.kind == "solid",
+            "heat.track: expected none": self.heat is not None and self.heat.track is not None,
+            "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
+            "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
             "program: expected none": self.program is not None,
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes,

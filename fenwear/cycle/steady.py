@@ -249,6 +249,22 @@ def steady(system: Tribosystem) -> Steady:
     return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
 
 
+def check_constant_materials(system: Tribosystem) -> None:
+    """Raise where the properties of materials follow the temperature: a state at once would have to find both.
+
+    Raises:
+        ConvergenceError: they do.
+    """
+    if system.made_from is not None and system.case.warming:
+        used = sorted({*system.case.punch.regions.values(), *system.case.strip.regions.values()})
+        name = next(name for name in used if system.case.materials[name].dependent)
+        key = f"materials.{name}.{system.case.materials[name].dependent[0]}"
+        raise ConvergenceError(
+            f"no steady state is solved for at once where {key} depends on the temperature: `run` with "
+            'run.integration = "jump" and run.periodic_within comes to it'
+        )
+
+
 def _check_exists(system: Tribosystem) -> None:
     """Raise where the strip's wear never comes to a shape that stays, or no one rigid motion can follow it."""
     if system.track_deepens:
@@ -262,6 +278,7 @@ def _check_exists(system: Tribosystem) -> None:
             f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
             "slid, as long as it slides. Follow the wear by `run`"
         )
+    check_constant_materials(system)
     if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
         raise ConvergenceError(
             "no cyclic steady state is solved for with a pressure_threshold: below it any pressure stays. Follow the "

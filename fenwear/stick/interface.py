@@ -217,6 +217,17 @@ class StickInterface(OppositeBodies):
         return position_of(rigid, self.punch, self.strip, reading, self.field)
 
 
+def meshed(bodies: OppositeBodies) -> StickInterface:
+    """Return bodies that were made from meshes, as what follows needs them.
+
+    Raises:
+        ValueError: they were not.
+    """
+    if not isinstance(bodies, StickInterface):
+        raise ValueError("expected bodies with meshes")
+    return bodies
+
+
 def position_of(
     rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, reading: csr_array, field: SlidingField
 ) -> Position:

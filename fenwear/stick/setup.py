@@ -15,7 +15,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.heat import stick_heat
-from fenwear.stick.interface import StickInterface
+from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.program import make_program
 from fenwear.stick.wear import local_wear
 
@@ -72,7 +72,7 @@ def heated(rig: Rig, case: Case) -> Rig:
     if case.heat is None:
         return rig
     steps = len(rig.program.steps) // rig.program.half_cycles
-    heat = stick_heat(rig.interface, case, steps)
+    heat = stick_heat(meshed(rig.interface), case, steps)
     return Rig(rig.interface, rig.program, rig.wear, rig.friction, rig.watch, heat)
 
 

@@ -1,14 +1,15 @@
-"""Contact that reaches the end of the meshed surface where the bodies go on: clipped, and how wide it should be.
+"""Contact that reaches the end of a plane's or ring's meshed surface where the bodies go on: clipped.
 
 Beyond its ends a contact surface has an edge, as a flat punch at its corner, or the bodies go on smoothly, as a
 cylinder whose tagged arc ends somewhere. At a smooth end pressure or wear of the outermost node says that contact
 would go on. strip_contact reaches at least as far as punch_contact in all positions, so its end is met there, too.
 
-How wide the surface should be is estimated by areas: the worn cross-section A fills the space below a level D,
+How wide it should be is estimated by areas: the worn cross-section A fills the space below a level D,
 
     integral of max(D - g, 0) dx = A,    g the gap of the unworn bodies with its least value taken off,
 
-and D is at least what Hertz's line contact closes, 2 F / (pi E*), F the load over the thickness.
+and D is at least what Hertz's line contact closes, 2 F / (pi E*), F the load over the thickness, or of a ring over its
+mean circumference. Of solids: `fenwear.rim`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Case
@@ -51,6 +52,7 @@ class ContactEnds:
         x: Abscissae as far as both bodies go on (k,), mm.
         gap: Gap of the unworn bodies there, its least value taken off (k,), mm.
         closed_by_load: D of Hertz over the load, mm per N/mm.
+        around: Of a ring its mean circumference, mm; 1 in a plane, whose forces are those over the thickness.
     """
 
     goes_on: tuple[bool, bool]
@@ -58,6 +60,21 @@ class ContactEnds:
     x: Array
     gap: Array
     closed_by_load: float
+    around: float = 1.0
+
+    @property
+    def width(self) -> float:
+        """How wide the contact surface is, mm."""
+        return self.ends[1] - self.ends[0]
+
+    def touched(self, carried: Mask) -> Mask:
+        """Return where the contact is clipped (k,) bool, of nodes that carry pressure or wear (k, n)."""
+        return np.asarray((carried[:, [0, -1]] & self.goes_on).any(axis=1))
+
+    def where(self, carried: Mask) -> str:
+        """Return in words where the contact is clipped, of nodes that carry pressure or wear (n,); "" for nowhere."""
+        places = self.reached((bool(carried[0]), bool(carried[-1])))
+        return f"at x = {' and '.join(f'{x:.4g}' for x in places)} mm" if places else ""
 
     def reached(self, at_ends: tuple[bool, bool]) -> list[float]:
         """Return the abscissae of the ends where the contact is clipped, mm.
@@ -71,16 +88,16 @@ class ContactEnds:
         """Return about how wide the contact surface should be, mm; at most as far as the bodies go on.
 
         Args:
-            worn_area: Cross-section worn off both bodies, mm².
-            load: On the contact over the thickness, N/mm.
+            worn_area: Cross-section worn off both bodies, mm²; of a ring the volume, mm³.
+            load: On the contact over the thickness, N/mm; of a ring all of it, N.
         """
-        level = max(self._level(worn_area), self.closed_by_load * load)
+        level = max(self._level(worn_area / self.around), self.closed_by_load * load / self.around)
         lowest = int(np.argmin(self.gap))
         above = np.flatnonzero(self.gap > level)
         left = max((k for k in above if k < lowest), default=0)
         right = min((k for k in above if k > lowest), default=len(self.x) - 1)
         wide = float(self.x[right] - self.x[left])
-        return min(max(wide, WIDER * (self.ends[1] - self.ends[0])), self.reach)
+        return min(max(wide, WIDER * self.width), self.reach)
 
     @property
     def reach(self) -> float:
@@ -113,31 +130,24 @@ def contact_ends(system: Tribosystem) -> ContactEnds | None:
     x = np.linspace(low, high, FINE)
     gap = np.interp(x, punch.x, punch.z) - np.interp(x, strip.x, strip.z)
     goes_on = (bool(low < punch.ends[0] - slack), bool(high > punch.ends[1] + slack))
-    return ContactEnds(goes_on, punch.ends, x, gap - gap.min(), 2 / (np.pi * _contact_modulus(system.case)))
+    closed, around = 2 / (np.pi * contact_modulus(system.case)), 1.0
+    if system.case.model.kind == "axisymmetric":
+        weights = system.pair.weights  # of whole circles
+        around = float(2 * np.pi * (weights @ system.pair.x) / weights.sum())
+    return ContactEnds(goes_on, punch.ends, x, gap - gap.min(), closed, around)
 
 
-def clipped_text(ends: ContactEnds, places: list[float], needed: float, case: Case) -> str:
-    """Say that the contact is clipped, and how wide the surface should be."""
-    where = " and ".join(f"{x:.4g}" for x in places)
-    how = "; set geometry.parameters.contact_width" if "contact_width" in case.geometry.parameters else ""
-    return (
-        f"contact reaches the end of the meshed contact surface at x = {where} mm, where the bodies go on smoothly: "
-        f"it is clipped there, and pressures and depths are not those of a surface that is wide enough; a width of "
-        f"about {needed:.3g} mm is needed, it has {ends.ends[1] - ends.ends[0]:.3g} mm{how}"
-    )
-
-
-def opened_area(system: Tribosystem, worn: Worn) -> float:
-    """Return the cross-section that depths worn off both bodies open in the middle position, mm²."""
+def opened(system: Tribosystem, worn: Worn) -> float:
+    """Return what depths worn off both bodies open in the middle position: mm² in a plane, mm³ of rings and solids."""
     return float(system.pair.weights @ system.pair.opening(worn.punch, worn.strip))
 
 
-def _contact_modulus(case: Case) -> float:
+def contact_modulus(case: Case) -> float:
     """Return E* of the softest region of each body, MPa: 1 / E* = sum of (1 - nu²) / E, without nu in plane stress."""
     compliance = 0.0
     for body in (case.punch, case.strip):
-        used = [case.materials[name] for name in body.regions.values()]
-        compliance += max((1 - (case.model.plane == "strain") * m.poisson**2) / m.young for m in used)
+        used = [case.initial_materials[name] for name in body.regions.values()]
+        compliance += max((1 - (case.model.law != "stress") * m.poisson**2) / m.young for m in used)
     return 1 / compliance
 
 

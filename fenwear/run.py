@@ -23,6 +23,7 @@ from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
 from fenwear.results import checkpoint
+from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
     HISTORY,
@@ -81,11 +82,7 @@ def run_case(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     if case.contact.law == "coulomb":
-        if resume:
-            raise CaseError(
-                InputError("--resume", "runs with contact.law = 'coulomb' start anew: they keep no checkpoint")
-            )
-        return run_stick(case, name, output, log, told=progress == "bar", comm=comm)
+        return run_stick(case, name, output, log, resume=resume, progress=progress, comm=comm, last=last)
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
     if not resume:
@@ -152,8 +149,9 @@ class _Run:
         start: RunState | None = None
         if resume:
             followed = checkpoint.followed(directory, system)
-            if followed is not None:
-                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case))
+            warmed = checkpoint.warmed(directory, system)
+            if followed is not None or warmed is not None:
+                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case), warmed=warmed)
             start = checkpoint.load(directory, system)
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
@@ -276,6 +274,8 @@ class _Run:
     def _take(self, block: Block) -> None:
         if block.system.bodies.followed is not self.system.bodies.followed:
             self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
+        elif block.system.bodies.warmed is not self.system.bodies.warmed:
+            self.log(f"after half-cycle {self.state.half_cycle:,} properties are those of the temperatures there")
         self.system = block.system
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
@@ -409,7 +409,8 @@ class _Progress:
     def block(self, block: Block) -> None:
         """Tell of a block."""
         number = int(block.half_cycle[-1])
-        hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"
+        degrees = degrees_of(block.system.case)
+        hot = "" if block.heat is None else f", {block.heat.max_temperature[-1] - degrees.zero:.1f} {degrees.shown}"
         state = f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
         self.bar.update(number - self.bar.n)
         self.bar.set_postfix_str(state)

@@ -8,8 +8,9 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
-from fenwear.clipped import clipped_text, contact_ends, opened_area
+from fenwear.clipped import ContactEnds, contact_ends, opened
 from fenwear.cycle import Block, Steady
+from fenwear.rim import ContactRim, contact_rim
 
 TAKEN_UP = 0.1  # of the amplitude: slip and worn volume are too large by that
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
@@ -23,7 +24,7 @@ class Watch:
     """
 
     def __init__(self, system: Tribosystem) -> None:
-        self.system, self.ends = system, contact_ends(system)
+        self.system, self.limits = system, contact_limits(system)
         self._texts: dict[str, str] = {}
         self._first_clipped = 0
 
@@ -47,23 +48,39 @@ class Watch:
         return list(self._texts.values())
 
     def _clipped(self, block: Block) -> str:
-        if self.ends is None:
+        if self.limits is None:
             return ""
-        ends = [0, -1]
-        held = (block.pressure[:, ends] > 0) | (block.wear[:, ends] > 0)
+        carried = (block.pressure > 0) | (block.wear > 0)
         for contact in block.end.contacts:
             if contact is not None:
-                held[-1] |= contact.pressure[0, ends] > 0
-        places = self.ends.reached((bool(held[:, 0].any()), bool(held[:, 1].any())))
-        if not places:
+                carried[-1] |= contact.pressure[0] > 0
+        touched = self.limits.touched(carried)
+        if not touched.any():
             return ""
-        row = int(np.argmax((held & self.ends.goes_on).any(axis=1)))
-        self._first_clipped = self._first_clipped or int(block.half_cycle[row])
-        needed = self.ends.width_needed(
-            opened_area(self.system, block.end.worn), float(block.system.pair.weights @ block.pressure[-1])
-        )
-        text = clipped_text(self.ends, places, needed, self.system.case)
+        self._first_clipped = self._first_clipped or int(block.half_cycle[np.argmax(touched)])
+        worn, load = opened(self.system, block.end.worn), float(block.system.pair.weights @ block.pressure[-1])
+        needed = self.limits.width_needed(worn, load)
+        text = clipped_text(self.limits, self.limits.where(np.asarray(carried.any(axis=0))), needed, self.system.case)
         return f"from half-cycle {self._first_clipped:,} on {text}"
+
+
+def contact_limits(system: Tribosystem) -> ContactEnds | ContactRim | None:
+    """Return how the contact surface of a system ends; collective. None where nothing can clip the contact.
+
+    Args:
+        system: On meshes as they were made, not moved by wear.
+    """
+    return contact_rim(system) if system.pair.punch.dim == 3 else contact_ends(system)
+
+
+def clipped_text(limits: ContactEnds | ContactRim, where: str, needed: float | None, case: Case) -> str:
+    """Say that the contact is clipped, and how wide the surface should be."""
+    how = "; set geometry.parameters.contact_width" if "contact_width" in case.geometry.parameters else ""
+    wide = "" if needed is None else f"; a width of about {needed:.3g} mm is needed, it has {limits.width:.3g} mm"
+    return (
+        f"contact reaches the end of the meshed contact surface {where}, where the bodies go on smoothly: "
+        f"it is clipped there, and pressures and depths are not those of a surface that is wide enough{wide}{how}"
+    )
 
 
 def mean_pressures(pressure: Array, weights: Array) -> Array:
@@ -80,8 +97,8 @@ def pressed(case: Case, pressure: float) -> str:
                 f"{law.hardness:,.4g} MPa: the surface would yield, and a linear-elastic contact does not"
             )
     used = {*case.punch.regions.values(), *case.strip.regions.values()}
-    softest = min(used, key=lambda name: case.materials[name].young)
-    young = case.materials[softest].young
+    softest = min(used, key=lambda name: case.initial_materials[name].young)
+    young = case.initial_materials[softest].young
     if pressure > STRONGEST * young:
         return (
             f"the mean pressure of the contact reaches {pressure:,.4g} MPa, more than a tenth of Young's modulus of "
@@ -103,11 +120,12 @@ def hot(temperature: float, when: str) -> str:
 def initial_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of the contact before any wear; collective."""
     contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
-    pressure, weights, ends = contact.pressure[0], system.pair.weights, contact_ends(system)
+    pressure, weights, limits = contact.pressure[0], system.pair.weights, contact_limits(system)
     texts = [pressed(system.case, float(mean_pressures(pressure[None], weights)[0]))]
-    places = [] if ends is None else ends.reached((bool(pressure[0] > 0), bool(pressure[-1] > 0)))
-    if ends is not None and places:
-        texts.append(clipped_text(ends, places, ends.width_needed(0.0, float(weights @ pressure)), system.case))
+    where = "" if limits is None else limits.where(pressure > 0)
+    if limits is not None and where:
+        needed = limits.width_needed(0.0, float(weights @ pressure))
+        texts.append(clipped_text(limits, where, needed, system.case))
     return [*(text for text in texts if text), *stroke_warnings(system)]
 
 
@@ -146,18 +164,17 @@ def stroke_warnings(system: Tribosystem) -> list[str]:
 
 def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
     """Return what is to be said of a cyclic steady state; collective."""
-    weights, ends = system.pair.weights, contact_ends(system)
+    weights, limits = system.pair.weights, contact_limits(system)
     texts = [pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max()))]
     if state.heat is not None:
         texts.append(hot(float(max(state.heat.punch.max(), state.heat.strip.max())), "in the cyclic steady state"))
-    held = (state.phase_pressure > 0).any(axis=0) | (state.wear_per_cycle > 0)
-    places = [] if ends is None else ends.reached((bool(held[0]), bool(held[-1])))
-    if ends is not None and places:
-        where = " and ".join(f"{x:.4g}" for x in places)
+    where = "" if limits is None else limits.where((state.phase_pressure > 0).any(axis=0) | (state.wear_per_cycle > 0))
+    if limits is not None and where:
+        reach = f"; a width of about {limits.reach:.4g} mm is needed, from edge to edge" if limits.reach else ""
         texts.append(
-            f"contact reaches the end of the meshed contact surface at x = {where} mm, where the bodies go on "
+            f"contact reaches the end of the meshed contact surface {where}, where the bodies go on "
             f"smoothly: the scar of the cyclic steady state is as wide as what is meshed, "
-            f"{ends.ends[1] - ends.ends[0]:.4g} mm, whatever that is, and so are its pressures; a width of about "
-            f"{ends.reach:.4g} mm is needed, from edge to edge. A scar that still grows is followed by `run`"
+            f"{limits.width:.4g} mm, whatever that is, and so are its pressures{reach}. "
+            "A scar that still grows is followed by `run`"
         )
     return [text for text in texts if text]

@@ -16,7 +16,7 @@ import pytest
 import fenwear as package
 from fenwear import Tribosystem, steady
 from fenwear.case import builtin_cases
-from fenwear.cli import steady_command
+from fenwear.cli.states import steady_command
 
 Run = Callable[..., Any]
 MEAN = 1e4 / 600
@@ -72,7 +72,7 @@ def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pyte
         clock[0] += 196.0
         return 7
 
-    monkeypatch.setattr("fenwear.cli.time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    monkeypatch.setattr("fenwear.cli.states.time", SimpleNamespace(perf_counter=lambda: clock[0]))
     monkeypatch.setattr("fenwear.cycle.cycles_to_reach", slow)
     steady_command("example2", list(options()[1::2]))
     assert "33.333 MPa" in printed[0]
@@ -245,7 +245,13 @@ def test_two_ranks_without_convergence(fenwear: Run, tmp_path: Path) -> None:
 
 
 def test_shell_completion(run_python: Run) -> None:
-    """The shell is told commands and options that begin as what stands there."""
-    for words, place, expected in (("fenwear st", 1, ["steady"]), ("fenwear run --re", 2, ["--resume"])):
+    """The shell is told commands, options, cases and keys that begin as what stands there."""
+    for words, place, expected in (
+        ("fenwear st", 1, ["steady"]),
+        ("fenwear run --re", 2, ["--resume"]),
+        ("fenwear check example1-l", 2, ["example1-lz40", "example1-lz40-heat"]),
+        ("fenwear check example1 --set motion.am", 4, ["motion.amplitude="]),
+        ("fenwear info wear.strip.coefficient.t", 2, ["wear.strip.coefficient.table"]),
+    ):
         variables = {"_FENWEAR_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(place)}
         assert run_python("-m", "fenwear", **variables).stdout.split() == expected

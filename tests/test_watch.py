@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,12 @@ import pytest
 from markupsafe import escape
 
 from fenwear import Tribosystem, assemble, load_case, make_case, steady
+from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
 from fenwear.clipped import contact_ends
 from fenwear.errors import MeshQualityError
 from fenwear.report.page import page
+from fenwear.rim import contact_rim
 from fenwear.run import run_case
 from fenwear.stick.cycle import Records
 from fenwear.stick.setup import make_rig
@@ -56,6 +60,54 @@ def test_width_by_area(assembled: Assembled) -> None:
     modulus, load = 2e5 / (2 * (1 - 0.09)), 6000.0
     assert ends.width_needed(0.0, load) == pytest.approx(2 * np.sqrt(4 * load * 6 / (np.pi * modulus)), rel=0.02)
     assert ends.width_needed(1e3, 18.5) == ends.reach  # never beyond the edges
+
+
+def test_rings_are_as_long_as_they_are_round(assembled: Assembled) -> None:
+    """Volumes and loads of whole rings are those of a plane times 2 pi times the mean radius of the contact."""
+    ends = contact_ends(assembled("ring-on-ring"))
+    assert ends is not None
+    assert ends.goes_on == (False, False)
+    assert ends.around == pytest.approx(2 * np.pi * 2 / 3 * (30**3 - 20**3) / (30**2 - 20**2), rel=1e-9)
+    plane = replace(ends, around=1.0)
+    assert ends.width_needed(ends.around * 1e-3, ends.around * 7.0) == plane.width_needed(1e-3, 7.0)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("name", "settings", "clips"),
+    [
+        ("ball-on-flat", (), "all around"),
+        ("pin-on-disc", (), "nowhere"),  # the pin's edge, on a disc that goes on
+        ("brake-pad", ("geometry.parameters.margin_angle=0",), "nowhere"),  # edges of both
+    ],
+)
+def test_rims(name: str, settings: tuple[str, ...], clips: str) -> None:
+    """A ball goes on beyond the square that is tagged; an edge ends a contact."""
+    placed = place_case(load_case(name, ["geometry.degree=2", *settings]))
+    rim = contact_rim(placed)
+    if clips == "nowhere":
+        assert rim is None
+        return
+    assert rim is not None
+    x = placed.pair.punch.x
+    np.testing.assert_array_equal(rim.clips, np.abs(x[:, :2]).max(axis=1) > 0.2 - 1e-9)
+    assert rim.width == pytest.approx(0.4, rel=1e-9)
+    np.testing.assert_allclose(rim.curvatures, 1 / 5, rtol=2e-3)
+
+
+def test_a_ball_that_needs_more(assembled: Assembled) -> None:
+    """Reference: Hertz's a³ = 3 F R / (4 E*), and the volume pi a⁴ / (4 R) of a cap worn flat."""
+    system = assembled("ball-on-flat", "geometry.degree=1", "punch.loads.0.force=[0, 0, -600]")
+    rim = contact_rim(system)
+    assert rim is not None
+    modulus = 210e3 / (2 * (1 - 0.09))
+    assert rim.width_needed(0.0, 600.0) == pytest.approx(2 * (0.75 * 600 * 5 / modulus) ** (1 / 3), rel=2e-3)
+    assert rim.width_needed(np.pi * 0.4**4 / (4 * 5), 0.0) == pytest.approx(0.8, rel=2e-3)
+    (warning, _) = initial_warnings(system)
+    assert re.search(r"at \d+ nodes of its rim, \(0\.2, 0, 0\.004\d*\) mm among them, where the bodies go on", warning)
+    assert "a width of about 0.538 mm is needed, it has 0.4 mm; set geometry.parameters.contact_width" in warning
+    inside = assembled("ball-on-flat", "geometry.degree=1", "punch.loads.0.force=[0, 0, -20]")
+    assert not any("clipped" in text for text in initial_warnings(inside))
 
 
 def half_tagged(folder: Path) -> Path:

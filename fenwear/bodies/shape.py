@@ -128,8 +128,9 @@ def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArr
     facets = exterior_facet_indices(mesh.topology)
     facets = np.setdiff1d(facets, body.facet_tags.find(contact_tag(body))).astype(np.int32)
     corners = mesh.geometry.x[entities_to_geometry(mesh, dim - 1, facets)][:, :, : mesh.geometry.dim]
-    extent, along = np.ptp(corners, axis=1), np.ptp(corners @ normal, axis=1)
-    bent = along < np.sqrt(1 - ACROSS**2) * np.linalg.norm(extent, axis=1)
+    sides = corners[:, 1:dim] - corners[:, :1]  # one of a line, two of a triangle or quadrilateral
+    across = np.cross(sides[:, 0], sides[:, 1]) if dim == 3 else sides[:, 0, ::-1] * [1.0, -1.0]
+    bent = np.abs(across @ normal) > ACROSS * np.linalg.norm(across, axis=1)
     return fem.locate_dofs_topological(space, dim - 1, facets[bent])
 
 

@@ -1,34 +1,16 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
+from fenwear.case.bodies import Body, Geometry, Load, Model, Prescribed, Support
+from fenwear.case.course import Output, Run
 from fenwear.case.dependence import register_law
+from fenwear.case.laws import Contact, Dependence, Stick, Wear, WearLaw
+from fenwear.case.materials import Material
+from fenwear.case.motions import Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.case.plausible import doubts
+from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
-from fenwear.case.schema import (
-    Body,
-    Case,
-    Contact,
-    Dependence,
-    Geometry,
-    Heat,
-    Kind,
-    Load,
-    Material,
-    Model,
-    Motions,
-    OneWay,
-    Oscillation,
-    Output,
-    Prescribed,
-    Reciprocating,
-    Rotation,
-    Run,
-    Stick,
-    Support,
-    Tabulated,
-    Track,
-    Wear,
-    WearLaw,
-)
+from fenwear.case.schema import Case
+from fenwear.case.thermal import Heat, Track
 
 __all__ = [
     "Body",

@@ -12,7 +12,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from fenwear.case.schema import Body, Case, Dependence, Unit, WearLaw, part_models
+from fenwear.case.bodies import Body
+from fenwear.case.laws import Dependence, WearLaw
+from fenwear.case.quantities import Unit
+from fenwear.case.schema import Case, part_models
 from fenwear.errors import CaseError, InputError
 
 WORDS = {float: "number", int: "whole number", str: "text", bool: "true or false"}

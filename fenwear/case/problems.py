@@ -6,7 +6,9 @@ import difflib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fenwear.case.schema import Case, Dependence, OneWay, Oscillation, Reciprocating, Rotation, Tabulated, part_models
+from fenwear.case.laws import Dependence
+from fenwear.case.motions import OneWay, Oscillation, Reciprocating, Rotation, Tabulated
+from fenwear.case.schema import Case, part_models
 from fenwear.case.units import shown
 from fenwear.errors import InputError
 

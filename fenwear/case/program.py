@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.case.schema import Case, OneWay, ProgramStep, Rotation, Tabulated
+from fenwear.case.course import ProgramStep
+from fenwear.case.motions import OneWay, Rotation, Tabulated
+from fenwear.case.schema import Case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 

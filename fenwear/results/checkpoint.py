@@ -16,10 +16,12 @@ from typing import Any
 
 import adios4dolfinx
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
+from fenwear.case import Case
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import SUMS, Totals
@@ -38,6 +40,7 @@ NUMBERS, WEAR, STATES = (
     ("pressure", "gap", "rigid"),
 )
 TOTALS = ("totals", "energy")
+WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
 BULK = "bulk"  # temperature of a closed track, NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
@@ -62,14 +65,31 @@ def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
     comm, new = system.comm, directory / NEW
     on_root(comm, lambda: _begin(new, system, state))
     if state.temperature is not None:
-        for basis, function in zip(state.temperature.bases, state.temperature.functions(), strict=True):
-            path = new / f"temperature_{basis.body.body.name}.bp"
-            size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
-            on_root(comm, partial(check_room, new, size))
-            with writing_together(comm, path):
-                adios4dolfinx.write_function_on_input_mesh(path, function)
+        write_temperatures(new, comm, state.temperature)
+    if system.bodies.warmed is not None and system.bodies.heat is not None:
+        for body, taken in zip(system.bodies.heat, system.bodies.warmed, strict=True):
+            _write_function(comm, new, f"{WARMED}_{body.body.name}", body.function(taken))
     comm.Barrier()
-    on_root(comm, lambda: _swap(directory))
+    on_root(comm, lambda: swap(directory))
+
+
+def write_temperatures(folder: Path, comm: MPI.Comm, state: HeatState) -> None:
+    """Write the temperatures of both bodies into a folder; collective.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    for basis, function in zip(state.bases, state.functions(), strict=True):
+        _write_function(comm, folder, f"temperature_{basis.body.body.name}", function)
+
+
+def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function) -> None:
+    """Write a temperature; collective."""
+    path = new / f"{name}.bp"
+    size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
+    on_root(comm, partial(check_room, new, size))
+    with writing_together(comm, path):
+        adios4dolfinx.write_function_on_input_mesh(path, function)
 
 
 def _begin(new: Path, system: Tribosystem, state: RunState) -> None:
@@ -117,11 +137,32 @@ def followed(directory: Path, system: Tribosystem) -> Worn | None:
     Raises:
         CaseError: there is no checkpoint, or it is of another case.
     """
-    arrays = on_root(system.comm, lambda: _read(_find(directory), system))
+    arrays = on_root(system.comm, lambda: _read(find(directory), system))
     return Worn(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
 
 
-def _swap(directory: Path) -> None:
+def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
+    """Return the temperatures that the materials' properties of a checkpoint are taken at (owned,) each; collective.
+
+    None where they are those of the initial temperature.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is damaged.
+    """
+    comm, bodies = system.comm, system.bodies.heat
+    folder = on_root(comm, lambda: find(directory))
+    if bodies is None or not on_root(comm, (folder / f"{WARMED}_punch.bp").exists):
+        return None
+    punch, strip = (read_temperature(folder, body, WARMED) for body in bodies)
+    return punch, strip
+
+
+def swap(directory: Path) -> None:
+    """Let the new checkpoint take the place of the one before; for one rank.
+
+    Raises:
+        OutputError: it cannot.
+    """
     new, current, old = (directory / name for name in (NEW, FOLDER, OLD))
     with writing(current):
         shutil.rmtree(old, ignore_errors=True)
@@ -138,12 +179,12 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
     comm = system.comm
-    folder = on_root(comm, lambda: _find(directory))
+    folder = on_root(comm, lambda: find(directory))
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if system.bodies.heat is not None:
         bulk = None if np.isnan(arrays[BULK]) else float(arrays[BULK])
-        read = [_read_temperature(folder, body) for body in system.bodies.heat]
+        read = [read_temperature(folder, body) for body in system.bodies.heat]
         temperature = HeatState.nodal(system.bodies.heat, read, bulk)
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
@@ -154,25 +195,35 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, *numbers)
 
 
-def _read_temperature(folder: Path, body: HeatBody) -> Array:
-    """Return the temperatures of this rank's own nodes of a body; collective."""
+def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
+    """Return the temperatures of this rank's own nodes of a body; collective.
+
+    Raises:
+        CaseError: they cannot be read.
+    """
     comm, function = body.body.mesh.comm, body.function(body.initial())
     readable = True
     try:
-        adios4dolfinx.read_function(folder / f"temperature_{body.body.name}.bp", function)
+        adios4dolfinx.read_function(folder / f"{name}_{body.body.name}.bp", function)
     except (KeyError, OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
         readable = False
     values = function.x.array[: body.owned].copy()
     if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):
-        raise _damaged(folder)
+        raise damaged(folder)
     return values
 
 
-def _damaged(folder: Path) -> CaseError:
+def damaged(folder: Path) -> CaseError:
+    """Return the error of a checkpoint that cannot be read."""
     return CaseError(InputError("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
 
 
-def _find(directory: Path) -> Path:
+def find(directory: Path) -> Path:
+    """Return the folder of a run's checkpoint.
+
+    Raises:
+        CaseError: there is none.
+    """
     for name in (FOLDER, OLD):  # killed between two renames only the old one is left
         if (directory / name / ARRAYS).is_file():
             return directory / name
@@ -182,7 +233,7 @@ def _find(directory: Path) -> Path:
 def reached(directory: Path) -> int | None:
     """Return the half-cycle of the checkpoint in a run's folder; None where there is none to go on from."""
     try:
-        return int(_arrays(_find(directory))["half_cycle"])
+        return int(_arrays(find(directory))["half_cycle"])
     except CaseError:
         return None
 
@@ -193,15 +244,20 @@ def _arrays(folder: Path) -> dict[str, Any]:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
             return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
-        raise _damaged(folder) from None
+        raise damaged(folder) from None
 
 
-def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
+def check_case(folder: Path, case: Case) -> None:
+    """Make sure that a checkpoint is of this case.
+
+    Raises:
+        CaseError: it is of another one, whose differences are named, or damaged.
+    """
     try:
         saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
     except (OSError, ValueError):
-        raise _damaged(folder) from None
-    present = _flat(tomllib.loads(system.case.to_toml()))
+        raise damaged(folder) from None
+    present = _flat(tomllib.loads(case.to_toml()))
     keys = sorted({*saved, *present})
     problems = [
         InputError(key, f"the checkpoint has {saved.get(key, 'nothing')!r}, the case {present.get(key, 'nothing')!r}")
@@ -210,13 +266,17 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
     ]
     if problems:
         raise CaseError([InputError("--resume", "the checkpoint is of another case"), *problems])
+
+
+def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
+    check_case(folder, system.case)
     arrays = _arrays(folder)
     for names in (WEAR, FOLLOWED):
         for name, unworn in _depths(names, system.unworn()).items():
             if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
-                raise _damaged(folder)
+                raise damaged(folder)
     if arrays["totals"].shape != (len(SUMS),) or arrays["energy"].shape != system.pair.weights.shape:
-        raise _damaged(folder)
+        raise damaged(folder)
     return arrays
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
@@ -130,6 +131,24 @@ class PhasesWear:
                 right[k, strip:] = self.pairs[k].deposit.toarray() * slope
         return self._left, right
 
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
+        if self.strip is not None or self.punch is None:
+            return None
+        return self.punch.slope(pressure)
+
+    def slopes(self, pressure: Array) -> list[csr_array]:
+        """Return the gap opened in the first phase by unit pressures of each phase (n, n), the same as L_1 R_k."""
+        m, n = pressure.shape
+        found = [csr_array((n, n)) for _ in range(m)]
+        if self.punch is not None:
+            found = [csr_array(diags_array(slope)) for slope in self.punch.slope(pressure)]
+        if self.strip is not None:
+            material = self.pairs[0].material
+            for k, slope in enumerate(self.strip.slope(pressure)):
+                found[k] = csr_array(found[k] + material @ (self.pairs[k].deposit @ diags_array(slope)))
+        return found
+
     @cached_property
     def _left(self) -> Array:
         parts = []
@@ -155,6 +174,11 @@ class WornLayer:
     def opening(self, pressure: Array) -> Array:
         """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
         return self.repeats * self.wear.opening(pressure)
+
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
+        found = self.wear.local(pressure)
+        return None if found is None else self.repeats * found
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of its derivative L_k R_j."""

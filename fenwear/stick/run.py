@@ -1,4 +1,4 @@
-"""A whole run with stick: from a case to the folder of its results."""
+"""A whole run with stick: from a case to the folder of its results, and on from its checkpoint."""
 
 from __future__ import annotations
 
@@ -6,87 +6,253 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Literal
 
 import numpy as np
 import xarray
 from mpi4py import MPI
+from tqdm import tqdm
 
 from fenwear.case import Case, doubts
-from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, OutputError
 from fenwear.parallel import on_root
 from fenwear.report.stick import write_stick_report
-from fenwear.results.history import free_directory, make_directory, write_case, write_summary
+from fenwear.results.history import HISTORY, free_directory, make_directory, write_case, write_summary
+from fenwear.signals import Signals
+from fenwear.stick import checkpoint
 from fenwear.stick.cycle import Rig
 from fenwear.stick.jump import Cycle, jump, march
-from fenwear.stick.results import Row, dataset, row_of, summary_of, write_history
-from fenwear.stick.setup import Fineness, fine_enough, make_rig
+from fenwear.stick.results import dataset, row_of, summary_of
+from fenwear.stick.setup import Fineness, fine_enough, make_rig, reaches_border
+from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
 
+LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
+LINE_SECONDS = 10.0  # after which a long cycle tells that it goes on
 Log = Callable[[str], None]
+Progress = Literal["bar", "lines", "none"]
 
 
 def run_stick(
-    case: Case, name: str, output: Path | None, log: Log, *, told: bool = True, comm: MPI.Comm = MPI.COMM_WORLD
+    case: Case,
+    name: str,
+    output: Path | None,
+    log: Log,
+    *,
+    resume: bool = False,
+    progress: Progress = "bar",
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    last: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case with contact.law = "coulomb" and write its results; collective.
 
     Args:
         case: The problem.
         name: Names the folder results/NAME where `output` is None.
-        output: New folder of the results.
+        output: New folder of the results, or with `resume` the folder of the run to go on with.
         log: Called with each message.
-        told: Whether progress is told where standard error is a terminal.
+        resume: Go on from the checkpoint in `output`.
+        progress: A bar where standard error is a terminal, a line now and then, or none.
         comm: The ranks.
+        last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
 
     Returns:
         The summary and the folder.
 
     Raises:
-        CaseError: the case or its geometry is wrong, or the folder cannot be made.
+        CaseError: the case, its geometry or its checkpoint is wrong, or the folder cannot be made.
         ConvergenceError: a time step failed; the results up to it are in the folder.
-        OutputError: a file cannot be written.
+        InterruptedRunError: a signal ended the run; it can be resumed.
+        OutputError: a file cannot be written; what was written before it is whole.
     """
-    if case.model.kind != "plane":
-        raise CaseError(InputError("model.kind", "results are written of plane models so far; Python takes solids"))
     begin = time.perf_counter()
     rig = make_rig(case, comm)
-    check_touching(rig)
+    if not resume:
+        check_touching(rig)
     setup = time.perf_counter() - begin
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
-    on_root(comm, lambda: make_directory(directory))
-    on_root(comm, lambda: write_case(directory, case))
-    begin = time.perf_counter()
-    rig, fineness = fine_enough(rig, case)
-    rows, last, failure = _follow(rig, case, told=told and comm.rank == 0)
-    warnings = [*doubts(case), *_warnings(last, fineness)]
-    for warning in warnings:
-        log(f"warning: {warning}")
-    if last is None:
-        raise failure or ConvergenceError("no cycle was done")
-    how = {
-        "stop": "all cycles done" if failure is None else str(failure),
-        "steps_per_half_cycle": len(rig.program.steps) // rig.program.half_cycles,
-        "setup_seconds": setup,
-        "cycles_seconds": time.perf_counter() - begin,
-        "warnings": warnings,
-        "contact_nodes": len(rig.weights),
-        "ranks": comm.size,
-        "versions": versions(),
-    }
-    data = dataset(rig, case, rows)
-    summary = {**summary_of(data, last.worn), **how}
-    on_root(comm, lambda: _write(directory, data, summary, report=case.output.report))
-    if failure is not None:
-        raise ConvergenceError(f"{failure}\nthe results up to cycle {last.number} are in {directory}") from failure
-    return summary, directory
+    try:
+        with Signals(comm, last=last) as signals:
+            run = _Run(rig, case, directory, log, comm, signals, progress, resume=resume)
+            return run.all_cycles(setup), directory
+    except OutputError as error:
+        raise OutputError(error.path, error.reason, on_root(comm, lambda: _way_on(directory))) from error
 
 
-def _write(directory: Path, data: xarray.Dataset, summary: dict[str, Any], *, report: bool) -> None:
-    write_history(directory, data)
-    write_summary(directory, summary)
-    if report:
-        write_stick_report(directory)
+def _way_on(directory: Path) -> str:
+    """Say how to go on after a fault of the disk."""
+    reached = checkpoint.reached(directory)
+    if reached is None:
+        return "there is no checkpoint to go on from: mend the cause, then start anew in a new folder"
+    return f"mend the cause, then go on from the checkpoint of cycle {reached}: --resume"
+
+
+class _Run:
+    """A run in its folder: takes the cycles, keeps history and checkpoints."""
+
+    def __init__(
+        self,
+        rig: Rig,
+        case: Case,
+        directory: Path,
+        log: Log,
+        comm: MPI.Comm,
+        signals: Signals,
+        progress: Progress,
+        *,
+        resume: bool,
+    ) -> None:
+        self.case, self.directory, self.log, self.comm, self.signals = case, directory, log, comm, signals
+        self.cycles = max(case.run.half_cycles // rig.program.half_cycles, 1)
+        self.jumps = case.run.integration == "jump"
+        self.rig, self.resume = rig.watched(self._watch), resume
+        self.last = checkpoint.load(directory, case, rig) if resume else None
+        if self.last is not None and self.done >= self.cycles:
+            message = f"the run has done {self.done} cycles already; expected more half-cycles to go on to"
+            raise CaseError(InputError("run.half_cycles", message))
+        if not resume:
+            on_root(comm, lambda: make_directory(directory))
+        on_root(comm, lambda: write_case(directory, case))
+        self.writer: CycleWriter | None = None  # of rank 0
+        on_root(comm, self._open_history)
+        self.told = _Progress(self.cycles, self.done, comm, progress)
+        self._looked = time.monotonic()
+        self._save_due = self._looked + case.output.checkpoint
+
+    def _open_history(self) -> None:
+        after = None if self.last is None else self.last.number
+        if after is not None and not (self.directory / HISTORY).exists():
+            self.log(f"warning: {HISTORY} is gone from {self.directory}: a new one begins after cycle {after}")
+        self.writer = CycleWriter(self.directory, after, 1 if self.jumps else self.case.output.every)
+
+    @property
+    def done(self) -> int:
+        """Cycles whose wear is in the state to go on from."""
+        return 0 if self.last is None else self.last.number + (not self.jumps)
+
+    def all_cycles(self, setup: float) -> dict[str, Any]:
+        """Compute all cycles and return the summary; collective."""
+        begin, fineness = time.perf_counter(), None
+        failure: ConvergenceError | InterruptedRunError | None = None
+        try:
+            with self.told:
+                self.rig, fineness = fine_enough(self.rig, self.case)
+                for cycle in self._cycles():
+                    self._take(cycle)
+        except (ConvergenceError, InterruptedRunError) as error:
+            failure = error
+        if self.last is None:
+            none = f"no cycle was done: {failure}; {self.directory} can be removed"
+            raise type(failure or ConvergenceError())(none) from failure
+        self._save()
+        warnings = [*doubts(self.case), *_warnings(self.rig, self.last, fineness)]
+        for warning in warnings:
+            self.log(f"warning: {warning}")
+        times = {"setup_seconds": setup, "cycles_seconds": time.perf_counter() - begin}
+        stop = "all cycles done" if failure is None else str(failure)
+        # Who interrupts a run is in a hurry: its figures can be drawn later.
+        report = self.case.output.report and not isinstance(failure, InterruptedRunError)
+        summary = on_root(self.comm, lambda: self._finish({"stop": stop, **times, "warnings": warnings}, report=report))
+        if failure is not None:
+            so_far = f"the results up to cycle {self.last.number} are in {self.directory}, to go on: --resume"
+            raise type(failure)(f"{failure}\n{so_far}") from failure
+        return summary
+
+    def _cycles(self) -> Iterator[Cycle]:
+        if self.jumps:
+            return jump(self.rig, self.cycles, self.case.run.jump_tolerance, self.last)
+        return march(self.rig, self.cycles, self.last)
+
+    def _take(self, cycle: Cycle) -> None:
+        """Keep a cycle; collective, so that every rank knows of an error."""
+        self.last = cycle
+        keep = self.jumps or cycle.number % self.case.output.every == 0
+
+        def row() -> xarray.Dataset:
+            return dataset(self.rig, self.case, [row_of(self.rig, self.case, cycle)])
+
+        on_root(self.comm, lambda: None if self.writer is None else self.writer.add(row, keep=keep))
+        self.told.cycle(self.done, cycle)
+
+    def _watch(self) -> None:
+        """Save where it is due, and tell how far the run is; collective.
+
+        Raises:
+            InterruptedRunError: a signal has come.
+        """
+        if self.comm.size == 1 and not self.signals.received and time.monotonic() < self._looked + LOOK:
+            return
+        self._looked = now = time.monotonic()
+        wishes = [self.signals.received, self.comm.rank == 0 and now > self._save_due]
+        interrupted, save = (self.comm.allreduce(np.array(wishes, dtype=int)) > 0).tolist()
+        if interrupted:
+            self.signals.ending = True
+            raise InterruptedRunError("interrupted")
+        if save and self.last is not None:
+            self._save()
+        self.told.working()
+
+    def _save(self) -> None:
+        """Write history and checkpoint, in this order: the history reaches as far or farther."""
+        on_root(self.comm, lambda: None if self.writer is None else self.writer.flush())
+        if self.last is not None:
+            checkpoint.save(self.directory, self.case, self.rig, self.last)
+        self._save_due = time.monotonic() + self.case.output.checkpoint
+
+    def _finish(self, how: dict[str, Any], *, report: bool) -> dict[str, Any]:
+        """Write what a run ends with, and return the summary; for rank 0."""
+        if self.writer is None or self.last is None:
+            return {}
+        summary = {
+            **how,
+            "steps_per_half_cycle": len(self.rig.program.steps) // self.rig.program.half_cycles,
+            "contact_nodes": len(self.rig.weights),
+            "ranks": self.comm.size,
+            "versions": versions(),
+        }
+        with self.writer.close() as data:
+            summary = {**summary_of(data, self.last.worn), **summary}
+        write_summary(self.directory, summary)
+        if report:
+            write_stick_report(self.directory)
+        return summary
+
+
+class _Progress:
+    """Tells how far a run is: on rank 0, by a bar on a terminal or by lines."""
+
+    def __init__(self, cycles: int, done: int, comm: MPI.Comm, progress: Progress) -> None:
+        self.cycles, self.done = cycles, done
+        self.lines = progress == "lines" and comm.rank == 0
+        hidden = progress != "bar" or comm.rank != 0 or not sys.stderr.isatty()
+        self.bar = tqdm(total=cycles, initial=done, unit=" cycles", disable=hidden)
+        self.told = time.monotonic()
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.bar.close()
+
+    def cycle(self, done: int, cycle: Cycle) -> None:
+        """Tell of a cycle."""
+        state = f"p max {cycle.half_cycles[-1].pressure.max():.4g} MPa"
+        self.done = done
+        self.bar.update(done - self.bar.n)
+        self.bar.set_postfix_str(state)
+        if self.lines:
+            self._line(f"cycle {cycle.number:,} of {self.cycles:,}, {state}")
+
+    def working(self) -> None:
+        """Tell, now and then, that a long cycle or jump is being made."""
+        self.bar.refresh()
+        if self.lines and time.monotonic() > self.told + LINE_SECONDS:
+            self._line(f"{self.done:,} of {self.cycles:,} cycles done, in the next one")
+
+    def _line(self, text: str) -> None:
+        self.told = time.monotonic()
+        print(text, file=sys.stderr, flush=True)
 
 
 def check_touching(rig: Rig) -> None:
@@ -99,41 +265,14 @@ def check_touching(rig: Rig) -> None:
         raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
 
-def _follow(rig: Rig, case: Case, *, told: bool) -> tuple[list[Row], Cycle | None, ConvergenceError | None]:
-    """Return what is kept of the cycles, the last cycle, and what ended them early."""
-    from tqdm import tqdm
-
-    cycles, every = max(case.run.half_cycles // rig.program.half_cycles, 1), case.output.every
-    rows: list[Row] = []
-    last: Cycle | None = None
-    with tqdm(total=cycles, unit="cycle", disable=None if told and sys.stderr.isatty() else True) as bar:
-        try:
-            for cycle in _cycles(rig, case, cycles):
-                bar.update(cycle.number - bar.n)
-                if case.run.integration == "jump" or cycle.number % every == 0 or cycle.number == cycles - 1:
-                    rows.append(row_of(rig, case, cycle))
-                last = cycle
-        except ConvergenceError as error:
-            return rows, last, error
-    return rows, last, None
-
-
-def _cycles(rig: Rig, case: Case, cycles: int) -> Iterator[Cycle]:
-    if case.run.integration == "jump":
-        return jump(rig, cycles, case.run.jump_tolerance)
-    return march(rig, cycles)
-
-
-def _warnings(last: Cycle | None, fineness: Fineness) -> list[str]:
+def _warnings(rig: Rig, last: Cycle, fineness: Fineness | None) -> list[str]:
     """Return what the user should know of the run."""
     found = []
-    if not fineness.enough:
+    if fineness is not None and not fineness.enough:
         found.append(
             f"the time steps are coarse: with {fineness.steps} in a half-cycle force or friction's work of the first "
             f"cycle still change by {100 * fineness.change:.2g} %; expected more stick.steps"
         )
-    if last is None:
-        return found
     records = last.records
     if not records.unique.all():
         found.append(
@@ -144,7 +283,6 @@ def _warnings(last: Cycle | None, fineness: Fineness) -> list[str]:
     if slipping.any():
         share = float(np.mean(slipping))
         found.append(f"gross sliding: in {100 * share:.0f} % of the last cycle's time steps nothing sticks")
-    edge = (records.pressure[:, [0, -1]] > 0).any()
-    if edge:
+    if reaches_border(rig, records.pressure):
         found.append("the contact reaches the end of its meshed surface; expected a wider one")
     return found

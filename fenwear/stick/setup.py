@@ -9,9 +9,12 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import build_bodies, make_sliding
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
+from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface
 from fenwear.stick.program import make_program
 from fenwear.stick.wear import local_wear
@@ -49,18 +52,28 @@ def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None =
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
     bodies, sliding = build_bodies(case, comm), make_sliding(case)
-    interface = StickInterface(bodies, sliding, case, moves=_moves(case, bodies.punch.surface.x[:, 0]))
+    interface = StickInterface(bodies, sliding, case, moves=_moves(case, bodies.punch.surface))
     middle = interface.middle
     wear = local_wear(sliding.wear, sliding.friction, middle.pair, middle.rigid.mean_pressure)
     mu = case.contact.friction
     if not isinstance(mu, float):
         raise CaseError(InputError("contact.friction", "expected a constant with contact.law = 'coulomb'"))
-    return Rig(interface, make_program(case, steps), wear, np.full(len(middle.pair.weights), mu))
+    rig = Rig(interface, make_program(case, steps), wear, np.full(len(middle.pair.weights), mu))
+    return heated(rig, case)
 
 
 def with_steps(rig: Rig, case: Case, steps: int) -> Rig:
     """Return the same with other time steps."""
-    return Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction)
+    return heated(Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction, rig.watch), case)
+
+
+def heated(rig: Rig, case: Case) -> Rig:
+    """Return the same with the heat of the case for its time steps; collective."""
+    if case.heat is None:
+        return rig
+    steps = len(rig.program.steps) // rig.program.half_cycles
+    heat = stick_heat(rig.interface, case, steps)
+    return Rig(rig.interface, rig.program, rig.wear, rig.friction, rig.watch, heat)
 
 
 def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
@@ -90,7 +103,23 @@ def _measures(rig: Rig) -> Array:
     return np.array([measures[0], max(measures[1], scale)])
 
 
-def _moves(case: Case, x: Array) -> bool:
+def reaches_border(rig: Rig, pressure: Array) -> bool:
+    """Return whether contact reaches where its meshed surface ends, but for planes of symmetry; collective.
+
+    Args:
+        rig: The bodies.
+        pressure: Of some time steps (k, n), MPa.
+    """
+    punch = rig.interface.bodies.punch
+    held = np.zeros(len(punch.load))
+    held[punch.supported] = 1.0
+    at_trace = punch.trace.pick(held[:, None])[:, :, 0].any(axis=1)
+    border = border_nodes(punch.surface)
+    free = border[~np.asarray(at_trace)[punch.surface.nodes[border]]]
+    return bool((pressure[:, free] > 0).any())
+
+
+def _moves(case: Case, surface: ContactSurface) -> bool:
     """Return whether the strip's surface passes under the punch: by default where it wears, and moves far enough."""
     motion = case.motion
     positions = getattr(motion, "positions", None)
@@ -100,4 +129,11 @@ def _moves(case: Case, x: Array) -> bool:
         return True
     reach = make_program(case, 2)
     far = max(abs(step.displacement or 0.0) for step in reach.steps)
-    return case.wear.strip is not None and far > SPACINGS * float(np.median(np.diff(np.unique(x.round(12)))))
+    return case.wear.strip is not None and far > SPACINGS * spacing(surface)
+
+
+def spacing(surface: ContactSurface) -> float:
+    """Return how far contact nodes are apart, mm: the median."""
+    if surface.dim == 3:
+        return float(np.sqrt(np.median(surface.weights)))
+    return float(np.median(np.diff(np.unique(surface.x[:, 0].round(12)))))

@@ -59,6 +59,26 @@ def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..
 
 
 @pytest.mark.mpi
+def test_a_pin_gets_shorter(assembled: Callable[..., Tribosystem]) -> None:
+    """In space the nodes of upright sides slide along them: an even depth shortens all elements evenly.
+
+    The volume falls by the integral of any depth; the pin's top and its circles stay.
+    """
+    system = assembled("pin-on-disc", "geometry.degree=1", "geometry.order=1")
+    x, old = system.pair.punch.x, system.bodies.punch.body
+    for depth in (np.full(len(x), 3.0), 1.0 + 0.1 * (x[:, 0] - 15.0) + 0.05 * x[:, 1] ** 2):
+        moved = assemble(system.case, system.comm, Worn(depth, system.unworn().strip))
+        assert moved.bodies.moved is not None
+        np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
+        new = moved.bodies.punch.body
+        assert area(old) - area(new) == pytest.approx(system.pair.punch.weights @ depth, rel=1e-12)
+        place, there = old.mesh.geometry.x, new.mesh.geometry.x
+        np.testing.assert_array_equal(there[:, :2], place[:, :2])
+        if np.ptp(depth) == 0:
+            np.testing.assert_allclose(there[:, 2], 3.0 + 0.75 * place[:, 2], atol=1e-12)
+
+
+@pytest.mark.mpi
 def test_used_up_elements_are_refused(assembled: Callable[..., Tribosystem]) -> None:
     """A punch that is worn through is an error that says which body and how deep, not a wrong number."""
     system = assembled("example1", *COARSE)

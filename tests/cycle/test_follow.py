@@ -38,6 +38,24 @@ def test_moved_meshes_agree_with_the_offset(assembled: Callable[..., Tribosystem
     np.testing.assert_allclose(other.pressure[-1], one.pressure[-1], atol=0.01 * one.pressure[-1].max())
 
 
+def test_meshes_of_solids_agree_with_the_offset(assembled: Callable[..., Tribosystem]) -> None:
+    """A ball and its flat that both wear: k F s, depths and pressures are those of the gap's offset."""
+    sizes = ("geometry.parameters.across=4", "motion.positions=3", "contact.friction=0")
+    offset, moved = (
+        run(assembled("ball-on-flat", *sizes, f"geometry.follow_wear={limit}"), 100) for limit in ("never", 0.004)
+    )
+    last = moved[-1].system
+    assert last is not moved[0].system
+    one, other = offset[-1], moved[-1]
+    np.testing.assert_allclose(other.wear_strip[-1], one.wear_strip[-1], atol=1e-3 * one.wear_strip[-1].max())
+    np.testing.assert_allclose(other.wear[-1], one.wear[-1], atol=1e-3 * one.wear[-1].max())
+    np.testing.assert_allclose(other.pressure[-1], one.pressure[-1], atol=3e-3 * one.pressure[-1].max())
+    first = moved[0].system.pair
+    slid = 20.0 * 0.2 * 100  # N mm
+    assert first.punch.weights @ other.wear[-1] == pytest.approx(1e-8 * slid, rel=1e-3)  # along the curved normal
+    assert first.strip.weights @ other.wear_strip[-1] == pytest.approx(2e-8 * slid, rel=1e-5)
+
+
 @pytest.mark.mpi
 def test_temperature_keeps_its_place(assembled: Callable[..., Tribosystem]) -> None:
     """A linear temperature on the moved mesh is the same function of the place."""

@@ -74,6 +74,32 @@ def test_lumped_disc(edited: Edited) -> None:
     assert block.heat.temperature_strip[-1].min() > found
 
 
+def test_lumped_turning_disc(edited: Edited) -> None:
+    """The same in space, beneath a pad on a disc that turns: P = mu omega times the integral of p r, a turn a step."""
+    capacity, loss, count = 4e6, 4e3, 100
+
+    def disc(tables: dict[str, Any]) -> None:
+        on_track(track={"heat_capacity": capacity, "loss": loss})(tables)
+        tables["motion"] = {"kind": "rotation", "angular_speed": 10.0, "duration": 4.0}
+        tables["strip"]["supports"] = [{"on": "strip_far", "fix": ["x", "y", "z"]}]
+
+    sizes = [f"geometry.parameters.{name}" for name in ("across=2", "along=3", "pad_layers=1", "disc_layers=2")]
+    system = assemble(edited("brake-pad", disc, "geometry.degree=1", "geometry.order=1", *sizes))
+    (block,) = march(system, count, block=count)
+    power = block.heat.terms[:, 0] / 4.0
+    radius = np.hypot(*system.pair.punch.x[:, :2].T)
+    torque = 0.35 * system.pair.weights @ (block.pressure[-1] * radius)
+    assert power[-1] == pytest.approx(10.0 * torque, rel=1e-9)
+    whole = sum(side.capacity for side in system.exchange.sides)
+    lumped = power[-1] / loss * (1 - np.exp(-loss * 4.0 * np.arange(1, count + 1) / whole))
+    np.testing.assert_allclose(block.heat.temperature_bulk, lumped, rtol=0, atol=0.02 * lumped[-1])
+    assert block.heat.balance_error.max() < 1e-8
+    assert np.abs(block.heat.terms[:, 5]).max() < 1e-9 * block.heat.terms[0, 0]
+    *_, end = jump(system, 20000, tolerance=1e-2)
+    torque = 0.35 * system.pair.weights @ (steady(system).pressure[0] * radius)
+    assert end.heat.temperature_bulk[-1] == pytest.approx(10.0 * torque / loss, rel=1e-6)
+
+
 def test_steady_bulk(edited: Edited) -> None:
     """In the end G T = mu F v exactly; jumps and the steady state come there."""
     system = assemble(edited("example1-heat", on_track(), *SMALL), heat="reduced")

@@ -14,21 +14,26 @@ from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import Isotropic, Kind, lame
 from fenwear.bodies.mesh import own_mesh
-from fenwear.case import Body, Heat, Support
+from fenwear.case import Body, Heat, Support, Track
 from fenwear.heat.conduction import HeatBody, Surroundings
+from fenwear.heat.field import ReducedField
 from fenwear.heat.material import ConductionLaw
+from fenwear.heat.reduction import reduced_basis
+from fenwear.heat.track import TrackField
 from fenwear.sliding.field import SlidingField
 
 K, RHO_C = 3.0, 2.0
 TURNING = SlidingField(turn=(0.0, 0.0, 1.0))
 
 
-def conducting(mesh: Any, kind: Kind, groups: dict[str, Callable[[Any], Any]], *held: str) -> HeatBody:
+def conducting(
+    mesh: Any, kind: Kind, groups: dict[str, Callable[[Any], Any]], *held: str, convection: float = 0.0
+) -> HeatBody:
     """Return conduction in a strip whose bottom holds it in place."""
     support = Support(on="bottom", fix=("x", "y", "z") if mesh.geometry.dim == 3 else ("x", "z"))
     description = Body(supports=(support,), temperatures=tuple({"on": name} for name in held))
     elastic = ElasticBody(own_mesh("strip", mesh, groups), description, Isotropic(kind, lame(1.0, 0.3, kind)), degree=2)
-    return HeatBody(elastic, description, ConductionLaw(K, RHO_C), Heat())
+    return HeatBody(elastic, description, ConductionLaw(K, RHO_C), Heat(convection=convection))
 
 
 def groups(dim: int) -> dict[str, Callable[[Any], Any]]:
@@ -95,20 +100,21 @@ def test_a_ring_conducts_through_its_circumference() -> None:
     assert np.abs(body.flow(TURNING).carried).max() == 0.0
 
 
-def ring(count: int) -> Any:
-    """Return a ring 1 < r < 2, 0 < z < 1 of hexahedra, a quarter of it `count` cells."""
+def ring(count: int, quarters: int = 4) -> Any:
+    """Return a ring 1 < r < 2, 0 < z < 1 of hexahedra, a quarter of it `count` cells, or a part from -90 degrees on."""
     import basix.ufl
     from dolfinx.mesh import create_mesh
 
-    around, out, up = 4 * count, 4, 2
-    angle = 2 * np.pi * np.arange(around) / around
+    around, out, up = quarters * count, 4, 2
+    lines = around if quarters == 4 else around + 1
+    angle = np.pi / 2 * (np.arange(lines) / count - 1)
     radius, height = np.linspace(1, 2, out + 1), np.linspace(0, 1, up + 1)
     points = np.array(
         [(r * np.cos(a), r * np.sin(a), z) for z in height for r in radius for a in angle], dtype=np.float64
     )
 
     def number(i: int, j: int, k: int) -> int:
-        return (k * (out + 1) + j) * around + i % around
+        return (k * (out + 1) + j) * lines + i % lines
 
     cells = np.array(
         [
@@ -152,3 +158,39 @@ def test_a_turning_disc() -> None:
     warm = body.contact(theta)
     angles = np.angle((warm * (x + 1j * y)).sum())
     assert 0.2 < angles < 1.2  # turned on, towards +y, by half of 10 rad/s times 0.1 s
+
+
+def test_half_a_disc_and_the_rest_of_its_track() -> None:
+    """A spot heats a whole turning ring, or half of it whose other half is a bulk: the same, at a low Biot number.
+
+    A turn lasts as long as heat takes through the section. What both have stored is the same, to rounding.
+    """
+    whole, half = (conducting(ring(6, quarters), "solid", groups(3)) for quarters in (4, 2))
+    speed, duration, count = 10.0, 0.02, 200
+    comm = MPI.COMM_WORLD
+    loads = [body.load(np.where(np.abs(body.surface.x[:, 1]) < 0.6 * body.surface.x[:, 0], 1.0, 0.0))
+             for body in (whole, half)]  # fmt: skip
+    turning = whole.step(speed, duration, Surroundings(sliding=TURNING))
+    heating = turning.respond(loads[0][:, None])[:, 0]
+    passing = Surroundings(renewed=True, sliding=TURNING)
+    step = half.step(speed, duration, passing)
+    inflow = np.column_stack([loads[1], step.entering])
+    basis = reduced_basis(half, inflow, [speed], duration, 1e-7, passing)
+    capacities = [comm.allreduce(body.storage.sum()) for body in (whole, half)]
+    rest = Track(heat_capacity=capacities[0] - capacities[1])
+    track = TrackField(ReducedField([step], inflow, basis), [step], [1.0], duration, rest, 1.0)
+    theta, coordinates = whole.initial(), track.basis.coordinates(half.initial())
+    for _ in range(count):
+        theta = turning.advance(theta) + heating
+        coordinates = track.advance(0, coordinates) + track.responses[0][:, 0]
+    on_half = track.basis.temperature(coordinates)
+    stored = comm.allreduce(whole.storage @ theta)
+    of_half = comm.allreduce(half.storage @ on_half)
+    assert of_half + rest.heat_capacity * coordinates[-1] == pytest.approx(stored, rel=1e-9)
+    mean = stored / capacities[0]
+    found, exact = half.contact(on_half), whole.contact(theta)
+    same = np.linalg.norm(whole.surface.x[None] - half.surface.x[:, None], axis=2).argmin(axis=1)
+    spot = exact.max() - mean
+    assert spot < 0.35 * mean
+    assert found.max() - mean == pytest.approx(spot, rel=0.02)
+    np.testing.assert_allclose(found, exact[same], rtol=0, atol=0.1 * spot)

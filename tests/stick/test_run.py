@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import json
+import os
+import shutil
+import signal
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray
 
 from fenwear import CaseError, load_case
+from fenwear.errors import InterruptedRunError
 from fenwear.report.page import write_report
 from fenwear.run import run_case
+from fenwear.stick.results import Row, row_of
 
 SMALL = ("geometry.parameters.elements_along_contact=20", "stick.steps=10", "run.jump_tolerance=0.05")
 
@@ -55,8 +62,8 @@ def test_report_is_drawn_and_drawn_again(ran: tuple[dict, Path]) -> None:
     assert "energy ratio" in page
 
 
-def test_gross_sliding_and_what_is_missing_are_told(tmp_path: Path) -> None:
-    """A long stroke is told as gross sliding; there is nothing to resume."""
+def test_gross_sliding_is_told(tmp_path: Path) -> None:
+    """A long stroke is told as gross sliding; a run that has ended goes on with more half-cycles only."""
     case = load_case("fretting-partial-slip", [*SMALL, "motion.amplitude='20 um'", "motion.positions=1",
                                                "run.half_cycles=2", "run.integration='explicit'"])  # fmt: skip
     told: list[str] = []
@@ -64,5 +71,61 @@ def test_gross_sliding_and_what_is_missing_are_told(tmp_path: Path) -> None:
     assert any("gross sliding" in text for text in summary["warnings"])
     assert any("gross sliding" in text for text in told)
     assert summary["energy_ratio"] > 0.5
-    with pytest.raises(CaseError, match="--resume"):
+    with pytest.raises(CaseError, match=r"run\.half_cycles: the run has done 1 cycles already"):
         run_case(case, "fretting", tmp_path / "out", told.append, resume=True)
+    other = load_case("fretting-partial-slip", [*SMALL, "run.half_cycles=4"])
+    with pytest.raises(CaseError, match=r"motion\.amplitude: the checkpoint has '0.02 mm'"):
+        run_case(other, "fretting", tmp_path / "out", told.append, resume=True)
+
+
+def run(folder: Path, settings: list[str], *, resume: bool = False) -> xarray.Dataset:
+    case = load_case("fretting-partial-slip", [*SMALL, "output.report=false", *settings])
+    run_case(case, "fretting", folder, lambda _: None, progress="none", resume=resume)
+    return xarray.load_dataset(folder / "history.nc", engine="h5netcdf")
+
+
+def interrupted_after(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
+    """Send SIGTERM to this process when so many cycles have been recorded."""
+    made = itertools.count(1)
+
+    def counted(*args: Any) -> Row:
+        if next(made) == rows:
+            os.kill(os.getpid(), signal.SIGTERM)
+        return row_of(*args)
+
+    monkeypatch.setattr("fenwear.stick.run.row_of", counted)
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        ["run.integration='explicit'", "run.half_cycles=14", "output.every=2", "wear.punch.coefficient='1e-6 1/MPa'"],
+        ["run.half_cycles=800", "stick.force='60 N'"],
+    ],
+)
+def test_interrupted_and_resumed_equals_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: list[str]) -> None:
+    """After SIGTERM nothing is lost, and the end is that of a run in one piece, to the last bit."""
+    whole = run(tmp_path / "whole", how)
+    with monkeypatch.context() as patched:
+        interrupted_after(patched, 3)
+        with pytest.raises(InterruptedRunError, match="to go on: --resume"):
+            run(tmp_path / "parts", how)
+    so_far = xarray.load_dataset(tmp_path / "parts" / "history.nc", engine="h5netcdf")
+    assert 3 <= len(so_far.cycle) < len(whole.cycle)
+    stop = json.loads((tmp_path / "parts" / "summary.json").read_text("utf-8"))["stop"]
+    assert stop == "interrupted"
+    resumed = run(tmp_path / "parts", how, resume=True)
+    xarray.testing.assert_identical(resumed, whole)
+
+
+def test_a_kill_between_checkpoints_costs_what_came_after(tmp_path: Path) -> None:
+    """What the history has beyond the checkpoint is computed again; a checkpoint cut short is told."""
+    how = ["run.integration='explicit'", "wear.punch.coefficient='1e-6 1/MPa'"]
+    run(tmp_path / "one", [*how, "run.half_cycles=6"])
+    whole = run(tmp_path / "two", [*how, "run.half_cycles=10"])
+    shutil.copyfile(tmp_path / "two" / "history.nc", tmp_path / "one" / "history.nc")
+    xarray.testing.assert_identical(run(tmp_path / "one", [*how, "run.half_cycles=10"], resume=True), whole)
+    with (tmp_path / "one" / "checkpoint" / "state.npz").open("r+b") as file:
+        file.truncate(5000)
+    with pytest.raises(CaseError, match=r"--resume: the checkpoint in .* is damaged"):
+        run(tmp_path / "one", [*how, "run.half_cycles=20"], resume=True)

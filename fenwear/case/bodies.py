@@ -1,0 +1,164 @@
+"""The tables of the two bodies: geometry, model, supports, loads and held temperatures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from fenwear.case.quantities import (
+    Axis,
+    Forces,
+    Kind,
+    Length,
+    Number,
+    Part,
+    Point,
+    Stresses,
+    Temperature,
+    Unit,
+)
+from fenwear.case.units import convert, shown
+
+
+def _parameter(value: object) -> float:
+    """Convert a geometry parameter: a plain number, or a length with its unit."""
+    try:
+        return convert(value, "mm")
+    except ValueError:
+        raise ValueError(f"expected a number or a length such as '60 mm', got {shown(value)}") from None
+
+
+class Geometry(Part):
+    """Where the meshes come from: a gmsh .geo with its parameters, or a .msh."""
+
+    file: str = Field(
+        default="punch_on_strip.geo", description=".geo or .msh beside the case file, or one of the ready geometries"
+    )
+    parameters: dict[str, Annotated[float, Unit("mm"), BeforeValidator(_parameter)]] = Field(
+        default={}, description="values of parameters of the .geo, by their names"
+    )
+    degree: Annotated[int, Field(ge=1, le=8, strict=True)] = Field(default=4, description="of the elements, 1 to 8")
+    order: Annotated[int, Field(ge=1, le=2, strict=True)] = Field(
+        default=1, description="of the elements' shape made from a .geo: 2 follows curved boundaries"
+    )
+    follow_wear: Annotated[Number, Field(gt=0)] | None = Field(
+        default=0.5,
+        description="worn depth over the elements' height above which the mesh follows the worn surface; or never",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _follow_or_not(cls, data: object) -> object:
+        if isinstance(data, Mapping) and data.get("follow_wear") == "never":
+            return {**data, "follow_wear": None}
+        return data
+
+
+class Model(Part):
+    """Plane bodies in (x, z) with their thickness; rings in (x, z), x the radius; or solids in (x, y, z)."""
+
+    kind: Literal["plane", "axisymmetric", "solid"] = Field(
+        default="plane", description="plane bodies, rings, or solids"
+    )
+    plane: Literal["stress", "strain"] = Field(default="stress", description="plane stress or plane strain")
+    thickness: Annotated[Length, Field(gt=0)] = Field(default=1.0, description="of plane bodies, out of their plane")
+
+    @model_validator(mode="after")
+    def _plane_alone(self) -> Self:
+        if self.kind != "plane":
+            for key, default in (("plane", "stress"), ("thickness", 1.0)):
+                if getattr(self, key) != default:
+                    raise ValueError(f"{key}: belongs to plane models, not with kind = '{self.kind}'")
+        return self
+
+    @property
+    def law(self) -> Kind:
+        """Plane stress, plane strain, axisymmetric or solid."""
+        return self.plane if self.kind == "plane" else self.kind
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes of vectors."""
+        return ("x", "y", "z") if self.kind == "solid" else ("x", "z")
+
+
+class Support(Part):
+    """Displacement components held at zero, on a named group or at a point."""
+
+    on: str | None = Field(default=None, description="group of the geometry")
+    at: Point | None = Field(default=None, description="or a point [x, z], in a solid [x, y, z], at a mesh node")
+    fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero")
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        if (self.on is None) == (self.at is None):
+            raise ValueError("give either on = (a group) or at = (a point)")
+        return self
+
+
+class Load(Part):
+    """A load spread evenly over a named group: its resultant, or a traction; (x, z), in a solid (x, y, z)."""
+
+    on: str = Field(description="group of the geometry")
+    force: Forces | None = Field(default=None, description="resultant [x, z], in a solid [x, y, z], spread evenly")
+    traction: Stresses | None = Field(default=None, description="or the traction itself")
+    over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None,
+        description="[fraction of the cycle, factor] pairs from 0 to 1: the load varies linearly between them",
+    )
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> Self:
+        if (self.force is None) == (self.traction is None):
+            raise ValueError("give either force or traction")
+        if self.over_cycle is not None:
+            fractions = [fraction for fraction, _ in self.over_cycle]
+            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
+                raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
+        return self
+
+    def times(self, factor: float) -> Load:
+        """Return the load times a factor at every time."""
+        return self._scaled(factor).model_copy(update={"over_cycle": self.over_cycle})
+
+    def at(self, fraction: float) -> Load:
+        """Return the load at this fraction of the cycle."""
+        if self.over_cycle is None:
+            return self
+        return self._scaled(float(np.interp(fraction, *np.array(self.over_cycle).T)))
+
+    def mean(self) -> Load:
+        """Return the mean of the load over the cycle."""
+        if self.over_cycle is None:
+            return self
+        fractions, factors = np.array(self.over_cycle).T
+        return self._scaled(float(np.diff(fractions) @ (factors[1:] + factors[:-1]) / 2))
+
+    def _scaled(self, factor: float) -> Load:
+        force, traction = (
+            None if vector is None else tuple(factor * component for component in vector)
+            for vector in (self.force, self.traction)
+        )
+        return Load(on=self.on, force=force, traction=traction)
+
+
+class Prescribed(Part):
+    """A temperature held on a named group of the boundary."""
+
+    on: str = Field(description="group of the geometry")
+    temperature: Temperature = Field(default=0.0, description="theta held there")
+
+
+class Body(Part):
+    """One body: the material of each of its regions, its supports, loads and held temperatures."""
+
+    regions: dict[str, str] = Field(default={}, description="name of the material of each region")
+    supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
+    loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
+    temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
+    pivot: Point | None = Field(
+        default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
+    )

@@ -1,0 +1,112 @@
+"""The tables of the course of a run: how far it goes, the test program, and what is kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from fenwear.case.quantities import AngularFrequency, Force, Length, Number, Part, Speed, Temperature, Time
+
+
+class Run(Part):
+    """How far a run goes and how it integrates the wear."""
+
+    half_cycles: Annotated[int, Field(ge=1, strict=True)] = Field(description="how many at most")
+    integration: Literal["explicit", "implicit", "jump"] = Field(
+        default="explicit", description="of the wear; jump: over many cycles at once"
+    )
+    jump_tolerance: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=3e-3,
+        description="error of one cycle jump: of its depths, and of where the force and the temperatures are",
+    )
+    periodic_within: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None, description="stop when pressure repeats within this fraction of its scale"
+    )
+
+
+@dataclass(frozen=True)
+class OneOrTwo:
+    """One value, or two that are the ends of a ramp; in the JSON schema a value alone may stand for the list."""
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a value or a list."""
+        several = handler(core)
+        return {"anyOf": [several, several.get("items", {})]}
+
+
+def _ramp(quantity: Any) -> Any:
+    """Return the type of what is held, or goes from one value to another, in a step of a program."""
+    listed = BeforeValidator(lambda value: value if isinstance(value, list | tuple) else (value,))
+    return Annotated[tuple[quantity, ...], Field(min_length=1, max_length=2), OneOrTwo(), listed] | None
+
+
+class ProgramStep(Part):
+    """A step of a test program: how long it takes, and what acts in it; [from, to] is a ramp."""
+
+    cycles: Annotated[int, Field(ge=1, strict=True)] | None = Field(default=None, description="how long it takes")
+    distance: Annotated[Length, Field(gt=0)] | None = Field(default=None, description="or: of sliding")
+    time: Annotated[Time, Field(gt=0)] | None = Field(default=None, description="or: how long")
+    load: _ramp(Annotated[Force, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="normal force: all loads of the case change in its proportion"
+    )
+    load_factor: _ramp(Annotated[Number, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="or: all loads of the case times this"
+    )
+    speed: _ramp(Annotated[Speed, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of one-way sliding"
+    )
+    angular_speed: _ramp(Annotated[AngularFrequency, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of a rotation"
+    )
+    amplitude: _ramp(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of reciprocating sliding"
+    )
+    angular_frequency: _ramp(Annotated[AngularFrequency, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="of reciprocating sliding or an oscillation"
+    )
+    period: _ramp(Annotated[Time, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        default=None, description="or: of a whole cycle"
+    )
+    ambient: _ramp(Temperature) = Field(  # type: ignore[valid-type]
+        default=None, description="heat.ambient"
+    )
+
+    @model_validator(mode="after")
+    def _one_length(self) -> Self:
+        if sum(length is not None for length in (self.cycles, self.distance, self.time)) != 1:
+            raise ValueError("give one of cycles, distance and time: how long the step takes")
+        for one, other in (("load", "load_factor"), ("angular_frequency", "period")):
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise ValueError(f"{one}: give either {one} or {other}")
+        for key in ("speed", "angular_speed"):
+            if getattr(self, key) is not None and not any(getattr(self, key)):
+                raise ValueError(f"{key}: expected more than zero: nothing slides in this step")
+        return self
+
+
+class Program(Part):
+    """A test program: steps one after the other. What a step does not name stays as it was."""
+
+    steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="in their order")
+    levels: Annotated[int, Field(ge=1, le=10000, strict=True)] = Field(
+        default=20,
+        description="that a ramp of motion or ambient temperature is cut into; loads change continuously",
+    )
+
+
+class Output(Part):
+    """What a run keeps."""
+
+    every: Annotated[int, Field(ge=1, strict=True)] = Field(
+        default=1, description="keep every k-th cycle in history.nc, and always the last one"
+    )
+    fields_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] | None = Field(
+        default=None, description="half-cycles whose fields are written; by default the last one, [] for none"
+    )
+    checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
+    report: bool = Field(default=True, description="draw figures and report.html when the run has ended")
+    figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = Field(
+        default=(), description="half-cycles that the figures show; by default six spread over the run"
+    )

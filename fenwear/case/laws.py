@@ -1,0 +1,295 @@
+"""The tables of friction and wear: coefficients, constant or dependent on the state, and the laws they belong to."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from fenwear.arrays import Array
+from fenwear.case.dependence import (
+    UNITS,
+    VARIABLES,
+    check_law,
+    evaluate,
+    evaluate_law,
+    parse_expression,
+    variables_of,
+    variables_of_law,
+)
+from fenwear.case.quantities import Force, Number, Part, Stress, Unit, quantity
+from fenwear.case.units import convert, quantity_text
+from fenwear.errors import CaseError, InputError
+
+
+class Dependence(Part):
+    """A coefficient that depends on the state: an expression, a table with straight lines, values of regions, a law."""
+
+    expression: str | None = Field(
+        default=None,
+        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn) and s (mm, slid)",
+    )
+    table: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None, description="[argument, value] pairs; beyond its ends the end values hold"
+    )
+    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s"] = Field(default="T", description="argument of the table")
+    regions: dict[str, Annotated[Number, Field(ge=0)]] | None = Field(
+        default=None, description="value of each material region of the body, of the punch for friction"
+    )
+    law: str | None = Field(default=None, description="name of a law registered in Python")
+    unit: str = Field(default="", description="unit of the values")
+
+    @model_validator(mode="after")
+    def _one_form(self) -> Self:
+        if sum(form is not None for form in (self.expression, self.table, self.regions, self.law)) != 1:
+            raise ValueError("give one of expression, table, regions and law")
+        if self.law is not None:
+            try:
+                check_law(self.law)
+            except ValueError as error:
+                raise ValueError(f"law: {error}") from None
+        if self.expression is not None:
+            try:
+                parse_expression(self.expression)
+            except ValueError as error:
+                raise ValueError(f"expression: {error}") from None
+        if self.table is not None:
+            arguments = [argument for argument, _ in self.table]
+            if len(arguments) < 2 or np.any(np.diff(arguments) <= 0):
+                raise ValueError("table: expected at least two pairs [argument, value] with rising arguments")
+        return self
+
+    def depends_on(self, name: str) -> bool:
+        """Return whether a variable such as T, p or depth is in it."""
+        if self.expression is not None:
+            return name in variables_of(self.expression)
+        if self.law is not None:
+            return name in variables_of_law(self.law)
+        return self.table is not None and name == self.of
+
+    @property
+    def varies(self) -> bool:
+        """Whether it changes with more than the place."""
+        return any(self.depends_on(name) for name in ("T", "p", "v", "depth", "s"))
+
+    @property
+    def passes(self) -> bool:
+        """Whether it changes as long as a run goes on: with the worn depth, or with what has been slid."""
+        return self.depends_on("depth") or self.depends_on("s")
+
+    def scale(self, unit: str) -> float:
+        """Return what turns its values into a unit.
+
+        Raises:
+            ValueError: its own unit is of another kind.
+        """
+        return convert(f"1 {self.unit}", unit) if self.unit else 1.0
+
+    def values(
+        self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str, least: float = 0.0
+    ) -> Array:
+        """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
+
+        Raises:
+            CaseError: it is less than `least` or not finite somewhere; `key` is the case's key.
+        """
+        if self.table is not None:
+            values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
+        elif self.regions is not None:
+            values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
+        elif self.law is not None:
+            try:
+                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES if name in state}, shape)
+            except ValueError as error:
+                raise CaseError(InputError(key, str(error))) from error
+        else:
+            values = evaluate(parse_expression(self.expression or ""), state, shape)
+        wrong = ~(np.isfinite(values) & (values >= least))
+        if wrong.any():
+            node = int(np.flatnonzero(wrong)[0])
+            named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
+            at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
+            wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
+            raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
+        return values * factor
+
+
+def _form(value: object) -> str:
+    return "dependence" if isinstance(value, (Mapping, Dependence)) else "number"
+
+
+def constant_or_dependence(constant: Any) -> Any:
+    """Return the type of a coefficient that is a constant of this type, or depends on the state."""
+    return Annotated[
+        Annotated[constant, Tag("number")] | Annotated[Dependence, Tag("dependence")],
+        Discriminator(_form),
+    ]
+
+
+class Contact(Part):
+    """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
+
+    law: Literal["gross-sliding", "coulomb"] = Field(
+        default="gross-sliding",
+        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
+        "as in fretting",
+    )
+    friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=0.0, description="mu"
+    )
+    transverse_friction: Number = Field(
+        default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
+    )
+    solver: Literal["condensed", "full"] = Field(
+        default="condensed", description="full: all displacements as unknowns, slow, to compare with"
+    )
+
+    @model_validator(mode="after")
+    def _pure_number(self) -> Self:
+        if isinstance(self.friction, Dependence) and self.friction.unit:
+            raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
+        return self
+
+
+class Stick(Part):
+    """How the rig drives a contact with stick, and its time steps; with contact.law = "coulomb"."""
+
+    force: Annotated[Force, Field(gt=0)] | None = Field(
+        default=None,
+        description="largest tangential force on the strip, which then follows the course of the motion in place of "
+        "its displacement",
+    )
+    bulk_stress: Stress = Field(
+        default=0.0, description="largest bulk stress along x in the strip, as in fretting fatigue, with the motion"
+    )
+    bulk_over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
+        default=None,
+        description="[fraction of the cycle, factor] pairs from 0 to 1 of the bulk stress; by default it follows the "
+        "motion",
+    )
+    steps: Annotated[int, Field(ge=2, le=1000, strict=True)] = Field(
+        default=20, description="time steps of a half-cycle, at least"
+    )
+    step_tolerance: Annotated[Number, Field(gt=0)] = Field(
+        default=0.02,
+        description="change of force and friction's work of the first cycle by which the steps are fine enough; they "
+        "are doubled until then",
+    )
+    load_steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(
+        default=5, description="in which the loads rise at the start"
+    )
+
+    @model_validator(mode="after")
+    def _bulk_table(self) -> Self:
+        if self.bulk_over_cycle is not None:
+            fractions = [fraction for fraction, _ in self.bulk_over_cycle]
+            if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
+                raise ValueError("bulk_over_cycle: expected pairs [fraction, factor] with fractions rising from 0 to 1")
+        return self
+
+
+class WearLaw(Part):
+    """Wear rate normal to the surface = beta~ p^b v^a, equation (1).
+
+    beta~ is given as `coefficient`; or as `beta`, beta~ = beta mu^b; or, for a = b = 1, by Archard's
+    dimensionless coefficient K and the `hardness` H, beta~ = K / H, or by the volume worn for each
+    energy of friction, `energy`, beta~ = energy mu.
+    """
+
+    coefficient: constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
+        default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
+    )
+    beta: Annotated[float | None, Unit("")] = Field(default=None, description="in the same unit; beta~ = beta mu^b")
+    archard: Annotated[Number, Field(ge=0)] | None = Field(default=None, description="K; beta~ = K / hardness")
+    hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H, with archard")
+    energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
+        default=None, description="volume worn over the energy of friction; beta~ = energy mu"
+    )
+    pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
+    pressure_threshold: Annotated[Stress, Field(ge=0)] = Field(
+        default=0.0, description="p_0: nothing wears below it, and above it (p - p_0)^b does"
+    )
+    pressure_cap: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None, description="such as the hardness: more pressure than it wears no more"
+    )
+    speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
+
+    @staticmethod
+    def coefficient_unit(pressure_exponent: float, speed_exponent: float) -> str:
+        """Return the unit of beta~ for the exponents b and a."""
+        unit = f"MPa^-{pressure_exponent:g}"
+        return unit if speed_exponent == 1 else f"{unit}*mm^{1 - speed_exponent:g}*s^{speed_exponent - 1:g}"
+
+    @property
+    def unit(self) -> str:
+        """The unit of beta~."""
+        return self.coefficient_unit(self.pressure_exponent, self.speed_exponent)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _convert_coefficients(cls, data: object) -> object:
+        if not isinstance(data, Mapping):
+            return data
+        exponents = (data.get("pressure_exponent", 1.0), data.get("speed_exponent", 1.0))
+        if not all(isinstance(e, (int, float)) and not isinstance(e, bool) and 0 < e < 100 for e in exponents):
+            return data
+        converted = dict(data)
+        for key in {"coefficient", "beta"} & data.keys():
+            if not isinstance(data[key], (Mapping, Dependence, type(None))):
+                try:
+                    converted[key] = convert(data[key], cls.coefficient_unit(*exponents))
+                except ValueError as error:
+                    raise ValueError(f"{key}: {error}") from None
+        return converted
+
+    @model_validator(mode="after")
+    def _one_coefficient(self) -> Self:
+        given = [key for key in ("coefficient", "beta", "archard", "energy") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of coefficient, beta, archard and energy, got {' and '.join(given) or 'none'}")
+        for key in ("coefficient", "beta"):
+            value = getattr(self, key)
+            if isinstance(value, float) and not (math.isfinite(value) and value >= 0):
+                raise ValueError(f"{key}: expected a finite number, zero or larger")
+        if self.pressure_cap is not None and self.pressure_cap <= self.pressure_threshold:
+            raise ValueError("pressure_cap: expected more than pressure_threshold")
+        if (self.archard is None) != (self.hardness is None):
+            raise ValueError("hardness: expected together with archard, and only then")
+        if (self.archard, self.energy) != (None, None) and (self.pressure_exponent, self.speed_exponent) != (1.0, 1.0):
+            raise ValueError(f"{given[0]}: expected with exponents of 1 only; give coefficient or beta")
+        if isinstance(self.coefficient, Dependence):
+            try:
+                convert(f"1 {self.coefficient.unit}" if self.coefficient.unit else 1.0, self.unit)
+            except ValueError as error:
+                raise ValueError(f"coefficient: unit: {error}") from None
+        return self
+
+    @property
+    def scale(self) -> float:
+        """What turns values of a dependent coefficient into its internal unit."""
+        if isinstance(self.coefficient, Dependence) and self.coefficient.unit:
+            return convert(f"1 {self.coefficient.unit}", self.unit)
+        return 1.0
+
+    def resolved(self, data: dict[str, Any]) -> dict[str, Any]:
+        """Return the dumped tables `data` of this law with the units of its coefficients."""
+        for key in ("coefficient", "beta"):
+            if isinstance(getattr(self, key), float):
+                data[key] = quantity_text(getattr(self, key), self.unit)
+        return data
+
+
+class Wear(Part):
+    """The wear law of each body that wears."""
+
+    punch: WearLaw | None = Field(default=None, description="law of the punch; without it the punch does not wear")
+    strip: WearLaw | None = Field(default=None, description="law of the strip; without it the strip does not wear")
+
+    @model_validator(mode="after")
+    def _some_law(self) -> Self:
+        if self.punch is None and self.strip is None:
+            raise ValueError("expected the wear law of punch, strip or both")
+        return self

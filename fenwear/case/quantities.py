@@ -1,0 +1,59 @@
+"""What the tables of a case file are made of: numbers with units, and tables that refuse unknown keys.
+
+Every number is held in mm, N, s, K (see `fenwear.case.units`); a case file may give any other unit as a string.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSerializer
+
+from fenwear.case.units import convert, quantity_text
+
+
+@dataclass(frozen=True)
+class Unit:
+    """The unit of a key's bare numbers; in the JSON schema a text with a unit may stand for the number."""
+
+    symbol: str
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
+        """Return the schema of a number with this unit."""
+        return {"anyOf": [handler(core), {"type": "string"}]}
+
+
+def quantity(unit: str) -> Any:
+    """Return pydantic metadata: a number read with, and written in, `unit`."""
+    return (
+        Unit(unit),
+        BeforeValidator(lambda value: convert(value, unit)),
+        PlainSerializer(lambda value: quantity_text(value, unit)),
+    )
+
+
+Length = Annotated[float, *quantity("mm")]
+Force = Annotated[float, *quantity("N")]
+Stress = Annotated[float, *quantity("MPa")]
+Speed = Annotated[float, *quantity("mm/s")]
+Time = Annotated[float, *quantity("s")]
+AngularFrequency = Annotated[float, *quantity("rad/s")]
+Number = Annotated[float, *quantity("")]
+Temperature = Annotated[float, *quantity("K")]
+CONDUCTANCE = "N/(mm*s*K)"
+Conductance = Annotated[float, *quantity(CONDUCTANCE)]
+Angle = Annotated[float, *quantity("rad")]
+Axis = Literal["x", "y", "z"]
+Vector = tuple[Number, Number, Number]
+Kind = Literal["stress", "strain", "axisymmetric", "solid"]  # of a model: what tells strains and rigid modes
+# With as many components as the model has axes.
+Point = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
+Forces = Annotated[tuple[Force, ...], Field(min_length=2, max_length=3)]
+Stresses = Annotated[tuple[Stress, ...], Field(min_length=2, max_length=3)]
+
+
+class Part(BaseModel):
+    """A table of the case file: unknown keys refused, values frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, ser_json_inf_nan="strings")

@@ -1,0 +1,114 @@
+"""The table of heat: its sharing, its ways out, and how it is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, PlainSerializer, model_validator
+
+from fenwear.case.quantities import CONDUCTANCE, Conductance, Number, Part, Temperature, Unit, quantity
+from fenwear.case.units import convert, quantity_text, shown
+
+
+def _perfect_or_conductance(value: object) -> float | str:
+    """Convert a conductance, which may be perfect."""
+    if value == "perfect":
+        return "perfect"
+    try:
+        conductance = convert(value, CONDUCTANCE)
+    except ValueError as error:
+        raise ValueError(f"{error}; or 'perfect'") from None
+    if conductance < 0:
+        raise ValueError(f"expected greater than or equal to 0, got {shown(value)}")
+    return conductance
+
+
+PerfectOrConductance = Annotated[
+    float | Literal["perfect"],
+    Unit(CONDUCTANCE),
+    BeforeValidator(_perfect_or_conductance),
+    PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
+]
+
+
+class Track(Part):
+    """The rest of a disc or ring whose material passes under the punch, warms up and comes back."""
+
+    heat_capacity: Annotated[float, *quantity("N*mm/K"), Field(gt=0)] = Field(
+        description="of what is not meshed, its mass times c; 1 J/K = 1000"
+    )
+    loss: Annotated[float, *quantity("N*mm/(s*K)"), Field(ge=0)] = Field(
+        default=0.0, description="to the surroundings, its area times h; 1 W/K = 1000"
+    )
+
+
+class Heat(Part):
+    """Friction heat and its conduction; without this table a case knows no temperature."""
+
+    partition: Annotated[Number, Field(ge=0, le=1)] = Field(
+        default=0.5, description="kappa, the punch's share of the friction heat"
+    )
+    debris: Annotated[Number, Field(ge=0, lt=1)] = Field(default=0.0, description="gamma_d, carried off by debris")
+    conductance: PerfectOrConductance = Field(
+        default="perfect",
+        description="h_c between punch and strip where they touch, 1 W/(m² K) = 0.001; "
+        "by default 0 where partition is given",
+    )
+    conductance_per_pressure: tuple[Annotated[float, *quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
+        default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"
+    )
+    conducting: Literal["closed", "nominal"] = Field(
+        default="closed", description="the nodes that conduct: those in contact, or the whole nominal interface"
+    )
+    convection: Annotated[Conductance, Field(ge=0)] = Field(
+        default=0.0, description="h on all other boundaries and on the two faces of the plane model, 1 W/(m² K) = 0.001"
+    )
+    convecting_faces: bool = Field(default=True, description="whether the faces of the plane model convect, too")
+    ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings, from any zero")
+    inflow: Temperature | None = Field(
+        default=None,
+        description="of the strip's material that enters through free ends; by default, sliding one way, the "
+        "ambient, and to and fro what has left comes back as it was",
+    )
+    track: Track | None = Field(default=None, description="closed track of one-way sliding, which warms up as a whole")
+    initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
+    steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
+    coupling: Literal["implicit", "split"] = Field(
+        default="implicit", description="heat and contact together, or in turn by the operator split"
+    )
+    split_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=1e-4, description="change of the gap volume that ends the operator split, equation (30)"
+    )
+    relaxation: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.5, description="of the pressure in the operator split, equation (29)"
+    )
+    operator: Literal["reduced", "full"] = Field(
+        default="reduced", description="temperatures on a small basis, or on the whole mesh"
+    )
+    # The keys that the operators of the bodies do not depend on.
+    exchange_keys: ClassVar[frozenset[str]] = frozenset(
+        (
+            *("partition", "debris", "conductance", "conductance_per_pressure", "conducting"),
+            *("coupling", "split_tolerance", "relaxation"),
+        )
+    )
+
+    property_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.02,
+        description="change of a material's property with the temperature, over itself, after which the bodies are "
+        "made anew with it",
+    )
+    # Finer than 1e-8 the basis, found by squares, would be made of rounding.
+    reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
+        default=3e-5, description="of the reduced operator's basis, relative"
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _conductance_by_default(cls, data: object) -> object:
+        """Let a partition that is given rule, and leave the sharing to conduction where none is."""
+        if not isinstance(data, Mapping) or data.get("conductance") is not None:
+            return data
+        ruled = data.get("partition") is not None or data.get("conductance_per_pressure") is not None
+        return {**data, "conductance": 0.0 if ruled else "perfect"}

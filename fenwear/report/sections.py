@@ -82,12 +82,13 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look 
         "held": Line2D([], [], color=RED, linewidth=2.5),
         "loaded": Line2D([], [], color=BLUE, linewidth=2.5),
     }
-    axes[0].legend(named.values(), named.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    figure.legend(named.values(), named.keys(), loc="outside upper right", frameon=False, ncols=3, fontsize="small")
+    figure.set_layout_engine("compressed")  # the axes keep their aspect
     return figure
 
 
 def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
-    """Leave out what of a strip lies far beside the punch, which would be too small beside it, and say what is there."""
+    """Leave out what of a strip lies far beside the punch, which would be small beside it, and say what is there."""
     high = np.ptp(np.concatenate([fields[f"{body}_z"].values for body in BODIES]))
     strip, punch = fields.strip_x.values, fields.punch_x.values
     middle, half = (punch.max() + punch.min()) / 2, max(SHOWN_WIDE * high / 2, 0.75 * np.ptp(punch))
@@ -98,12 +99,8 @@ def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
         if sign * (end - edge) <= 0.1 * half:
             continue
         ax.set_xlim(**{"left" if sign < 0 else "right": edge})
-        held = [
-            ", ".join(f"u{axis}" for axis in support["fix"])
-            for support in supports
-            if (lines := _group(fields, "strip", support))
-            and _all_beyond(np.concatenate(lines)[:, 0], middle, half, sign)
-        ]
+        groups = [(support["fix"], _group(fields, "strip", support)) for support in supports]
+        held = [", ".join(f"u{a}" for a in fix) for fix, lines in groups if _all_beyond(lines, middle, half, sign)]
         text = f"to x = {end:.4g} mm" + (f"\nheld there: {'; '.join(held)}" if held else "")
         ax.annotate(text, (edge, bottom), (0, -6), textcoords="offset points", ha="left" if sign < 0 else "right",
                     va="top", color=GREY, fontsize="small", zorder=6, bbox=PLATE)  # fmt: skip
@@ -113,8 +110,9 @@ def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
         ax.set_ylim(bottom - 0.2 * high)
 
 
-def _all_beyond(x: Array, middle: float, half: float, sign: int) -> bool:
+def _all_beyond(lines: list[Array], middle: float, half: float, sign: int) -> bool:
     """Return whether all of a group lies out of what is shown, some of it on this side."""
+    x = np.concatenate([line[:, 0] for line in lines] or [np.array([middle])])
     return bool((np.abs(x - middle) > half).all() and (sign * (x - middle) > 0).any())
 
 

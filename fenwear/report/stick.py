@@ -53,6 +53,13 @@ LABELS = {
 }
 
 
+def key_numbers_text(summary: Mapping[str, Any]) -> str:
+    """Return the key numbers of a run with stick as lines for people."""
+    rows = [(f"{label} ({unit})" if unit else label, summary[k]) for k, (label, unit) in LABELS.items() if k in summary]
+    wide = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{wide}}  {value:>12,.5g}" for label, value in rows)
+
+
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
     """Return the places of recorded cycles at even shares of the wear, the first and the last among them."""
     depth = (history.wear.max(history.wear.dims[1:]) + history.wear_strip.max(history.wear_strip.dims[1:])).values

@@ -11,7 +11,8 @@ from fenwear.errors import CaseError, InputError
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape, stick_zone
-from fenwear.stick.run import check_touching
+from fenwear.stick.fineness import fine_enough
+from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
 
 
@@ -24,6 +25,7 @@ def check_text(case: Case) -> str:
     """
     rig = make_rig(case)
     check_touching(rig)
+    rig, fineness = fine_enough(rig, case)
     records = Records.joined(rig.cycle(rig.beginning())[1])
     thick, weights = case.model.thickness, rig.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
@@ -36,6 +38,7 @@ def check_text(case: Case) -> str:
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
+        + "".join(f"\nwarning: {text}" for text in (fineness.text(), unique_text(records)) if text)
     )
 
 
@@ -53,7 +56,7 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
     found = final_shape(rig, stick_zone(rig))
     solid = case.model.kind == "solid"
     pair, weights = rig.interface.middle.pair, rig.weights
-    x = sliding_chart(rig.interface.sliding.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
+    x = sliding_chart(rig.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
     scar = x[found.depth > 0]
     names = ("stick_area_mm2", "worn_volume_mm3") if solid else ("stick_width_mm", "worn_area_mm2")
     places = {a: pair.punch.x[:, k].tolist() for k, a in enumerate("xyz")} if solid else {"x": pair.x.tolist()}

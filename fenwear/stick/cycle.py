@@ -13,7 +13,7 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import Position, StickInterface
+from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
@@ -133,7 +133,7 @@ class Rig:
 
     def __init__(
         self,
-        interface: StickInterface,
+        interface: OppositeBodies,
         program: Program,
         wear: LocalWear,
         friction: Array,
@@ -147,6 +147,10 @@ class Rig:
     def watched(self, watch: Callable[[], None]) -> Rig:
         """Return the same, watched."""
         return Rig(self.interface, self.program, self.wear, self.friction, watch, self.heat)
+
+    def driven(self, program: Program) -> Rig:
+        """Return the same in other time steps, without heat."""
+        return Rig(self.interface, program, self.wear, self.friction, self.watch)
 
     @cached_property
     def reach(self) -> float:

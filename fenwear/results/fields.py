@@ -141,7 +141,7 @@ def _solve(
         coupling.destroy()
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
-    displacement.x.array[:owned] = elastic.factor.solve(force)
+    displacement.x.array[:owned] = elastic.solve(force)
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()

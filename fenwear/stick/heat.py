@@ -216,4 +216,4 @@ def _free_expansion(elastic: ElasticBody, basis: ReducedBasis, fields: Array) ->
         forces.append(force.array.copy())
     for one in (coupling, theta, force):
         one.destroy()
-    return elastic.trace.pick(elastic.factor.solve(np.stack(forces, axis=1)))
+    return elastic.trace.pick(elastic.solve(np.stack(forces, axis=1)))

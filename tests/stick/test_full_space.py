@@ -112,8 +112,8 @@ class FullSpace:
         raise AssertionError("the full system did not converge")
 
 
-def compare(interface: StickInterface, radius: float, path: list[float]) -> None:
-    """Press, then follow a path of displacements; every traction within 1e-8 of the largest pressure."""
+def compare(interface: StickInterface, radius: float, path: list[float], close: float = 1e-8) -> None:
+    """Press, then follow a path of displacements; every traction within `close` of the largest pressure."""
     full, bodies = FullSpace(interface), interface.bodies
     n = len(interface.middle.pair.weights)
     x = interface.middle.pair.punch.x
@@ -130,9 +130,9 @@ def compare(interface: StickInterface, radius: float, path: list[float]) -> None
         loads: Any = [bodies.punch.load.copy(), bodies.strip.load.copy()]
         f, old, _ = full.solve(old, opening, loads, loaded.resultant, displacement, f)
         top = f[:n].max()
-        assert state.pressure.max() == pytest.approx(top, rel=1e-8)
-        assert np.abs(state.pressure - f[:n]).max() < 1e-8 * top
-        assert np.abs(state.traction - f[n:].reshape(-1, n).T).max() < 1e-8 * top
+        assert state.pressure.max() == pytest.approx(top, rel=close)
+        assert np.abs(state.pressure - f[:n]).max() < close * top
+        assert np.abs(state.traction - f[n:].reshape(-1, n).T).max() < close * top
         slipped, stuck = slipped + int(state.slipping.sum()), stuck + int(state.sticking.sum())
     assert slipped > 3
     assert stuck > 3
@@ -149,4 +149,5 @@ def test_solid() -> None:
     settings = ["geometry.parameters.across=2", "geometry.degree=2"]
     case = load_case("fretting-sphere", settings)
     interface = StickInterface(build_bodies(case), make_sliding(case), case)
-    compare(interface, 0.0, [0.5e-3])
+    # In two directions Newton's steps end at a residual of 1e-10, not at rounding: tractions differ by 1.4e-8.
+    compare(interface, 0.0, [0.5e-3], close=1e-7)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField
+from fenwear.heat.kept_basis import kept_basis
 from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
@@ -34,6 +36,8 @@ def prepare_exchange(
     *,
     reduced: bool,
     at_rest: bool = False,
+    keep: bool = False,
+    fresh: bool = False,
 ) -> HeatExchange:
     """Return the exchange over the half-cycles of the motion; collective.
 
@@ -48,6 +52,8 @@ def prepare_exchange(
         thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
         at_rest: Whether the strip's material stays where it is, whatever the motion.
+        keep: Whether bases are kept on disk, and taken from there where they are.
+        fresh: Make them whatever is kept.
 
     Raises:
         CaseError: the half-cycles of the motion last unequally long.
@@ -76,7 +82,8 @@ def prepare_exchange(
         if heat.track is not None and body.body.name == "strip":
             field = _on_track(heat, heat.track, body, steps, inflow, own, duration, around, cycle, thickness)
         elif reduced:
-            field = _reduced(body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle)
+            tolerance = heat.reduction_tolerance
+            field = _reduced(body, steps, inflow, moving, duration, tolerance, around, cycle, keep=keep, fresh=fresh)
         else:
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
@@ -120,6 +127,9 @@ def _reduced(
     tolerance: float,
     surroundings: Surroundings,
     cycle: Sequence[int],
+    *,
+    keep: bool = False,
+    fresh: bool = False,
 ) -> ReducedField:
     """Return the field on a basis whose cycle of steps lets every temperature die out; collective.
 
@@ -127,7 +137,9 @@ def _reduced(
         HeatError: none does.
     """
     while True:
-        basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
+        make = partial(reduced_basis, body, inflow, speeds, duration, tolerance, surroundings)
+        settings = [inflow, [*speeds], duration, tolerance]
+        basis = kept_basis(make, steps, settings, surroundings, fresh=fresh) if keep else make()
         field = ReducedField(steps, inflow, basis)
         growth = field.spectral_radius(cycle)
         if growth <= 1 + NEUTRAL:

@@ -2,47 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+from scipy.sparse import csc_array
 
 from fenwear.bodies import kept
-from fenwear.heat.conduction import HeatStep, Surroundings
+from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.field import ReducedBasis
 
+Make = partial[ReducedBasis]  # the function that makes it, after the body all that it follows from
+Way = Callable[[Make, Sequence[HeatStep]], ReducedBasis]
 
-def kept_basis(
-    make: Callable[[], ReducedBasis],
-    steps: Sequence[HeatStep],
-    settings: Sequence[object],
-    surroundings: Surroundings,
-    *,
-    fresh: bool,
-) -> ReducedBasis:
+
+def made(make: Make, _: Sequence[HeatStep]) -> ReducedBasis:
+    """Return a basis that is made whatever is kept; collective."""
+    return make()
+
+
+def kept_basis(make: Make, steps: Sequence[HeatStep], *, fresh: bool) -> ReducedBasis:
     """Return a basis from disk where it is kept, else make and keep it; collective.
 
     Args:
-        make: Makes it.
+        make: Makes it from the body and further arguments.
         steps: Of the body: their matrices have its mesh, materials, convection and held temperatures in them.
-        settings: What else the basis follows from.
-        surroundings: What the body meets beyond its mesh.
         fresh: Make it whatever is kept.
 
     Raises:
         CaseError: the limit of what is kept is no number.
     """
-    body = steps[0].body
+    body: HeatBody = steps[0].body
     comm = body.body.mesh.comm
     if comm.bcast(kept.limit()) == 0:
         return make()
-    exposed = "none" if surroundings.exposed is None else surroundings.exposed
-    around = [surroundings.renewed, surroundings.sliding, exposed]
-    parts = ["reduced temperatures", kept.surroundings(), body.body.mesh.geometry.x, *settings, *around]
+    parts = ["reduced temperatures", kept.surroundings(), body.body.mesh.geometry.x]
+    for argument in (*make.args[1:], *make.keywords.values()):
+        parts += _parts(argument)
     for step in steps:
         parts += [*step.a.getValuesCSR(), *step.b.getValuesCSR(), step.source, step.carried, step.entering]
-    parts += [body.initial(), body.held, body.storage, body.convected]
-    key = kept.common_key(comm, parts)
+    key = kept.common_key(comm, [*parts, body.initial(), body.held, body.storage, body.convected])
     found = None if fresh else kept.load(comm, key)
-    if found is not None and {"lift", "columns"} <= found.keys():
+    if found is not None:
         return ReducedBasis(body, found["lift"], found["columns"])
     basis = make()
     kept.save(comm, key, {"lift": basis.lift, "columns": basis.columns})
     return basis
+
+
+def _parts(argument: object) -> Iterator[object]:
+    """Yield what tells an argument: arrays, and what has a text that tells all of it."""
+    if isinstance(argument, csc_array):
+        yield from (argument.data, argument.indices, argument.indptr)
+    elif isinstance(argument, Surroundings):
+        yield from (argument.renewed, argument.sliding, argument.exposed)
+    elif isinstance(argument, Sequence):
+        yield np.asarray(argument)
+    else:
+        yield argument

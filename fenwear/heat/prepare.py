@@ -6,14 +6,15 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
-from fenwear.heat.field import FullField, ReducedField
-from fenwear.heat.kept_basis import kept_basis
+from fenwear.heat.field import FullField, ReducedField, contact_responses
+from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
@@ -21,6 +22,7 @@ from fenwear.parallel import total
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
 
+MANY = 300  # contact nodes above which a basis holds what is felt a step later alone
 NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
 
 
@@ -82,8 +84,9 @@ def prepare_exchange(
         if heat.track is not None and body.body.name == "strip":
             field = _on_track(heat, heat.track, body, steps, inflow, own, duration, around, cycle, thickness)
         elif reduced:
-            tolerance = heat.reduction_tolerance
-            field = _reduced(body, steps, inflow, moving, duration, tolerance, around, cycle, keep=keep, fresh=fresh)
+            lasting = contact_rows(body, pair) if len(pair.weights) > MANY else None
+            tolerance, way = heat.reduction_tolerance, partial(kept_basis, fresh=fresh) if keep else made
+            field = _reduced(body, steps, inflow, moving, duration, tolerance, around, cycle, lasting, way)
         else:
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
@@ -121,26 +124,29 @@ def prepare_steady(
 def _reduced(
     body: HeatBody,
     steps: list[HeatStep],
-    inflow: Array,
+    inflow: csc_array,
     speeds: Sequence[float],
     duration: float,
     tolerance: float,
     surroundings: Surroundings,
     cycle: Sequence[int],
-    *,
-    keep: bool = False,
-    fresh: bool = False,
+    lasting: csr_array | None = None,
+    way: Way = made,
 ) -> ReducedField:
     """Return the field on a basis whose cycle of steps lets every temperature die out; collective.
+
+    Args:
+        lasting: Temperature at the contact nodes, for a basis of what is felt a step later; None for all.
+        way: How a basis is come by: made, or taken from what is kept.
 
     Raises:
         HeatError: none does.
     """
+    exact = None if lasting is None else contact_responses(steps, inflow, lasting)
     while True:
-        make = partial(reduced_basis, body, inflow, speeds, duration, tolerance, surroundings)
-        settings = [inflow, [*speeds], duration, tolerance]
-        basis = kept_basis(make, steps, settings, surroundings, fresh=fresh) if keep else make()
-        field = ReducedField(steps, inflow, basis)
+        settings = (inflow, speeds, duration, tolerance, surroundings)
+        basis = way(partial(reduced_basis, body, *settings, lasting=lasting is not None), steps)
+        field = ReducedField(steps, inflow, basis, exact)
         growth = field.spectral_radius(cycle)
         if growth <= 1 + NEUTRAL:
             return field
@@ -158,7 +164,7 @@ def _on_track(
     track: Track,
     body: HeatBody,
     steps: list[HeatStep],
-    inflow: Array,
+    inflow: csc_array,
     speeds: Sequence[float],
     duration: float,
     surroundings: Surroundings,
@@ -176,7 +182,7 @@ def _on_track(
     # What enters at a kelvin, as large as a unit flux: what is small against the largest is dropped from the basis.
     comm, entering = body.body.mesh.comm, steps[0].entering
     fluxes, unit = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], np.abs(entering).sum()]))
-    both = np.hstack([inflow, entering[:, None] * (fluxes / unit)])
+    both = csc_array(hstack([inflow, csc_array(entering[:, None] * (fluxes / unit))]))
     moving = [speeds[step] for step in cycle]
     inner = _reduced(body, steps, both, moving, duration, heat.reduction_tolerance, surroundings, cycle)
     kelvins = [abs(speed / speeds[0]) * unit / fluxes for speed in speeds]
@@ -199,10 +205,20 @@ def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, r
     return Surroundings(renewed, body.place(bare), sliding)
 
 
-def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[Array, Array]:
+def contact_rows(body: HeatBody, pair: ContactPair) -> csr_array:
+    """Return what gives the temperature of a body at the interface nodes, (n, owned) of this rank."""
+    onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
+    return csr_array(onto_nodes @ body.trace.rows)
+
+
+def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[csc_array, csc_array]:
     """Return the loads of unit fluxes at the interface nodes on each body (owned, n), mm."""
-    weights = np.diag(pair.weights)
-    return bodies[0].place(pair.punch.spread @ weights), bodies[1].place(pair.transfer.T @ weights)
+    weights = diags_array(pair.weights)
+    punch, strip = (
+        csc_array(body.trace.rows.T @ (onto @ weights))
+        for body, onto in zip(bodies, (pair.punch.spread, pair.transfer.T), strict=True)
+    )
+    return punch, strip
 
 
 def _exchange(
@@ -227,8 +243,6 @@ def _side(
     cooled: bool,
 ) -> Side:
     body = field.basis.body
-    onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
-    contact_rows = onto_nodes @ body.trace.rows
     convected = body.convected
     if surroundings.exposed is not None:
         convected = convected + body.heat.convection * surroundings.exposed
@@ -241,7 +255,7 @@ def _side(
     capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
     side = Side(
         field,
-        field.observe(contact_rows),
+        field.observe(contact_rows(body, pair)),
         field.observe(gap_rows).less(initial),
         field.observe(rows),
         [step.held_source for step in steps],

@@ -152,7 +152,9 @@ def test_reduced_heat_is_kept_too(setup: Setup, monkeypatch: pytest.MonkeyPatch,
     """With the same bits, and reduced again by --fresh or where conduction or motion is another."""
     made: list[object] = []
     reduce = prepare.reduced_basis
-    monkeypatch.setattr(prepare, "reduced_basis", lambda *given: (made.append(given), reduce(*given))[1])
+    monkeypatch.setattr(
+        prepare, "reduced_basis", lambda *given, **named: (made.append(given), reduce(*given, **named))[1]
+    )
 
     def bases(*changes: str, fresh: bool = False) -> tuple[list[bytes], int]:
         made.clear()

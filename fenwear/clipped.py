@@ -146,7 +146,7 @@ def contact_modulus(case: Case) -> float:
     """Return E* of the softest region of each body, MPa: 1 / E* = sum of (1 - nu²) / E, without nu in plane stress."""
     compliance = 0.0
     for body in (case.punch, case.strip):
-        used = [case.materials[name] for name in body.regions.values()]
+        used = [case.initial_materials[name] for name in body.regions.values()]
         compliance += max((1 - (case.model.law != "stress") * m.poisson**2) / m.young for m in used)
     return 1 / compliance
 

@@ -148,8 +148,9 @@ class _Run:
         start: RunState | None = None
         if resume:
             followed = checkpoint.followed(directory, system)
-            if followed is not None:
-                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case))
+            warmed = checkpoint.warmed(directory, system)
+            if followed is not None or warmed is not None:
+                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case), warmed=warmed)
             start = checkpoint.load(directory, system)
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
@@ -272,6 +273,8 @@ class _Run:
     def _take(self, block: Block) -> None:
         if block.system.bodies.followed is not self.system.bodies.followed:
             self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
+        elif block.system.bodies.warmed is not self.system.bodies.warmed:
+            self.log(f"after half-cycle {self.state.half_cycle:,} properties are those of the temperatures there")
         self.system = block.system
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)

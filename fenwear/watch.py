@@ -97,8 +97,8 @@ def pressed(case: Case, pressure: float) -> str:
                 f"{law.hardness:,.4g} MPa: the surface would yield, and a linear-elastic contact does not"
             )
     used = {*case.punch.regions.values(), *case.strip.regions.values()}
-    softest = min(used, key=lambda name: case.materials[name].young)
-    young = case.materials[softest].young
+    softest = min(used, key=lambda name: case.initial_materials[name].young)
+    young = case.initial_materials[softest].young
     if pressure > STRONGEST * young:
         return (
             f"the mean pressure of the contact reaches {pressure:,.4g} MPa, more than a tenth of Young's modulus of "

@@ -16,7 +16,7 @@ import pytest
 import fenwear as package
 from fenwear import Tribosystem, steady
 from fenwear.case import builtin_cases
-from fenwear.cli import steady_command
+from fenwear.cli.states import steady_command
 
 Run = Callable[..., Any]
 MEAN = 1e4 / 600
@@ -72,7 +72,7 @@ def test_steady_tells_all_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pyte
         clock[0] += 196.0
         return 7
 
-    monkeypatch.setattr("fenwear.cli.time", SimpleNamespace(perf_counter=lambda: clock[0]))
+    monkeypatch.setattr("fenwear.cli.states.time", SimpleNamespace(perf_counter=lambda: clock[0]))
     monkeypatch.setattr("fenwear.cycle.cycles_to_reach", slow)
     steady_command("example2", list(options()[1::2]))
     assert "33.333 MPa" in printed[0]

@@ -132,6 +132,7 @@ class Results(Written):
             "With heat.track": history.BULK,
             "Of solids and rings instead, or as well": _of_surfaces(),
             "With contact.law = coulomb, these alone": stick.VARIABLES,
+            "With contact.law = coulomb in a solid instead, or as well": stick.of_solids(),
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

@@ -27,6 +27,7 @@ from fenwear.assembly.tribosystem import (
     with_reduced_heat,
 )
 from fenwear.assembly.variants import assemble, in_parts, place_case, set_up_by, vary, with_case
+from fenwear.assembly.warmed import outwarmed, property_change, taken_at, warmed_system
 
 __all__ = [
     "Bodies",
@@ -46,12 +47,16 @@ __all__ = [
     "in_parts",
     "make_sliding",
     "needs_of",
+    "outwarmed",
     "place",
     "place_case",
     "preparation",
+    "property_change",
     "set_up_by",
     "steady_exchange",
+    "taken_at",
     "vary",
+    "warmed_system",
     "with_case",
     "with_exchange",
     "with_reduced_heat",

@@ -11,13 +11,13 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.material import isotropic
+from fenwear.bodies.material import isotropic, nodal_function
 from fenwear.bodies.mesh import BodyMesh, build_meshes
 from fenwear.bodies.regions import contact_regions
 from fenwear.bodies.shape import follow_wear
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
-from fenwear.heat.material import isotropic_conduction
+from fenwear.heat.material import ConductionLaw, isotropic_conduction
 from fenwear.parallel import release
 from fenwear.sliding.wear import Worn
 
@@ -33,6 +33,8 @@ class Bodies:
         moved: How far the contact nodes have moved for it.
         regions: Shares of the material regions in the contact nodes of punch and strip, by their names.
         densities: At the pressure nodes of punch and strip, N s²/mm⁴; None where it is not given.
+        warmed: Temperatures of this rank's own nodes of both that the materials' properties are taken at (owned,)
+            each, K; None for the initial temperature.
     """
 
     punch: ElasticBody
@@ -42,6 +44,7 @@ class Bodies:
     moved: Worn | None = None
     regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     densities: tuple[Array | None, Array | None] = (None, None)
+    warmed: tuple[Array, Array] | None = None
 
     @property
     def comm(self) -> MPI.Comm:
@@ -72,13 +75,20 @@ class Bodies:
         return replace(self, punch=punch, strip=strip)
 
 
-def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None) -> Bodies:
+def build_bodies(
+    case: Case,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    followed: Worn | None = None,
+    warmed: tuple[Array, Array] | None = None,
+) -> Bodies:
     """Mesh both bodies and assemble them; collective.
 
     Args:
         case: The problem.
         comm: The ranks.
         followed: Worn depths that the meshes follow; by default they are as they were made.
+        warmed: Temperatures of this rank's own nodes of both bodies that the materials' properties are taken at
+            (owned,) each, K; by default the initial one.
 
     Raises:
         CaseError: what only the geometry can tell is wrong, such as a missing group.
@@ -87,32 +97,65 @@ def build_bodies(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | N
     release(comm)  # what earlier systems have left
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
     moved = None if followed is None else _moved(case, meshes, followed)
-    punch, strip = (elastic_body(case, m, d) for m, d in zip(meshes, (case.punch, case.strip), strict=True))
+    warmed = warmed if case.warming else None
+    punch, strip = (
+        elastic_body(case, m, d, theta)
+        for m, d, theta in zip(meshes, (case.punch, case.strip), warmed or (None, None), strict=True)
+    )
     regions = contact_regions(punch), contact_regions(strip)
     of_punch, of_strip = (
         contact_density(shares, {region: case.materials[name].density for region, name in description.regions.items()})
         for shares, description in zip(regions, (case.punch, case.strip), strict=True)
     )
-    heat = build_conduction(case, punch, strip)
-    return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip))
+    heat = build_conduction(case, punch, strip, warmed)
+    return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip), warmed)
 
 
-def build_conduction(case: Case, punch: ElasticBody, strip: ElasticBody) -> tuple[HeatBody, HeatBody] | None:
-    """Prepare conduction in both bodies; None for a case without heat; collective."""
+def build_conduction(
+    case: Case, punch: ElasticBody, strip: ElasticBody, warmed: tuple[Array, Array] | None = None
+) -> tuple[HeatBody, HeatBody] | None:
+    """Prepare conduction in both bodies; None for a case without heat; collective.
+
+    Args:
+        case: The problem.
+        punch, strip: Their elasticity.
+        warmed: Temperatures that the properties are taken at; by default the initial one.
+    """
     if case.heat is None:
         return None
     of_punch, of_strip = (
-        HeatBody(
-            elastic, description, isotropic_conduction(elastic.body, description.regions, case.materials), case.heat
+        HeatBody(elastic, description, _conduction(case, elastic, description, theta), case.heat)
+        for elastic, description, theta in zip(
+            (punch, strip), (case.punch, case.strip), warmed or (None, None), strict=True
         )
-        for elastic, description in ((punch, case.punch), (strip, case.strip))
     )
     return of_punch, of_strip
 
 
-def elastic_body(case: Case, mesh: BodyMesh, description: Body) -> ElasticBody:
-    """Assemble the elasticity of one body of a case under the mean of its loads; collective."""
-    law = isotropic(mesh, description.regions, case.materials, case.model.law)
+def _conduction(case: Case, elastic: ElasticBody, description: Body, theta: Array | None) -> ConductionLaw:
+    """Return the conduction of a body at temperatures of its own nodes; collective."""
+    if theta is None:
+        return isotropic_conduction(elastic.body, description.regions, case.initial_materials)
+    at = nodal_function(elastic.body, case.geometry.degree, theta)
+    return isotropic_conduction(elastic.body, description.regions, case.materials, at)
+
+
+def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | None = None) -> ElasticBody:
+    """Assemble the elasticity of one body of a case under the mean of its loads; collective.
+
+    Args:
+        case: The problem.
+        mesh: Of the body.
+        description: Of the body.
+        theta: Temperatures of this rank's own nodes that its properties are taken at (owned,), K; by default the
+            initial one.
+    """
+    regions, kind = description.regions, case.model.law
+    if theta is None:
+        law = isotropic(mesh, regions, case.initial_materials, kind)
+    else:
+        at = nodal_function(mesh, case.geometry.degree, theta)
+        law = isotropic(mesh, regions, case.materials, kind, at)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
     return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)
 

@@ -132,7 +132,10 @@ def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
 
 
 def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
-    """Condense both bodies onto what the phases of the motion ask for; collective."""
+    """Condense both bodies onto what the phases of the motion ask for; collective.
+
+    They are kept on disk, but with properties of temperatures that no other run has.
+    """
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
     if bodies.heat is not None:
@@ -149,7 +152,7 @@ def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
         onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1])
     else:
         onto_strip = Request(bodies.strip, csr_array(middle.transfer.T), middle.normal_on_strip, couplings[1])
-    punch, strip = condense_together([onto_punch, onto_strip], keep=True, fresh=fresh)
+    punch, strip = condense_together([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from mpi4py import MPI
 
+from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies, build_conduction
 from fenwear.assembly.placed import Placed, make_sliding, place
 from fenwear.assembly.tribosystem import (
@@ -33,6 +34,7 @@ def assemble(
     *,
     heat: Preparation = "as set",
     fresh: bool = False,
+    warmed: tuple[Array, Array] | None = None,
 ) -> Tribosystem:
     """Return the system of a case: all steps; collective.
 
@@ -43,6 +45,8 @@ def assemble(
         heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
         fresh: Condense the bodies again, even where they are kept on disk.
+        warmed: Temperatures of this rank's own nodes that the materials' properties are taken at; by default the
+            initial one.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
@@ -51,25 +55,31 @@ def assemble(
     if case.contact.law == "coulomb":
         reason = "expected 'gross-sliding' here: with 'coulomb', `run`, `check`, `steady` and fenwear.stick go on"
         raise CaseError(InputError("contact.law", reason))
-    system = elastic(place_case(case, comm, followed), fresh=fresh)
+    system = elastic(place_case(case, comm, followed, warmed), fresh=fresh)
     if heat == "none":
         return system
     return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)
 
 
-def place_case(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, followed: Worn | None = None) -> Placed:
+def place_case(
+    case: Case,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    followed: Worn | None = None,
+    warmed: tuple[Array, Array] | None = None,
+) -> Placed:
     """Return both bodies of a case opposite each other, without any elasticity; collective.
 
     Args:
         case: The problem.
         comm: The ranks.
         followed: Worn depths that the meshes follow.
+        warmed: Temperatures that the materials' properties are taken at.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    bodies = build_bodies(case, comm, followed)
+    bodies = build_bodies(case, comm, followed, warmed)
     return place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case)
 
 
@@ -109,7 +119,7 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
         bodies = bodies.under(case)
     conducts_alike = _same_conduction(before, case)
     if not conducts_alike:
-        bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip))
+        bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
     placed = place(bodies, sliding, case.heat, solver=case.contact.solver, case=case)
     if not same_frame(system, placed):
         condensed = condense_bodies(placed)
@@ -134,7 +144,8 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
 def set_up_by(case: Case) -> tuple[object, ...]:
     """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
     bodies = ((body.regions, body.supports, body.pivot) for body in (case.punch, case.strip))
-    return (case.geometry, case.folder, case.model, case.materials, case.heat is None, *bodies)
+    initial = case.heat.initial if case.heat is not None and case.warming else None
+    return (case.geometry, case.folder, case.model, case.materials, case.heat is None, initial, *bodies)
 
 
 def _same_conduction(one: Case, other: Case) -> bool:

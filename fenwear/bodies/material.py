@@ -6,14 +6,18 @@ and surfaces of a plane model are per thickness, those of an axisymmetric one ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
+import basix.ufl
+import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import Mesh
 
+from fenwear.arrays import Array
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Kind, Material
 from fenwear.errors import CaseError, InputError
@@ -153,42 +157,98 @@ class OwnLaw:
         return ufl.as_ufl(0.0) if self.out_of_plane is None else self.out_of_plane(u, theta)
 
 
-def region_field(body: BodyMesh, values: dict[str, float]) -> fem.Function:
-    """Return the field that is constant on each material region.
+# A property of a region: its value, or its values at temperatures (n,).
+Property = float | Callable[[Array], Array]
+
+
+def region_field(body: BodyMesh, values: Mapping[str, Property], theta: fem.Function | None = None) -> fem.Function:
+    """Return the field of a property: constant on each material region, or a function of the temperature; collective.
 
     Args:
         body: The body.
-        values: The value on each region, by its name.
+        values: The property on each region, by its name.
+        theta: The temperature, K, whose nodes in each cell the field then has; needed where a property is a function.
+
+    Raises:
+        CaseError: a value that a temperature gives is none; on every rank.
     """
-    field = fem.Function(fem.functionspace(body.mesh, ("DG", 0)))
+    warm = theta is not None and any(callable(value) for value in values.values())
+    element = ("DG", 0) if theta is None or not warm else _broken(theta)
+    field = fem.Function(fem.functionspace(body.mesh, element))
+    if theta is not None and warm:
+        field.interpolate(theta)
+    dofs, problem = field.function_space.dofmap.list, None
     for region, value in values.items():
-        field.x.array[body.cell_tags.find(body.regions[region])] = value
+        of_region = np.unique(dofs[body.cell_tags.find(body.regions[region])])
+        try:
+            field.x.array[of_region] = value(field.x.array[of_region]) if callable(value) else value
+        except CaseError as error:  # raised below, on all ranks
+            problem = error
+    found = [one for one in body.mesh.comm.allgather(problem) if one is not None] if warm else []
+    if found:
+        raise found[0]
     field.x.scatter_forward()
     return field
 
 
-def isotropic(body: BodyMesh, regions: dict[str, str], materials: dict[str, Material], kind: Kind) -> Isotropic:
+def nodal_function(body: BodyMesh, degree: int, values: Array) -> fem.Function:
+    """Return the scalar function of values at this rank's own nodes (owned,); collective."""
+    space = fem.functionspace(body.mesh, basix.ufl.element("Lagrange", body.mesh.basix_cell(), degree))
+    function = fem.Function(space)
+    function.x.array[: len(values)] = values
+    function.x.scatter_forward()
+    return function
+
+
+def _broken(theta: fem.Function) -> Any:
+    """Return the element of a temperature without continuity between the cells: regions meet at their faces."""
+    space = theta.function_space
+    cell, degree = space.mesh.basix_cell(), space.ufl_element().degree
+    return basix.ufl.element("Lagrange", cell, degree, discontinuous=True)
+
+
+def isotropic(
+    body: BodyMesh,
+    regions: Mapping[str, str],
+    materials: Mapping[str, Material],
+    kind: Kind,
+    theta: fem.Function | None = None,
+) -> Isotropic:
     """Return the isotropic law of a body's regions.
 
     Args:
         body: The body.
         regions: Name of the material of each region.
-        materials: By their names.
+        materials: By their names; with constants alone where no temperature is given.
         kind: Of the model.
+        theta: Temperature that the properties are taken at, K.
 
     Raises:
         CaseError: an unknown region, or one without a material.
     """
     _check_regions(body, regions)
-    of_region = {region: materials[name] for region, name in regions.items()}
-    young = region_field(body, {r: m.young for r, m in of_region.items()})
-    poisson = region_field(body, {r: m.poisson for r, m in of_region.items()})
     held = 1 if kind == "stress" else 2
-    modulus = {r: m.young * (m.expansion or 0.0) / (1 - held * m.poisson) for r, m in of_region.items()}
-    return Isotropic(kind, lame(young, poisson, kind), region_field(body, modulus))
+    young: dict[str, Property] = {}
+    modulus: dict[str, Property] = {}
+    for region, name in regions.items():
+        m, key = materials[name], f"materials.{name}"
+        depends = set(m.dependent) if theta is not None else set()
+        young[region] = partial(m.values, "young", key=key) if "young" in depends else m.young
+        if depends & {"young", "expansion"}:
+            modulus[region] = partial(_thermal_modulus, m, held, key)
+        else:
+            modulus[region] = m.young * (m.expansion or 0.0) / (1 - held * m.poisson)
+    poisson = region_field(body, {region: materials[name].poisson for region, name in regions.items()})
+    return Isotropic(kind, lame(region_field(body, young, theta), poisson, kind), region_field(body, modulus, theta))
 
 
-def _check_regions(body: BodyMesh, regions: dict[str, str]) -> None:
+def _thermal_modulus(material: Material, held: int, key: str, theta: Array) -> Array:
+    """Return E alpha / (1 - nu), or / (1 - 2 nu), at temperatures (n,), MPa/K."""
+    young, expansion = (material.values(name, theta, key) for name in ("young", "expansion"))
+    return np.asarray(young * expansion / (1 - held * material.poisson), dtype=np.float64)
+
+
+def _check_regions(body: BodyMesh, regions: Mapping[str, str]) -> None:
     problems = [
         InputError(
             f"{body.name}.regions.{name}",

@@ -1,4 +1,4 @@
-"""The tables of the two bodies: geometry, model, materials, supports, loads and held temperatures."""
+"""The tables of the two bodies: geometry, model, supports, loads and held temperatures."""
 
 from __future__ import annotations
 
@@ -16,11 +16,9 @@ from fenwear.case.quantities import (
     Number,
     Part,
     Point,
-    Stress,
     Stresses,
     Temperature,
     Unit,
-    quantity,
 )
 from fenwear.case.units import convert, shown
 
@@ -85,25 +83,6 @@ class Model(Part):
     def axes(self) -> tuple[Axis, ...]:
         """The axes of vectors."""
         return ("x", "y", "z") if self.kind == "solid" else ("x", "z")
-
-
-class Material(Part):
-    """An isotropic, linear-elastic material; the thermal values are needed with heat only."""
-
-    young: Annotated[Stress, Field(gt=0)] = Field(description="Young's modulus E")
-    poisson: Annotated[Number, Field(gt=-1, le=0.5)] = Field(description="Poisson's ratio nu")
-    conductivity: Annotated[float, *quantity("N/(s*K)"), Field(gt=0)] | None = Field(
-        default=None, description="thermal conductivity k; 1 W/(m K) = 1"
-    )
-    heat_capacity: Annotated[float, *quantity("mm^2/(s^2*K)"), Field(gt=0)] | None = Field(
-        default=None, description="c; 1 J/(kg K) = 1e6: better give the unit"
-    )
-    density: Annotated[float, *quantity("N*s^2/mm^4"), Field(gt=0)] | None = Field(
-        default=None, description="rho; 1 kg/m³ = 1e-12: better give the unit"
-    )
-    expansion: Annotated[float, *quantity("1/K")] | None = Field(
-        default=None, description="linear thermal expansion alpha"
-    )
 
 
 class Support(Part):

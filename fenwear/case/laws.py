@@ -80,11 +80,21 @@ class Dependence(Part):
         """Whether it changes as long as a run goes on: with the worn depth, or with what has been slid."""
         return self.depends_on("depth") or self.depends_on("s")
 
-    def values(self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str) -> Array:
+    def scale(self, unit: str) -> float:
+        """Return what turns its values into a unit.
+
+        Raises:
+            ValueError: its own unit is of another kind.
+        """
+        return convert(f"1 {self.unit}", unit) if self.unit else 1.0
+
+    def values(
+        self, state: Mapping[str, Array], shape: tuple[int, ...], factor: float, key: str, least: float = 0.0
+    ) -> Array:
         """Return the coefficient times `factor` at the `state` (shape), which has shares of regions by their names.
 
         Raises:
-            CaseError: it is negative or not finite somewhere; `key` is the case's key.
+            CaseError: it is less than `least` or not finite somewhere; `key` is the case's key.
         """
         if self.table is not None:
             values = np.interp(np.broadcast_to(state[self.of], shape), *np.array(self.table).T)
@@ -92,17 +102,18 @@ class Dependence(Part):
             values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
         elif self.law is not None:
             try:
-                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES}, shape)
+                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES if name in state}, shape)
             except ValueError as error:
                 raise CaseError(InputError(key, str(error))) from error
         else:
             values = evaluate(parse_expression(self.expression or ""), state, shape)
-        wrong = ~(np.isfinite(values) & (values >= 0))
+        wrong = ~(np.isfinite(values) & (values >= least))
         if wrong.any():
             node = int(np.flatnonzero(wrong)[0])
-            named = [name for name in VARIABLES if name in ("T", "p", "v") or self.depends_on(name)]
+            named = [name for name in VARIABLES if (name in ("T", "p", "v") and name in state) or self.depends_on(name)]
             at = ", ".join(f"{name} = {np.broadcast_to(state[name], shape)[node]:g} {UNITS[name]}" for name in named)
-            raise CaseError(InputError(key, f"expected zero or more, got {values[node]:g} at {at}"))
+            wanted = "zero or more" if least == 0 else "more than zero" if least > 0 else "a finite number"
+            raise CaseError(InputError(key, f"expected {wanted}, got {values[node]:g} at {at}"))
         return values * factor
 
 
@@ -110,7 +121,7 @@ def _form(value: object) -> str:
     return "dependence" if isinstance(value, (Mapping, Dependence)) else "number"
 
 
-def _constant_or_dependence(constant: Any) -> Any:
+def constant_or_dependence(constant: Any) -> Any:
     """Return the type of a coefficient that is a constant of this type, or depends on the state."""
     return Annotated[
         Annotated[constant, Tag("number")] | Annotated[Dependence, Tag("dependence")],
@@ -126,7 +137,7 @@ class Contact(Part):
         description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
         "as in fretting",
     )
-    friction: _constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+    friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
         default=0.0, description="mu"
     )
     transverse_friction: Number = Field(
@@ -188,7 +199,7 @@ class WearLaw(Part):
     energy of friction, `energy`, beta~ = energy mu.
     """
 
-    coefficient: _constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
+    coefficient: constant_or_dependence(Annotated[float | None, Unit("")]) = Field(  # type: ignore[valid-type]
         default=None, description="beta~, in (mm/s) MPa^-b (mm/s)^-a"
     )
     beta: Annotated[float | None, Unit("")] = Field(default=None, description="in the same unit; beta~ = beta mu^b")

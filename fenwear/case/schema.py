@@ -13,9 +13,10 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import Body, Geometry, Material, Model
+from fenwear.case.bodies import Body, Geometry, Model
 from fenwear.case.course import Output, Program, Run
 from fenwear.case.laws import Contact, Dependence, Stick, Wear
+from fenwear.case.materials import Material
 from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
 from fenwear.case.quantities import Part
 from fenwear.case.thermal import Heat
@@ -128,6 +129,18 @@ class Case(Part):
         return problems
 
     @property
+    def initial_materials(self) -> dict[str, Material]:
+        """The materials as they are at the initial temperature, with constants."""
+        start = 0.0 if self.heat is None else self.heat.initial
+        return {name: material.at(start, f"materials.{name}") for name, material in self.materials.items()}
+
+    @property
+    def warming(self) -> bool:
+        """Whether a property of a material that is used depends on the temperature."""
+        used = {*self.punch.regions.values(), *self.strip.regions.values()}
+        return any(self.materials[name].dependent for name in used)
+
+    @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
         return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
@@ -154,6 +167,12 @@ class Case(Part):
                 f"{key}: depends on the temperature T, which a case without the table heat does not know"
                 for key, value in given.items()
                 if isinstance(value, Dependence) and value.law is None and value.depends_on("T")
+            ]
+            problems += [
+                f"materials.{name}.{key}: depends on the temperature T, which a case without the table heat does not "
+                "know"
+                for name, material in self.materials.items()
+                for key in material.dependent
             ]
         problems += self._region_problems()
         friction = self.contact.friction
@@ -223,6 +242,9 @@ class Case(Part):
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes,
             "run.integration: expected 'explicit' or 'jump'": self.run.integration == "implicit",
+            "stick.force: expected none for a motion that turns": (
+                self.stick.force is not None and isinstance(self.motion, Oscillation)
+            ),
         }
         return [f"{problem} with contact.law = 'coulomb'" for problem, so in wrong.items() if so]
 

@@ -94,6 +94,11 @@ class Heat(Part):
         )
     )
 
+    property_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.02,
+        description="change of a material's property with the temperature, over itself, after which the bodies are "
+        "made anew with it",
+    )
     # Finer than 1e-8 the basis, found by squares, would be made of rounding.
     reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
         default=3e-5, description="of the reduced operator's basis, relative"

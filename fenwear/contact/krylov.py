@@ -36,29 +36,48 @@ def iterative(
     Raises:
         LinAlgError: the sparse matrix is singular. The solution operator raises NotSolvedError.
     """
-    size = near.shape[0]
     try:
         factor = splu(near)
     except RuntimeError as error:  # SuperLU's way of saying that it is singular
         raise np.linalg.LinAlgError("singular matrix") from error
-    matrix = LinearOperator((size, size), matvec=multiply, dtype=float)
-    preconditioner = LinearOperator((size, size), matvec=factor.solve, dtype=float)
+    return lambda b: gmres_solution(multiply, factor.solve, b, count)
 
-    def solve(b: Array) -> Array:
-        iterations = 0
 
-        def note(_residual: float) -> None:
-            nonlocal iterations
-            iterations += 1
+def gmres_solution(
+    multiply: Callable[[Array], Array],
+    precondition: Callable[[Array], Array],
+    b: Array,
+    count: Callable[[int], None],
+) -> Array:
+    """Return the solution of a square system (size,).
 
-        x, failed = gmres(
-            matrix, b, rtol=ACCURACY, restart=min(RESTART, size), maxiter=RESTARTS, M=preconditioner, callback=note,
-            callback_type="pr_norm",
-        )  # fmt: skip
-        count(iterations)
-        if failed or not np.isfinite(x).all():
-            raise NotSolvedError
-        result: Array = x
-        return result
+    Args:
+        multiply: The product with its matrix.
+        precondition: That with a matrix near its inverse.
+        b: Right-hand side (size,).
+        count: Told of the iterations.
 
-    return solve
+    Raises:
+        NotSolvedError: the accuracy was not reached.
+    """
+    shape, iterations = (len(b), len(b)), 0
+
+    def note(_residual: float) -> None:
+        nonlocal iterations
+        iterations += 1
+
+    x, failed = gmres(
+        LinearOperator(shape, matvec=multiply, dtype=float),
+        b,
+        rtol=ACCURACY,
+        restart=min(RESTART, len(b)),
+        maxiter=RESTARTS,
+        M=LinearOperator(shape, matvec=precondition, dtype=float),
+        callback=note,
+        callback_type="pr_norm",
+    )
+    count(iterations)
+    if failed or not np.isfinite(x).all():
+        raise NotSolvedError
+    result: Array = x
+    return result

@@ -1,8 +1,11 @@
-"""Large wear: the run goes on with meshes that follow the worn shape.
+"""What changes slowly: the run goes on with meshes that follow the worn shape, and with properties of its temperature.
 
 Small wear is an offset of the gap. When it grows past a share of the elements' height at the contact,
 both meshes move by the depths worn so far, all operators are made anew, and temperatures keep their
 place in space: theta(x + s) = theta + grad theta . s at a node that moves by s.
+
+Where properties of materials depend on the temperature, the bodies are made anew, on the same meshes, at the end of a
+cycle after which one has changed by more than heat.property_tolerance: see `fenwear.assembly.warmed`.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, preparation
+from fenwear.assembly import Tribosystem, assemble, outwarmed, preparation, warmed_system
 from fenwear.compat import interpolation_points
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
@@ -33,7 +36,7 @@ def follow(
     start: RunState | None = None,
     adapt: Callable[[Tribosystem], Tribosystem] = lambda system: system,
 ) -> Iterator[Block]:
-    """Yield the blocks of a run whose meshes follow large wear; collective. Each block knows its system.
+    """Yield the blocks of a run whose bodies follow large wear and temperature; collective. Each knows its system.
 
     Args:
         system: The assembled problem.
@@ -48,14 +51,27 @@ def follow(
     state = start
     while True:
         if state is not None and system.outworn(state.worn):  # a run may also go on from just there
-            moved = adapt(assemble(system.case, system.comm, state.worn, heat=preparation(system)))
+            warmed = None if state.temperature is None else state.temperature.temperatures()
+            again = assemble(system.case, system.comm, state.worn, heat=preparation(system), warmed=warmed)
+            moved = adapt(again)
             state = replace(state, temperature=_carried(state.temperature, moved))
             system = moved
-        for block in integrate(system, state, lambda now: system.outworn(now.worn)):  # noqa: B023  (used at once)
+        elif state is not None and state.temperature is not None and _is_warm(system, state):
+            system = adapt(warmed_system(system, state.temperature))
+
+        def leave(now: RunState, own: Tribosystem = system) -> bool:
+            return own.outworn(now.worn) or _is_warm(own, now)
+
+        for block in integrate(system, state, leave):
             yield block
             state = block.end
-        if state is None or not system.outworn(state.worn):
+        if state is None or not leave(state):
             return
+
+
+def _is_warm(system: Tribosystem, state: RunState) -> bool:
+    """Return whether a whole cycle ends at temperatures for which the properties are to be taken anew; collective."""
+    return state.half_cycle % system.motion.half_cycles == 0 and outwarmed(system, state.temperature)
 
 
 def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:

@@ -36,7 +36,7 @@ from functools import reduce
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, with_reduced_heat
+from fenwear.assembly import Tribosystem, property_change, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, Passing
@@ -50,6 +50,7 @@ from fenwear.sliding.wear import Worn, WornLayer
 
 GAMMA = 1 - np.sqrt(0.5)
 ORDER = 2
+WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
 PARTS = 8  # of a cycle that does not converge as a whole
 SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
 
@@ -116,7 +117,7 @@ class Estimate:
 
 
 class _Jumps:
-    """Steps of as many cycles as the tolerance allows."""
+    """Steps of as many cycles as the tolerance allows, and the materials whose properties change with the warmth."""
 
     def __init__(self, stepper: _Stepper, tolerance: float) -> None:
         self.stepper, self.tolerance = stepper, tolerance
@@ -137,7 +138,8 @@ class _Jumps:
                 length = max(1, tried // 4)
                 continue
             factor = SAFETY * (tolerance / max(estimate.largest, 1e-300)) ** (1 / (ORDER + 1))
-            if estimate.largest <= tolerance or tried == 1:
+            warmed = tried > 1 and property_change(stepper.system, end.temperature) > WARMED
+            if (estimate.largest <= tolerance and not warmed) or tried == 1:
                 break
             # A half is half made already.
             length = max(1, int(tried * min(0.5, max(LEAST, factor))))

@@ -8,6 +8,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, steady_exchange
+from fenwear.cycle.steady import check_constant_materials
 from fenwear.errors import CaseError, InputError
 
 DIRECTIONS = (-1, 1)
@@ -38,9 +39,11 @@ def monotonic(system: Tribosystem) -> Monotonic:
 
     Raises:
         CaseError: the case has no heat, or a body loses heat nowhere.
+        ConvergenceError: properties of materials depend on the temperature.
     """
     if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
+    check_constant_materials(system)
     speed = system.motion.mean_speed
     exchange = steady_exchange(system, [d * speed for d in DIRECTIONS])
     pressures = [system.optimum(d).pressure for d in DIRECTIONS]

@@ -44,6 +44,8 @@ def stability_number(system: Tribosystem) -> float:
     largest = 0.0
     for d in np.unique(directions):
         phase = int(np.argmax(np.where(directions == d, most, -1.0)))
+        if not right[phase].any():  # nothing wears
+            continue
         interface, ratio = system.interfaces[phase], ratios[phase]
         matrix = np.zeros((n + r, n + r))
         matrix[:n, :n] = interface.compliance(ratio) / scale

@@ -21,7 +21,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
@@ -29,7 +28,8 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import WornShape
+from fenwear.contact.operators import Operator
+from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.cycle.coupled import Coupled
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
@@ -117,71 +117,63 @@ class _SteadyInequality:
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
         self.lengths = system.mode_lengths
         self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
-        shape = rigid.rigid_normal / self.lengths
-        size = m * n + n + m * r
-        self.matrix = np.zeros((size, size))
-        self.offset = np.zeros(size)
-        omega = slice(m * n, m * n + n)
-        last = m * n + n
-        for k, own in enumerate(system.interfaces):
-            rows = slice(k * n, (k + 1) * n)
-            self.matrix[rows, omega] = np.eye(n)
-            if k > 0:
-                self.matrix[rows, last + (k - 1) * r : last + k * r] = shape
-            moved = own.pair.initial_gap - system.pair.initial_gap
-            self.offset[rows] = (own.load_gap + moved) / self.gap_scale
-            self.offset[last + k * r : last + (k + 1) * r] = own.rigid.resultant / self.moment[:, 0]
+        self.omega = slice(m * n, m * n + n)
         self._slide(system.friction_ratios())
+        size = self.equations.size
+        self._cold: Array = np.zeros(size)  # what the rows have besides the unknowns, without heat
+        for k, own in enumerate(system.interfaces):
+            moved = own.pair.initial_gap - system.pair.initial_gap
+            self._cold[k * n : (k + 1) * n] = (own.load_gap + moved) / self.gap_scale
+            last = m * n + n + k * r
+            self._cold[last : last + r] = own.rigid.resultant / self.moment[:, 0]
+        self.offset: Array = self._cold
         # At its upper bound a variational inequality wants F <= 0: the wear balance with its sign turned.
-        self.matrix[omega, size - r :] = shape
-        self.omega = omega
         lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
         lower[: m * n] = 0.0
-        upper[omega] = OPEN
-        self._without_heat = (self.matrix.copy(), self.offset.copy())
+        upper[self.omega] = OPEN
         self.x = self._start()
         self._solved = False
-        self._known: tuple[Array, NDArray[np.int64], WornShape] | None = None  # the last derivative, and what it is of
         self.inequality = Inequality(
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
 
     def _slide(self, ratios: Sequence[Array]) -> None:
-        """Fill in what friction changes."""
-        n, r, last = self.n, self.r, self.m * self.n + self.n
-        for k, (own, friction_ratio) in enumerate(zip(self.system.interfaces, ratios, strict=True)):
-            rows, balance = slice(k * n, (k + 1) * n), slice(last + k * r, last + (k + 1) * r)
-            self.matrix[rows, rows] = own.compliance(friction_ratio) * (self.p_scale / self.gap_scale)
-            self.matrix[balance, rows] = own.rigid.equilibrium(friction_ratio) * self.p_scale / self.moment
-        self.ratios = list(ratios)
+        """Take friction."""
+        made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
+        compliances, balances = [], []
+        for own, ratio in zip(self.system.interfaces, ratios, strict=True):
+            key = (id(own.gap_by_force), np.asarray(ratio + own.pair.normal).tobytes())
+            if key not in made:
+                made[key] = own.compliance(ratio) * (self.p_scale / self.gap_scale)
+            compliances.append(made[key])
+            balances.append(own.rigid.equilibrium(ratio) * self.p_scale / self.moment)
+        modes = self.system.rigid.rigid_normal / self.lengths
+        self.equations = ShapeEquations(compliances, modes, np.array(balances))
+        self._known: tuple[list[csr_array], Array, Operator] | None = None  # the last derivative, and what it is of
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""
         self.wear = self.system.wear.phases(conditions)
-        self.matrix[:], self.offset[:] = self._without_heat
-        self._slide(self.system.friction_ratios(conditions))
-        self._without_heat = (self.matrix.copy(), self.offset.copy())
+        if not self.system.friction.constant:
+            self._slide(self.system.friction_ratios(conditions))
 
     def _residual(self, x: Array) -> Array:
         m, n = self.m, self.n
-        f = self.matrix @ x + self.offset
+        f = self.equations.multiply(x) + self.offset
         pressure = x[: m * n].reshape(m, n) * self.p_scale
         f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
         return f
 
-    def _jacobian(self, x: Array) -> WornShape:
-        m, n = self.m, self.n
-        pressure = x[: m * n].reshape(m, n)
-        left, right = self.wear.border(pressure * self.p_scale)
+    def _jacobian(self, x: Array) -> Operator:
+        pressure = x[: self.m * self.n].reshape(self.m, self.n)
+        slopes = self.wear.slopes(pressure * self.p_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
-        opened = m * n + np.flatnonzero(pressure.max(axis=0) <= 0)
-        if self._known is not None and all(map(np.array_equal, self._known[:2], (right, opened))):
-            return self._known[2]
-        jacobian, opens = self.matrix.copy(), csr_array(left[0])
-        for k in range(m):
-            jacobian[self.omega, k * n : (k + 1) * n] -= opens @ right[k] * (self.p_scale / self.wear_scale)
-        jacobian[opened, opened] += DRIVE
-        self._known = (right, opened, WornShape(jacobian, m, n))
+        held = np.where(pressure.max(axis=0) <= 0, DRIVE, 0.0)
+        known = self._known
+        if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):
+            return known[2]
+        scaled = [slope * (self.p_scale / self.wear_scale) for slope in slopes]
+        self._known = (slopes, held, self.equations.derivative(scaled, held))
         return self._known[2]
 
     def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
@@ -192,11 +184,14 @@ class _SteadyInequality:
             coupling: Thermal gap from the pressures of the phases (m, n, m, n), mm/MPa.
         """
         m, n = self.m, self.n
-        self.matrix[:], self.offset[:] = self._without_heat
-        self._known = None
-        if thermal is not None and coupling is not None:
+        self.offset = self._cold
+        if thermal is not None:
+            self.offset = self._cold.copy()
             self.offset[: m * n] += thermal.ravel() / self.gap_scale
-            self.matrix[: m * n, : m * n] += coupling.reshape(m * n, m * n) * (self.p_scale / self.gap_scale)
+        if coupling is not None or self.equations.coupling is not None:
+            scale = self.p_scale / self.gap_scale
+            by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
+            self.equations, self._known = self.equations.with_heat(by_heat), None
         if self.m == 1 or not self._solved:
             self.x = self._touching(self.x)
         self.x = self.inequality.solve(self.x, near=self._solved)
@@ -208,7 +203,7 @@ class _SteadyInequality:
     def _start(self) -> Array:
         """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""
         m, n, r = self.m, self.n, self.r
-        x = np.zeros(len(self.offset))
+        x = np.zeros(self.equations.size)
         if m == 1:
             optimum = self.system.optimum(self.system.motion.directions[0])
             x[:n] = optimum.pressure / self.p_scale
@@ -217,18 +212,22 @@ class _SteadyInequality:
         else:
             x[: m * n] = 1.0
             if r:
-                shape = self.system.rigid.rigid_normal / self.lengths
-                x[-r:] = np.linalg.lstsq(shape, np.full(n, float(m)), rcond=None)[0]
+                x[-r:] = np.linalg.lstsq(self.equations.modes, np.full(n, float(m)), rcond=None)[0]
         return x
 
     def _touching(self, x: Array) -> Array:
         """Return x with the shape that carries its first pressure, open where the motion leaves the wear behind."""
         n = self.n
         x = x.copy()
-        x[self.omega] = -(self.matrix[:n, : self.m * n] @ x[: self.m * n] + self.offset[:n])
-        outrun = (x[:n] == 0) & (self.matrix[self.omega, len(x) - self.r :] @ x[len(x) - self.r :] < 0)
+        pressure, _, _, velocity = self.equations.parts(x)
+        outrun = (x[:n] == 0) & (self.equations.modes @ velocity < 0)
+        x[self.omega] = -(self.equations.gaps(pressure)[0] + self.offset[:n])
         x[self.omega] = np.where(outrun & (self.m == 1), OPEN, x[self.omega])
         return x
+
+
+def _same(one: csr_array, other: csr_array) -> bool:
+    return all(np.array_equal(getattr(one, n), getattr(other, n)) for n in ("indptr", "indices", "data"))
 
 
 def steady(system: Tribosystem) -> Steady:
@@ -250,6 +249,22 @@ def steady(system: Tribosystem) -> Steady:
     return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
 
 
+def check_constant_materials(system: Tribosystem) -> None:
+    """Raise where the properties of materials follow the temperature: a state at once would have to find both.
+
+    Raises:
+        ConvergenceError: they do.
+    """
+    if system.made_from is not None and system.case.warming:
+        used = sorted({*system.case.punch.regions.values(), *system.case.strip.regions.values()})
+        name = next(name for name in used if system.case.materials[name].dependent)
+        key = f"materials.{name}.{system.case.materials[name].dependent[0]}"
+        raise ConvergenceError(
+            f"no steady state is solved for at once where {key} depends on the temperature: `run` with "
+            'run.integration = "jump" and run.periodic_within comes to it'
+        )
+
+
 def _check_exists(system: Tribosystem) -> None:
     """Raise where the strip's wear never comes to a shape that stays, or no one rigid motion can follow it."""
     if system.track_deepens:
@@ -263,6 +278,7 @@ def _check_exists(system: Tribosystem) -> None:
             f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
             "slid, as long as it slides. Follow the wear by `run`"
         )
+    check_constant_materials(system)
     if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
         raise ConvergenceError(
             "no cyclic steady state is solved for with a pressure_threshold: below it any pressure stays. Follow the "

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import ufl
+from dolfinx import fem
 
-from fenwear.bodies.material import region_field
+from fenwear.arrays import Array
+from fenwear.bodies.material import Property, region_field
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Material
 
@@ -37,16 +41,34 @@ class ConductionLaw:
         return (ufl.tr(conductivity) / shape[0] if shape else conductivity) / self.capacity
 
 
-def isotropic_conduction(body: BodyMesh, regions: dict[str, str], materials: dict[str, Material]) -> ConductionLaw:
+def isotropic_conduction(
+    body: BodyMesh, regions: Mapping[str, str], materials: Mapping[str, Material], theta: fem.Function | None = None
+) -> ConductionLaw:
     """Return the conduction law of a body's regions.
 
     Args:
         body: The body.
         regions: Name of the material of each region.
-        materials: By their names.
+        materials: By their names; with constants alone where no temperature is given.
+        theta: Temperature that the properties are taken at, K.
+
+    Raises:
+        CaseError: a property is not positive at a temperature.
     """
-    of_region = {region: materials[name] for region, name in regions.items()}
-    capacity = {r: (m.density or 0.0) * (m.heat_capacity or 0.0) for r, m in of_region.items()}
-    return ConductionLaw(
-        region_field(body, {r: m.conductivity or 0.0 for r, m in of_region.items()}), region_field(body, capacity)
-    )
+    conductivity: dict[str, Property] = {}
+    capacity: dict[str, Property] = {}
+    for region, name in regions.items():
+        m, key = materials[name], f"materials.{name}"
+        depends = m.dependent if theta is not None else []
+        conductivity[region] = (
+            partial(m.values, "conductivity", key=key) if "conductivity" in depends else m.conductivity or 0.0
+        )
+        capacity[region] = (
+            partial(_capacity, m, key) if "heat_capacity" in depends else (m.density or 0.0) * (m.heat_capacity or 0.0)
+        )
+    return ConductionLaw(region_field(body, conductivity, theta), region_field(body, capacity, theta))
+
+
+def _capacity(material: Material, key: str, theta: Array) -> Array:
+    """Return rho c at temperatures (n,), N/(mm² K)."""
+    return (material.density or 0.0) * material.values("heat_capacity", theta, key)

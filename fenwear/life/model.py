@@ -109,6 +109,10 @@ class Model:
         if self.case.program is not None:
             message = "not followed here; expected a case of constant loads and motion, or `run`"
             raise CaseError(InputError("program", message))
+        for name, material in self.case.materials.items():
+            for key in material.dependent:
+                message = "depends on the temperature: not followed here; expected a constant"
+                raise CaseError(InputError(f"materials.{name}.{key}", message))
         laws = {"contact.friction": self.case.contact.friction}
         for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
             laws[f"wear.{body}.coefficient"] = None if law is None else law.coefficient

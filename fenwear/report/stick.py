@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
+from fenwear.report import stick_maps
 from fenwear.report.figures import FOLDER
 from fenwear.report.html_page import picture, render
 from fenwear.report.key_numbers import read_summary
 from fenwear.report.style import BLUE, GREY, RED, contact_axis, legend_beside, panels, reference_line, shades
+from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.reading import open_history
@@ -34,10 +36,13 @@ LABELS = {
     "accumulated_energy_mJ": ("work of friction in all cycles", "mJ"),
     "energy_ratio": ("energy ratio of the last cycle", ""),
     "contact_width_mm": ("width in contact", "mm"),
+    "contact_area_mm2": ("area in contact", "mm²"),
     "stick_width_mm": ("width that sticks all through the cycle", "mm"),
+    "stick_area_mm2": ("area that sticks all through the cycle", "mm²"),
     "wear_max_mm": ("largest worn depth of the punch", "mm"),
     "wear_strip_max_mm": ("largest worn depth of the strip", "mm"),
     "worn_area_punch_mm2": ("cross-section worn off the punch", "mm²"),
+    "worn_volume_punch_mm3": ("volume worn off the punch", "mm³"),
     "largest_energy_balance_error": ("largest error of the energy balance, over its largest term", ""),
     "largest_jump_error": ("largest estimated error of a jump's depths", ""),
     "steps_per_half_cycle": ("time steps of a half-cycle", ""),
@@ -47,7 +52,7 @@ LABELS = {
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
     """Return the places of recorded cycles at even shares of the wear, the first and the last among them."""
-    depth = (history.wear.max("x") + history.wear_strip.max("x_strip")).values
+    depth = (history.wear.max(history.wear.dims[1:]) + history.wear_strip.max(history.wear_strip.dims[1:])).values
     course = depth if depth[-1] > depth[0] else np.arange(len(depth), dtype=float)
     return sorted({int(np.abs(course - target).argmin()) for target in np.linspace(course[0], course[-1], count)})
 
@@ -69,7 +74,7 @@ def loops(history: xarray.Dataset) -> Figure:
     whole.set_xlabel("displacement of the strip (µm)")
     beyond.set_xlabel("displacement less that of full stick at the same force (µm)")
     for ax in (whole, beyond):
-        ax.set_ylabel("tangential force (N)")
+        ax.set_ylabel(f"tangential force ({history.tangential_force.units.replace(' ', ' ')})")
     legend_beside(whole, "cycle")
     return figure
 
@@ -205,6 +210,26 @@ FIGURES: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
     "shape": (shapes, "Worn depth and pressure", "Worn depths of both bodies and pressure along x, a line a cycle."),
 }
 
+IN_SOLIDS: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
+    "loops": FIGURES["loops"],
+    "zones": (stick_maps.zones, "Stick and slip over the cycle", "Where nodes stick and slip at four times."),
+    "tractions": (stick_maps.tractions, "Tangential traction", "Its size and direction at four times."),
+    "cuts": (
+        stick_maps.cuts,
+        "Traction along the sliding",
+        "On a cut through the middle, between plus and minus mu p.",
+    ),
+    "sliding": (stick_maps.sliding_map, "Slip and work of friction", "Slip and work of friction in a cycle."),
+    "energy": FIGURES["energy"],
+    "surface_stress": (stick_maps.stresses, "Stress in the strip's surface", "Its largest value in a cycle."),
+    "scar": (stick_maps.scar, "Worn depth", "Worn depth of both bodies at the end."),
+    "shape": (
+        lambda history: stick_maps.shapes(history, chosen(history)),
+        "Worn depth and pressure along the sliding",
+        "Worn depths of both bodies and pressure on a cut through the middle, a line a cycle.",
+    ),
+}
+
 
 def write_stick_report(directory: Path) -> list[Path]:
     """Draw the figures of a run with stick and write its report.html; return the files.
@@ -219,7 +244,7 @@ def write_stick_report(directory: Path) -> list[Path]:
     paths, pictures = [], []
     with writing(directory):
         folder.mkdir(exist_ok=True)
-        for name, (draw, caption, alt) in FIGURES.items():
+        for name, (draw, caption, alt) in (IN_SOLIDS if model_of(history) == "solid" else FIGURES).items():
             path = folder / f"{name}.png"
             draw(history).savefig(path, dpi=150)
             paths.append(path)

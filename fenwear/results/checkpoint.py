@@ -16,6 +16,7 @@ from typing import Any
 
 import adios4dolfinx
 import numpy as np
+from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
@@ -39,6 +40,7 @@ NUMBERS, WEAR, STATES = (
     ("pressure", "gap", "rigid"),
 )
 TOTALS = ("totals", "energy")
+WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
 BULK = "bulk"  # temperature of a closed track, NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
@@ -64,13 +66,21 @@ def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
     on_root(comm, lambda: _begin(new, system, state))
     if state.temperature is not None:
         for basis, function in zip(state.temperature.bases, state.temperature.functions(), strict=True):
-            path = new / f"temperature_{basis.body.body.name}.bp"
-            size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
-            on_root(comm, partial(check_room, new, size))
-            with writing_together(comm, path):
-                adios4dolfinx.write_function_on_input_mesh(path, function)
+            _write_function(comm, new, f"temperature_{basis.body.body.name}", function)
+    if system.bodies.warmed is not None and system.bodies.heat is not None:
+        for body, taken in zip(system.bodies.heat, system.bodies.warmed, strict=True):
+            _write_function(comm, new, f"{WARMED}_{body.body.name}", body.function(taken))
     comm.Barrier()
     on_root(comm, lambda: swap(directory))
+
+
+def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function) -> None:
+    """Write a temperature; collective."""
+    path = new / f"{name}.bp"
+    size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
+    on_root(comm, partial(check_room, new, size))
+    with writing_together(comm, path):
+        adios4dolfinx.write_function_on_input_mesh(path, function)
 
 
 def _begin(new: Path, system: Tribosystem, state: RunState) -> None:
@@ -122,6 +132,22 @@ def followed(directory: Path, system: Tribosystem) -> Worn | None:
     return Worn(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
 
 
+def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
+    """Return the temperatures that the materials' properties of a checkpoint are taken at (owned,) each; collective.
+
+    None where they are those of the initial temperature.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is damaged.
+    """
+    comm, bodies = system.comm, system.bodies.heat
+    folder = on_root(comm, lambda: find(directory))
+    if bodies is None or not on_root(comm, (folder / f"{WARMED}_punch.bp").exists):
+        return None
+    punch, strip = (_read_temperature(folder, body, WARMED) for body in bodies)
+    return punch, strip
+
+
 def swap(directory: Path) -> None:
     """Let the new checkpoint take the place of the one before; for one rank.
 
@@ -160,12 +186,12 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, *numbers)
 
 
-def _read_temperature(folder: Path, body: HeatBody) -> Array:
+def _read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
     """Return the temperatures of this rank's own nodes of a body; collective."""
     comm, function = body.body.mesh.comm, body.function(body.initial())
     readable = True
     try:
-        adios4dolfinx.read_function(folder / f"temperature_{body.body.name}.bp", function)
+        adios4dolfinx.read_function(folder / f"{name}_{body.body.name}.bp", function)
     except (KeyError, OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
         readable = False
     values = function.x.array[: body.owned].copy()

@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.interface import ContactPair
 from fenwear.results.subcells import linear_cells
-from fenwear.sliding.chart import sliding_chart
+from fenwear.sliding.chart import SlidingChart, sliding_chart
+from fenwear.sliding.field import SlidingField
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 
@@ -66,13 +68,25 @@ def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     return cells[(cells >= 0).all(axis=1)]
 
 
+def border_nodes(surface: ContactSurface) -> NDArray[np.int64]:
+    """Return the pressure nodes at the border of a surface: edges, or ends of them, that belong to one facet."""
+    cells = surface_cells(surface)
+    ends = [cells] if surface.dim == 2 else [cells, np.roll(cells, -1, axis=1)]
+    edges = np.sort(np.stack(ends, axis=-1).reshape(-1, surface.dim - 1), axis=1)
+    single, counts = np.unique(edges, axis=0, return_counts=True)
+    return np.unique(single[counts == 1])
+
+
 def surface_columns(placed: Placed) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
-    pair = placed.pair
-    columns = _columns(placed, pair.punch, "")
-    if placed.strip_wears:
-        columns |= _columns(placed, pair.strip, "_strip")
-    return columns
+    return columns_of_pair(placed.pair, placed.sliding.field, with_strip=placed.strip_wears)
+
+
+def columns_of_pair(pair: ContactPair, field: SlidingField, *, with_strip: bool) -> dict[str, Column]:
+    """Return coordinates and facets of the punch's contact surface, and of the strip's own, by name."""
+    chart = sliding_chart(field, pair)
+    columns = _columns(chart, pair.punch, "")
+    return columns | _columns(chart, pair.strip, "_strip") if with_strip else columns
 
 
 def coordinate_names(end: str, dim: int) -> tuple[str, ...]:
@@ -80,7 +94,7 @@ def coordinate_names(end: str, dim: int) -> tuple[str, ...]:
     return tuple(f"{axis}{end}" for axis in (("r", "z") if dim == 2 else ("x", "y", "z")))
 
 
-def _columns(placed: Placed, surface: ContactSurface, end: str) -> dict[str, Column]:
+def _columns(chart: SlidingChart, surface: ContactSurface, end: str) -> dict[str, Column]:
     node, facet, corner = f"node{end}", f"facet{end}", f"corner{end}"
     names = coordinate_names(end, surface.dim)
     columns = {
@@ -88,7 +102,7 @@ def _columns(placed: Placed, surface: ContactSurface, end: str) -> dict[str, Col
         for k, name in enumerate(names)
     }
     if surface.dim == 3:
-        along, across = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x).T
+        along, across = chart.coordinates(surface.x).T
         columns[f"along{end}"] = Column((node,), along, _mm("place along the sliding"))
         columns[f"across{end}"] = Column((node,), across, _mm("place across the sliding"))
     cells, kind = surface_cells(surface), "edge" if surface.dim == 2 else "face"

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
@@ -129,6 +130,18 @@ class PhasesWear:
             for k, slope in enumerate(self.strip.slope(pressure)):
                 right[k, strip:] = self.pairs[k].deposit.toarray() * slope
         return self._left, right
+
+    def slopes(self, pressure: Array) -> list[csr_array]:
+        """Return the gap opened in the first phase by unit pressures of each phase (n, n), the same as L_1 R_k."""
+        m, n = pressure.shape
+        found = [csr_array((n, n)) for _ in range(m)]
+        if self.punch is not None:
+            found = [csr_array(diags_array(slope)) for slope in self.punch.slope(pressure)]
+        if self.strip is not None:
+            material = self.pairs[0].material
+            for k, slope in enumerate(self.strip.slope(pressure)):
+                found[k] = csr_array(found[k] + material @ (self.pairs[k].deposit @ diags_array(slope)))
+        return found
 
     @cached_property
     def _left(self) -> Array:

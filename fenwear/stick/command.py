@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.case import Case
-from fenwear.errors import CaseError, InputError
+from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape, stick_zone
 from fenwear.stick.run import check_touching
@@ -42,26 +42,26 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
     """Return the final shape of a case's partial slip, and its key numbers; collective.
 
     Raises:
-        CaseError: a model that is not plane, or what only the geometry can tell.
+        CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
-    if case.model.kind != "plane":
-        raise CaseError(
-            InputError("model.kind", "`steady` of contact with stick is for plane models; Python takes solids")
-        )
     rig = make_rig(case)
     check_touching(rig)
     found = final_shape(rig, stick_zone(rig))
-    x, weights = rig.interface.middle.pair.x, rig.weights
+    solid = case.model.kind == "solid"
+    pair, weights = rig.interface.middle.pair, rig.weights
+    x = sliding_chart(rig.interface.sliding.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
     scar = x[found.depth > 0]
+    names = ("stick_area_mm2", "worn_volume_mm3") if solid else ("stick_width_mm", "worn_area_mm2")
+    places = {a: pair.punch.x[:, k].tolist() for k, a in enumerate("xyz")} if solid else {"x": pair.x.tolist()}
     numbers = {
-        "stick_width_mm": float(weights @ found.stick),
+        names[0]: float(weights @ found.stick),
         "scar_from_mm": float(scar.min()) if len(scar) else None,
         "scar_to_mm": float(scar.max()) if len(scar) else None,
         "largest_depth_mm": float(found.depth.max()),
-        "worn_area_mm2": float(weights @ found.depth),
+        names[1]: float(weights @ found.depth),
         "max_pressure_MPa": float(found.pressure.max()),
-        "x": x.tolist(),
+        **places,
         "pressure": found.pressure.tolist(),
         "depth": found.depth.tolist(),
     }
@@ -70,13 +70,16 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
 
 def final_text(numbers: dict[str, Any]) -> str:
     """Return the key numbers of a final shape for readers."""
+    solid = "worn_volume_mm3" in numbers
     scar = "no scar"
     if numbers["scar_from_mm"] is not None:
-        scar = f"scar from x = {numbers['scar_from_mm']:.4g} to {numbers['scar_to_mm']:.4g} mm"
+        axis = "along the sliding" if solid else "x ="
+        scar = f"scar from {axis} {numbers['scar_from_mm']:.4g} to {numbers['scar_to_mm']:.4g} mm"
+    stick = f"of {numbers['stick_area_mm2']:.4g} mm²" if solid else f"{numbers['stick_width_mm']:.4g} mm wide"
+    worn = f"{numbers['worn_volume_mm3']:.4g} mm³" if solid else f"{numbers['worn_area_mm2']:.4g} mm²"
     return (
-        f"  the stick zone, {numbers['stick_width_mm']:.4g} mm wide, carries all of the load in the end\n"
-        f"  {scar}, {1e3 * numbers['largest_depth_mm']:.4g} µm deep in both bodies together, "
-        f"{numbers['worn_area_mm2']:.4g} mm²\n"
+        f"  the stick zone, {stick}, carries all of the load in the end\n"
+        f"  {scar}, {1e3 * numbers['largest_depth_mm']:.4g} µm deep in both bodies together, {worn}\n"
         f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone: as high as nodes "
         "are near to them"
     )

@@ -13,6 +13,7 @@ from fenwear.stick.increment import advance
 from fenwear.stick.interface import Position, StickInterface
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
+from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.stick.wear import LocalWear
 
 
@@ -33,7 +34,7 @@ class Records:
         closing: Work of the pressure on gaps that close or open in the step (k,): of the step's size, it vanishes
             with it.
         punch_depth, strip_depth: Worn off each body in the step, at the contact nodes (k, n), mm.
-        strain: Of the strip's surface along x opposite each node (k, n).
+        strain: Of the strip's surface opposite each node, along and across the sliding (k, n, m).
         iterations: Newton steps (k,).
         unique: Whether the answer was the only one near (k,).
     """
@@ -114,6 +115,7 @@ class Rig:
     ) -> None:
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
         self.weights, self.watch = interface.middle.pair.weights, watch
+        self._gradient = surface_gradient(interface.middle.pair.punch)
 
     def watched(self, watch: Callable[[], None]) -> Rig:
         """Return the same, watched."""
@@ -219,18 +221,8 @@ class Rig:
             weights @ (state.pressure * state.approach),
             punch,
             strip,
-            self._surface_strain(state, position),
+            surface_strain(position, self._gradient, state.on_strip),
             float(state.iterations),
             state.unique,
         )
         return Records(*(np.asarray(value)[None] for value in values))
-
-    def _surface_strain(self, state: StickState, position: Position) -> Array:
-        """Return d u_x / dx of the strip's surface (n,) by differences between neighbours; in solids not known."""
-        x = position.pair.x
-        if position.frame.shape[2] == 3:
-            return np.full(len(x), np.nan)
-        order = np.argsort(x)
-        strain = np.empty(len(x))
-        strain[order] = np.gradient((position.reading @ state.on_strip)[order, 0], x[order])
-        return strain

@@ -67,10 +67,8 @@ class Step:
         self.mu = friction
         self.n, self.d = position.pair.normal.shape
         self.m = self.d - 1
-        strain = np.zeros_like(before.on_strip)
-        strain[:, 0] = imposed.strain * interface.strip_abscissae
         self.free_punch = imposed.loaded.on_punch
-        self.free_strip = imposed.loaded.on_strip + strain
+        self.free_strip = imposed.loaded.on_strip + imposed.strain * interface.bulk
         read, turn = position.reading, position.pair.placement.vectors
         now = position.in_frame(self.free_punch - turn(read @ self.free_strip))
         old = position.in_frame(before.on_punch - turn(read @ before.on_strip))

@@ -125,10 +125,20 @@ class StickInterface:
         return self._positions[0.0]
 
     @cached_property
-    def strip_abscissae(self) -> Array:
-        """X of what the strip was condensed onto (q,), mm, in the strip's own place."""
-        trace = self.middle.pair.strip.trace[:, 0]
-        return trace if self.moves else self.middle.pair.transfer @ trace
+    def bulk(self) -> Array:
+        """Displacement of what the strip was condensed onto by a unit bulk strain along x (q, d), mm.
+
+        A solid under stress along x alone gets narrower along y.
+        """
+        pair = self.middle.pair
+        x = pair.strip.trace if self.moves else pair.transfer @ pair.strip.trace
+        found = np.zeros_like(x)
+        found[:, 0] = x[:, 0]
+        if self.dim == 3:
+            materials = {} if self.case is None else self.case.materials
+            names = set() if self.case is None else set(self.case.strip.regions.values())
+            found[:, 1] = -x[:, 1] * (materials[names.pop()].poisson if len(names) == 1 else 0.0)
+        return found
 
     def position(self, offset: float) -> Position:
         """Return the place of the strip moved by this amount of its motion; collective where it is new."""

@@ -11,12 +11,14 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.results.surfaces import DIMENSIONS, Variable, columns_of_pair, on_mesh
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.jump import Cycle
+from fenwear.stick.strain import along_sliding, directions
 
 # name: (dimensions, units, long_name)
-VARIABLES = {
+VARIABLES: dict[str, Variable] = {
     "displacement": (("cycle", "step"), "mm", "displacement of the strip's supports at the end of the time step"),
     "tangential_force": (("cycle", "step"), "N", "tangential force on the strip"),
     "pressure": (("cycle", "step", "x"), "MPa", "contact pressure"),
@@ -36,11 +38,35 @@ VARIABLES = {
     "jump_error": (("cycle",), "1", "estimated error of the depths of the jump to the cycle, over what it wore"),
 }
 CONTACT_NODE = "position along the contact, from the centre of the geometry"
+# of solids: the name in a plane model, and name, unit and meaning instead
+IN_SOLIDS = {
+    "traction": ("traction", "MPa", "tangential traction on the punch, along the sliding"),
+    "slip": ("slip", "mm", "slip of the punch against the strip in the time step, along the sliding"),
+    "surface_stress": ("surface_stress", "MPa", "stress along the sliding in the strip's surface opposite each node"),
+    "worn_area": ("worn_volume", "mm3", "volume worn off the punch in the cycle"),
+    "worn_area_strip": ("worn_volume_strip", "mm3", "volume worn off the strip in the cycle"),
+    "stick_width": ("stick_area", "mm2", "area that sticks all through the cycle"),
+    "contact_width": ("contact_area", "mm2", "largest area in contact"),
+}
+ACROSS: dict[str, Variable] = {
+    "traction_across": (("cycle", "step", "x"), "MPa", "tangential traction on the punch, across the sliding"),
+    "slip_across": (("cycle", "step", "x"), "mm", "slip in the time step, across the sliding"),
+}
+
+
+def of_solids() -> dict[str, Variable]:
+    """Return what a solid has in place of the plane's variables of the same names, and as well."""
+    plane = {name: value for name, value in VARIABLES.items() if name in IN_SOLIDS or value[0][-1] in DIMENSIONS}
+    found = {}
+    for name, (dimensions, units, text) in {**plane, **ACROSS}.items():
+        new, unit, meaning = IN_SOLIDS.get(name, (name, units, text))
+        found[new] = (tuple(DIMENSIONS.get(d, d) for d in dimensions), unit, meaning)
+    return found
 
 
 @dataclass(frozen=True)
 class Row:
-    """The values of one kept cycle, by the names of `VARIABLES`."""
+    """The values of one kept cycle, by the names of `VARIABLES` and `ACROSS`."""
 
     number: int
     values: dict[str, Any]
@@ -55,12 +81,14 @@ def row_of(rig: Rig, case: Case, cycle: Cycle) -> Row:
     reach = float(np.ptp(records.displacement)) / 2
     most = float(np.abs(force).max())
     pair = rig.interface.middle.pair
+    turn = along_sliding(rig.interface.middle)
+    traction, slip = (np.einsum("nam,knm->akn", turn, v[order]) for v in (records.traction, records.slip))
     values: dict[str, Any] = {
         "displacement": records.displacement[order],
         "tangential_force": force[order],
         "pressure": records.pressure[order],
-        "traction": records.traction[order, :, 0],
-        "slip": records.slip[order, :, 0],
+        "traction": traction[0],
+        "slip": slip[0],
         "stick": records.sticking[order].astype(np.int8),
         "surface_stress": surface_stress(case, records)[order],
         "wear": cycle.worn.punch,
@@ -74,65 +102,107 @@ def row_of(rig: Rig, case: Case, cycle: Cycle) -> Row:
         "contact_width": float(((records.pressure > 0) @ weights).max()),
         "jump_error": cycle.error,
     }
+    if len(traction) > 1:
+        values |= {"traction_across": traction[1], "slip_across": slip[1]}
     return Row(cycle.number, values)
 
 
 def surface_stress(case: Case, records: Records) -> Array:
-    """Return sigma_xx in the strip's surface (k, n), MPa, from its strain along x and the pressure on it.
+    """Return the stress along the sliding in the strip's surface (k, n), MPa, from its strains and the pressure on it.
 
-    The law of the strip's material, with sigma_zz = -p: in plane strain
-    sigma_xx = E / (1 - nu²) eps_xx - nu / (1 - nu) p, in plane stress E eps_xx - nu p.
+    The law of the strip's material, with sigma_zz = -p: in a solid, and with eps_yy = 0 in plane strain,
+    sigma_xx = E / (1 - nu²) (eps_xx + nu eps_yy) - nu / (1 - nu) p, in plane stress E eps_xx - nu p.
     """
+    along = records.strain[:, :, 0]
     names = set(case.strip.regions.values())
-    if len(names) > 1 or case.model.kind != "plane":
-        return np.full(records.strain.shape, np.nan)
+    if len(names) > 1:
+        return np.full(along.shape, np.nan)
     material = case.materials[names.pop()]
     young, nu = material.young, material.poisson
-    if case.model.law == "strain":
-        return young / (1 - nu**2) * records.strain - nu / (1 - nu) * records.pressure
-    return young * records.strain - nu * records.pressure
+    if case.model.kind == "plane" and case.model.law == "stress":
+        return young * along - nu * records.pressure
+    both = along if case.model.kind == "plane" else along + nu * records.strain[:, :, 1]
+    return young / (1 - nu**2) * both - nu / (1 - nu) * records.pressure
 
 
 def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
     """Return the kept cycles as a data set."""
-    pair = rig.interface.middle.pair
-    data = {
-        name: (dimensions, np.array([row.values[name] for row in rows]), {"units": units, "long_name": text})
-        for name, (dimensions, units, text) in VARIABLES.items()
-    }
+    solid = case.model.kind == "solid"
+    data = {}
+    for name, (dimensions, units, text) in {**VARIABLES, **(ACROSS if solid else {})}.items():
+        values = np.array([row.values[name] for row in rows])
+        new, unit, meaning = IN_SOLIDS.get(name, (name, units, text)) if solid else (name, units, text)
+        over = tuple(DIMENSIONS.get(d, d) for d in dimensions) if solid else dimensions
+        place = on_mesh(over, 3) if solid else {}
+        data[new] = (over, values, {"units": _turned(unit, new, rig), "long_name": meaning, **place})
     steps = rig.program.steps
     coordinates: dict[str, Any] = {
         "cycle": ("cycle", [row.number for row in rows], {"units": "1", "long_name": "cycles done before"}),
         "fraction": ("step", [s.fraction for s in steps], {"units": "1", "long_name": "fraction of the cycle"}),
         "half_cycle_of_step": ("step", [s.half_cycle + 1 for s in steps], {"units": "1", "long_name": "half-cycle"}),
+        **_nodes(rig),
+    }
+    attributes = {
+        "title": case.title,
+        "law": "coulomb",
+        "friction": float(rig.friction[0]),
+        "model": case.model.kind,
+    }
+    return xarray.Dataset(data, coordinates, attributes)
+
+
+def _turned(unit: str, name: str, rig: Rig) -> str:
+    """Return the unit of a variable where the strip turns: by rad, against a torque."""
+    turns = any(rig.interface.sliding.field.turn)
+    return {"displacement": "rad", "tangential_force": "N mm"}.get(name, unit) if turns else unit
+
+
+def _nodes(rig: Rig) -> dict[str, Any]:
+    """Return where the nodes of both surfaces are."""
+    pair = rig.interface.middle.pair
+    if pair.normal.shape[1] == 3:
+        found: dict[str, Any] = dict(columns_of_pair(pair, rig.interface.sliding.field, with_strip=True))
+        area = {"units": "mm2", "long_name": "area that each contact node stands for"}
+        ways = directions(rig.interface.middle)
+        return {
+            **found,
+            "weight": ("node", rig.weights, area),
+            "sliding_along": (("node", "axis"), ways[:, 0], {"units": "1", "long_name": "direction of the sliding"}),
+            "sliding_across": (("node", "axis"), ways[:, 1], {"units": "1", "long_name": "direction across it"}),
+        }
+    return {
         "x": ("x", pair.x, {"units": "mm", "long_name": CONTACT_NODE}),
         "x_strip": ("x_strip", pair.strip.x[:, 0], {"units": "mm", "long_name": "position along the strip"}),
         "weight": ("x", rig.weights, {"units": "mm", "long_name": "length that each contact node stands for"}),
     }
-    attributes = {"title": case.title, "law": "coulomb", "friction": float(rig.friction[0])}
-    return xarray.Dataset(data, coordinates, attributes)
 
 
 def summary_of(data: xarray.Dataset, worn: Worn) -> dict[str, Any]:
     """Return the key numbers of the end of a run, each with its unit in its name."""
     last = data.isel(cycle=-1)
-    zone = last.traction.where(last.stick == 1)
+    solid = data.attrs["model"] == "solid"
+    traction = np.hypot(last.traction, last.traction_across) if solid else np.abs(last.traction)
+    zone = traction.where(last.stick == 1)
+    sizes = (
+        {"contact_area_mm2": float(last.contact_area), "stick_area_mm2": float(last.stick_area)}
+        if solid
+        else {"contact_width_mm": float(last.contact_width), "stick_width_mm": float(last.stick_width)}
+    )
     return {
         "title": data.attrs["title"],
         "cycles": int(last.cycle),
         "largest_force_N": float(np.abs(last.tangential_force).max()),
         "max_pressure_MPa": float(last.pressure.max()),
-        "largest_traction_MPa": float(np.abs(last.traction).max()),
-        "largest_stick_traction_MPa": float(np.abs(zone).max()) if zone.notnull().any() else 0.0,
+        "largest_traction_MPa": float(traction.max()),
+        "largest_stick_traction_MPa": float(zone.max()) if zone.notnull().any() else 0.0,
         "largest_surface_stress_MPa": float(last.surface_stress.max()),
         "dissipated_energy_mJ": float(last.dissipated_energy),
         "accumulated_energy_mJ": float(np.trapezoid(data.dissipated_energy, data.cycle)),
         "energy_ratio": float(last.energy_ratio),
-        "contact_width_mm": float(last.contact_width),
-        "stick_width_mm": float(last.stick_width),
+        **sizes,
         "wear_max_mm": float(worn.punch.max()),
         "wear_strip_max_mm": float(worn.strip.max()),
-        "worn_area_punch_mm2": float(data.weight.values @ worn.punch),
+        "worn_volume_punch_mm3" if solid else "worn_area_punch_mm2": float(data.weight.values @ worn.punch),
         "largest_energy_balance_error": float(data.energy_balance_error.max()),
         "largest_jump_error": float(data.jump_error.max()),
     }

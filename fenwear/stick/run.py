@@ -24,7 +24,7 @@ from fenwear.stick import checkpoint
 from fenwear.stick.cycle import Rig
 from fenwear.stick.jump import Cycle, jump, march
 from fenwear.stick.results import dataset, row_of, summary_of
-from fenwear.stick.setup import Fineness, fine_enough, make_rig
+from fenwear.stick.setup import Fineness, fine_enough, make_rig, reaches_border
 from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
 
@@ -66,8 +66,6 @@ def run_stick(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    if case.model.kind != "plane":
-        raise CaseError(InputError("model.kind", "results are written of plane models so far; Python takes solids"))
     begin = time.perf_counter()
     rig = make_rig(case, comm)
     if not resume:
@@ -148,7 +146,7 @@ class _Run:
             none = f"no cycle was done: {failure}; {self.directory} can be removed"
             raise type(failure or ConvergenceError())(none) from failure
         self._save()
-        warnings = [*doubts(self.case), *_warnings(self.last, fineness)]
+        warnings = [*doubts(self.case), *_warnings(self.rig, self.last, fineness)]
         for warning in warnings:
             self.log(f"warning: {warning}")
         times = {"setup_seconds": setup, "cycles_seconds": time.perf_counter() - begin}
@@ -267,7 +265,7 @@ def check_touching(rig: Rig) -> None:
         raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
 
-def _warnings(last: Cycle, fineness: Fineness | None) -> list[str]:
+def _warnings(rig: Rig, last: Cycle, fineness: Fineness | None) -> list[str]:
     """Return what the user should know of the run."""
     found = []
     if fineness is not None and not fineness.enough:
@@ -285,7 +283,6 @@ def _warnings(last: Cycle, fineness: Fineness | None) -> list[str]:
     if slipping.any():
         share = float(np.mean(slipping))
         found.append(f"gross sliding: in {100 * share:.0f} % of the last cycle's time steps nothing sticks")
-    edge = (records.pressure[:, [0, -1]] > 0).any()
-    if edge:
+    if reaches_border(rig, records.pressure):
         found.append("the contact reaches the end of its meshed surface; expected a wider one")
     return found

@@ -9,8 +9,10 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import build_bodies, make_sliding
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
+from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.interface import StickInterface
 from fenwear.stick.program import make_program
@@ -49,7 +51,7 @@ def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None =
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
     bodies, sliding = build_bodies(case, comm), make_sliding(case)
-    interface = StickInterface(bodies, sliding, case, moves=_moves(case, bodies.punch.surface.x[:, 0]))
+    interface = StickInterface(bodies, sliding, case, moves=_moves(case, bodies.punch.surface))
     middle = interface.middle
     wear = local_wear(sliding.wear, sliding.friction, middle.pair, middle.rigid.mean_pressure)
     mu = case.contact.friction
@@ -90,7 +92,23 @@ def _measures(rig: Rig) -> Array:
     return np.array([measures[0], max(measures[1], scale)])
 
 
-def _moves(case: Case, x: Array) -> bool:
+def reaches_border(rig: Rig, pressure: Array) -> bool:
+    """Return whether contact reaches where its meshed surface ends, but for planes of symmetry; collective.
+
+    Args:
+        rig: The bodies.
+        pressure: Of some time steps (k, n), MPa.
+    """
+    punch = rig.interface.bodies.punch
+    held = np.zeros(len(punch.load))
+    held[punch.supported] = 1.0
+    at_trace = punch.trace.pick(held[:, None])[:, :, 0].any(axis=1)
+    border = border_nodes(punch.surface)
+    free = border[~np.asarray(at_trace)[punch.surface.nodes[border]]]
+    return bool((pressure[:, free] > 0).any())
+
+
+def _moves(case: Case, surface: ContactSurface) -> bool:
     """Return whether the strip's surface passes under the punch: by default where it wears, and moves far enough."""
     motion = case.motion
     positions = getattr(motion, "positions", None)
@@ -100,4 +118,11 @@ def _moves(case: Case, x: Array) -> bool:
         return True
     reach = make_program(case, 2)
     far = max(abs(step.displacement or 0.0) for step in reach.steps)
-    return case.wear.strip is not None and far > SPACINGS * float(np.median(np.diff(np.unique(x.round(12)))))
+    return case.wear.strip is not None and far > SPACINGS * spacing(surface)
+
+
+def spacing(surface: ContactSurface) -> float:
+    """Return how far contact nodes are apart, mm: the median."""
+    if surface.dim == 3:
+        return float(np.sqrt(np.median(surface.weights)))
+    return float(np.median(np.diff(np.unique(surface.x[:, 0].round(12)))))

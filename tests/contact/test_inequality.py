@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from fenwear import ConvergenceError, Tribosystem, steady
 from fenwear.arrays import Array
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Dense, Phases, Updating, WornShape
+from fenwear.contact.operators import Dense, Phases, Updating
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -197,37 +197,6 @@ def test_phases(m: int, bordered: bool, coupled: bool) -> None:
         kept = np.flatnonzero(random.uniform(size=m * size) < share).astype(np.int32)
         solution = operator.factor(kept)(x[kept])
         np.testing.assert_allclose(solution, np.linalg.solve(matrix[np.ix_(kept, kept)], x[kept]), atol=1e-11)
-
-
-@given(SEEDS, st.sampled_from([1, 2, 3]), st.booleans())
-def test_worn_shape(seed: int, m: int, local: bool) -> None:
-    """Node by node and then the rest: the same solution as by one elimination, whichever rows are kept."""
-    random = np.random.default_rng(seed)
-    n, more = 12, 2 * m
-    size = m * n + n + more
-    matrix = np.zeros((size, size))
-    matrix[: m * n, : m * n] = random.uniform(-1, 1, (m * n, m * n)) / n + np.eye(m * n)
-    omega, last = slice(m * n, m * n + n), slice(m * n + n, None)
-    for k in range(m):
-        rows = slice(k * n, (k + 1) * n)
-        matrix[rows, omega] = np.eye(n)
-        wear = np.diag(random.uniform(0.5, 1, n)) + (0 if local else random.uniform(0, 0.1, (n, n)))
-        matrix[omega, rows] = -wear
-    matrix[: m * n, last] = random.uniform(-1, 1, (m * n, more))
-    matrix[omega, last] = random.uniform(-1, 1, (n, more))
-    matrix[last, : m * n] = random.uniform(-1, 1, (more, m * n))
-    opened = m * n + np.flatnonzero(random.uniform(size=n) < 0.1)
-    matrix[opened, opened] += 1e-3
-    free = np.ones(size, dtype=bool)
-    free[: m * n] = random.uniform(size=m * n) < 0.8
-    free[omega] = free[: m * n].reshape(m, n).any(axis=0) | (matrix[omega, omega].diagonal() > 0)
-    kept = np.flatnonzero(free).astype(np.int32)
-    b = random.uniform(-1, 1, len(kept))
-    whole = matrix[np.ix_(kept, kept)]
-    x = WornShape(matrix, m, n).factor(kept)(b)
-    scale = np.linalg.norm(whole, 2) * np.abs(x).max()
-    np.testing.assert_allclose(whole @ x, b, rtol=0, atol=1e-12 * scale)
-    np.testing.assert_allclose(x, np.linalg.solve(whole, b), rtol=0, atol=1e-14 * scale * np.linalg.cond(whole))
 
 
 @pytest.mark.parametrize("whole", [False, True])

@@ -176,3 +176,24 @@ def test_cycles_to_reach(assembled: Callable[..., Tribosystem]) -> None:
         distance.append(np.abs(last.pressure[-2:] - state.pressure).max() / MEAN)
     assert distance[1] < 0.05 < distance[0]
     assert cycles_to_reach(system, state, 0.05, limit=10) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("example1", ("contact.friction=0.4",)),
+        ("example1-heat", ("geometry.degree=2",)),
+        ("example2", ("geometry.degree=2", "geometry.parameters.overlap=3", "motion.positions=3")),
+        ("monotonic-lz40", ("contact.friction=0.4", "motion.direction='rightward'")),
+    ],
+)
+def test_blocks_of_many_nodes(
+    assembled: Callable[..., Tribosystem], name: str, settings: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is taken for many nodes, blocks and iterations, gives the state of one matrix: to 1e-9 of the mean."""
+    system = assembled(name, *settings)
+    one = steady(system)
+    monkeypatch.setattr("fenwear.contact.worn_shape.WHOLE", 0)
+    other = steady(system)
+    np.testing.assert_allclose(other.phase_pressure, one.phase_pressure, rtol=0, atol=1e-9 * MEAN)
+    np.testing.assert_allclose(other.shape, one.shape, rtol=0, atol=1e-9 * np.nanmax(np.abs(one.shape)))

@@ -1,0 +1,52 @@
+"""Commands that tell about the program: its versions, cases and keys."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from fenwear.case import builtin_cases
+from fenwear.cli.base import JsonOption, app, print_json
+
+
+@app.command("info")
+def info_command(
+    key: Annotated[
+        str | None, typer.Argument(metavar="KEY", help="Explain this key of the case file, or this table.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
+    from fenwear.bodies import kept
+    from fenwear.case.keys import find_keys
+    from fenwear.versions import versions
+
+    if key is not None:
+        found = find_keys(key)
+        if as_json:
+            print_json({"keys": [asdict(k) for k in found]})
+        else:
+            print("\n".join(k.text() for k in found))
+        return
+    if as_json:
+        print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})
+        return
+    for name, version in versions().items():
+        print(f"{name:14} {version}")
+    state = kept.summary()
+    print(
+        f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}"
+    )
+    print("\nbuilt-in cases:")
+    for name, title in builtin_cases().items():
+        print(f"  {name:26} {title}")
+
+
+@app.command("schema")
+def schema_command() -> None:
+    """Print the JSON schema of case files, by which editors complete and check them."""
+    from fenwear.case.keys import json_schema
+
+    print_json(json_schema())

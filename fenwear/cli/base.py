@@ -1,0 +1,45 @@
+"""What all commands share: the application, its common options, reading a case and printing."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Annotated, Any
+
+import typer
+from mpi4py import MPI
+
+from fenwear.case import Case, load_case
+from fenwear.parallel import on_root
+
+app = typer.Typer(
+    help="Thermo-mechanical sliding wear with FEniCSx. Without a command: runs the built-in Example 1.",
+    pretty_exceptions_enable=False,
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+
+DEFAULT_CASE = "example1-heat"
+
+CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (TOML) or the name of a built-in case.")]
+SetOption = Annotated[
+    list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
+]
+FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+
+
+def log(message: str) -> None:
+    """Print to standard error; every rank but 0 has it closed."""
+    print(message, file=sys.stderr, flush=True)
+
+
+def load(case: str, settings: list[str]) -> Case:
+    """Return a case that rank 0 has read, on every rank."""
+    loaded = on_root(MPI.COMM_WORLD, lambda: (c := load_case(case, settings), c.folder))
+    return loaded[0].at(loaded[1])
+
+
+def print_json(data: dict[str, Any]) -> None:
+    """Print one JSON object in a line."""
+    print(json.dumps(data), flush=True)

@@ -1,0 +1,134 @@
+"""Commands that take a case: run it, check it, write a new one or its mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from mpi4py import MPI
+
+import fenwear
+from fenwear.case import doubts
+from fenwear.cli.base import DEFAULT_CASE, CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json
+from fenwear.errors import CaseError, InputError
+from fenwear.parallel import on_root
+
+
+@app.callback(invoke_without_command=True)
+def main(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and end.")] = False,
+) -> None:
+    """Run the built-in Example 1 where no command is given."""
+    if version:
+        print(f"fenwear {fenwear.__version__}")
+    elif context.invoked_subcommand is None:
+        run(DEFAULT_CASE)
+
+
+@app.command("run")
+def run(
+    case: CaseArgument = DEFAULT_CASE,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    settings: SetOption = [],  # noqa: B006  (typer wants a list)
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="A line of progress for every block.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress and no messages but errors.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on from the checkpoint in the folder.")] = False,
+    fresh: FreshOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.results.sheet import sheet_text
+    from fenwear.run import Progress, run_case
+
+    loaded = load(case, settings)
+    if resume and output is None:
+        raise CaseError(InputError("--resume", "expected the folder of the run to go on with, as -o DIR"))
+    if quiet and verbose:
+        raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
+    say = (lambda _message: None) if quiet else log
+    progress: Progress = "none" if quiet else "lines" if verbose else "bar"
+    summary, directory = run_case(
+        loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True, fresh=fresh
+    )
+    if as_json:
+        print_json(summary)
+    else:
+        if not quiet:
+            print(sheet_text(summary))
+        say(f"results in {directory}")
+
+
+@app.command("check")
+def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
+    """Validate a case with its geometry and print it with all defaults."""
+    from fenwear.assembly import elastic, needs_of, place_case
+    from fenwear.cycle import stability_number
+    from fenwear.run import position_warnings
+    from fenwear.watch import initial_warnings
+
+    loaded = load(case, settings)
+    if loaded.contact.law == "coulomb":
+        from fenwear.stick.command import check_text
+
+        text = check_text(loaded)
+        for warning in doubts(loaded):
+            log(f"warning: {warning}")
+        print(loaded.to_toml())
+        log(text)
+        return
+    placed = place_case(loaded)
+    log(needs_of(placed).text())
+    system = elastic(placed)
+    number = stability_number(system)
+    system.check_touching()
+    warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
+    for warning in warnings:
+        log(f"warning: {warning}")
+    print(loaded.to_toml())
+    log(f"the case is valid: {len(system.pair.x)} contact nodes, "
+        f"{system.bodies.unknowns:,} displacement degrees of freedom, "
+        f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
+
+
+@app.command("new")
+def new_command(
+    template: Annotated[
+        str | None, typer.Argument(metavar="TEST", help="Such as block-on-ring; without it all are listed.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The case file to write; by default TEST.toml.")
+    ] = None,
+    settings: Annotated[
+        list[str], typer.Option("--set", metavar="DIMENSION=VALUE", help='A dimension: --set load="50 N"; repeatable.')
+    ] = [],  # noqa: B006
+    list_dimensions: Annotated[bool, typer.Option("--list", help="Print the dimensions and end.")] = False,
+) -> None:
+    """Write a commented case of a usual test, with its dimensions, to go on from."""
+    from fenwear.case.templates import all_text, dimensions_text, write_case_of
+
+    if template is None:
+        print(all_text())
+    elif list_dimensions:
+        print(dimensions_text(template))
+    else:
+        path = output or Path(f"{template}.toml")
+        on_root(MPI.COMM_WORLD, lambda: write_case_of(template, path, settings))
+        log(f"case in {path}; next: fenwear check {path}")
+
+
+@app.command("mesh")
+def mesh_command(
+    case: CaseArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
+    settings: SetOption = [],  # noqa: B006
+) -> None:
+    """Write the mesh of a case with its physical groups."""
+    from fenwear.bodies.mesh import write_msh
+
+    loaded = load(case, settings)
+    if output.suffix != ".msh":
+        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output, loaded.model.law))
+    log(f"mesh in {output}")

@@ -1,0 +1,66 @@
+"""Commands that look at the folders of runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from mpi4py import MPI
+
+from fenwear.cli.base import JsonOption, app, log, print_json
+from fenwear.parallel import on_root
+
+
+@app.command("plot")
+def plot_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
+    formats: Annotated[str, typer.Option("--format", help="Of the figures: png, pdf, svg, with commas.")] = "png",
+    width: Annotated[str, typer.Option(help='Of the figures, such as "85 mm" for a column of a paper.')] = "178 mm",
+    axis: Annotated[str, typer.Option(help="What a run is drawn over: cycles, distance or time.")] = "cycles",
+) -> None:
+    """Draw a run: figures with captions, pictures of the bodies, animation and report.html, into its folder."""
+    from fenwear.report.chosen import chosen_formats, chosen_look
+    from fenwear.report.page import write_report
+
+    look, endings = chosen_look(width, axis), chosen_formats(formats)
+    paths = on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True, look=look, formats=endings))
+    for path in paths:
+        print(path)
+
+
+@app.command("export")
+def export_command(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a run.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The folder of the CSV files; by default DIR/export.")
+    ] = None,
+    at: Annotated[
+        str, typer.Option(metavar="NUMBERS", help="Kept half-cycles of the profiles, first and last too, with commas.")
+    ] = "first,last",
+) -> None:
+    """Write a run as CSV: a line for each kept half-cycle, and the profiles of both bodies."""
+    from fenwear.results.export import export
+
+    for path in on_root(MPI.COMM_WORLD, lambda: export(directory, output, at)):
+        print(path)
+
+
+@app.command("compare")
+def compare_command(
+    directories: Annotated[list[Path], typer.Argument(metavar="DIR...", help="The folders of several runs.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The figure to write: .png, .pdf or .svg.")] = Path(
+        "compare.png"
+    ),
+    as_json: JsonOption = False,
+) -> None:
+    """Put several runs in one figure and one table, with the differences of their cases."""
+    from fenwear.report.compare import compare, draw_comparison
+
+    comparison = on_root(MPI.COMM_WORLD, lambda: compare(directories))
+    on_root(MPI.COMM_WORLD, lambda: draw_comparison(comparison, output))
+    if as_json:
+        print_json(comparison.as_json())
+    else:
+        print(comparison.text())
+    log(f"figure in {output}")

@@ -1,0 +1,160 @@
+"""Commands that find a state directly: the cyclic steady state, and the pressure optimum."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+from fenwear.case import Case, doubts
+from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json
+
+if TYPE_CHECKING:
+    from fenwear.assembly import Tribosystem
+    from fenwear.cycle import Steady
+
+
+@app.command("steady")
+def steady_command(
+    case: CaseArgument,
+    settings: SetOption = [],  # noqa: B006
+    fresh: FreshOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Solve for the cyclic steady state directly."""
+    from fenwear.assembly import assemble
+    from fenwear.cycle import cycles_to_reach, growth_rate, steady
+    from fenwear.watch import steady_warnings
+
+    begin = time.perf_counter()
+    loaded = load(case, settings)
+    if loaded.contact.law == "coulomb":
+        _print_final(case, loaded, as_json=as_json)
+        return
+    system = assemble(loaded, heat="reduced", fresh=fresh)
+    setup = time.perf_counter() - begin
+    state = steady(system)
+    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
+    for warning in warnings:
+        log(f"warning: {warning}")
+    if not as_json:
+        _print_steady(case, system, state)
+    way = time.perf_counter()
+    rate = growth_rate(system, state.phase_pressure)
+    cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
+    seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
+    if not as_json:
+        _print_way(rate, cycles, seconds, time.perf_counter() - begin)
+        return
+    pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
+    print_json(
+        {
+            **_coordinates(system),
+            "pressure_plus": pressures.get(1),
+            "pressure_minus": pressures.get(-1),
+            "shape": state.shape.tolist(),
+            "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
+            "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
+            "growth_rate": rate,
+            "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
+            "wear_per_cycle": state.wear_per_cycle.tolist(),
+            **state.velocity,
+            "cycles_to_1_percent": cycles,
+            "seconds": state.seconds,
+            "all_seconds": {**seconds, "in_all": time.perf_counter() - begin},
+            "warnings": warnings,
+        }
+    )
+
+
+def _print_final(name: str, case: Case, *, as_json: bool) -> None:
+    """Print the shape to which partial slip wears."""
+    from fenwear.stick.command import final_of, final_text
+
+    _, numbers = final_of(case)
+    if as_json:
+        print_json(numbers)
+    else:
+        print(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
+
+
+def _coordinates(system: Tribosystem) -> dict[str, Any]:
+    """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
+    if system.case.model.kind == "plane":
+        return {"x": system.pair.x.tolist()}
+    x = system.pair.punch.x
+    names = ("r", "z") if x.shape[1] == 2 else ("x", "y", "z")
+    return {name: x[:, k].tolist() for k, name in enumerate(names)}
+
+
+def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
+    """Print the state as soon as it is there: the way to it may take longer.
+
+    The load over the whole surface is a pressure only where the surfaces lie on each other before they wear.
+    """
+    from fenwear.cycle.state import pressure_scale
+    from fenwear.results.scar import conforming
+
+    print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
+    part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
+    words = system.sliding.field.words
+    for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
+        print(f"  strip moves {words[d]:9} largest pressure {p.max():8.3f} MPa, "
+              f"contact {part.format(width)}")  # fmt: skip
+    if conforming(system.pair):
+        print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
+    scale = pressure_scale(system, state.phase_pressure)
+    print(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
+    print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
+    if state.heat is not None:
+        punch, strip = state.heat.punch.max(), state.heat.strip.max()
+        print(f"  largest temperature at the contact: punch {punch:.3f} K, strip {strip:.3f} K")
+    sys.stdout.flush()
+
+
+def _print_way(rate: float, cycles: int | None, seconds: dict[str, float], in_all: float) -> None:
+    """Print how the state is reached, and where the time went."""
+    if rate > 0:
+        print(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
+    elif cycles is None:
+        print("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
+    else:
+        print(f"  pressure within 1 % of the pressure scale after about {cycles:,} cycles from the initial shape")
+    print(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
+          f"steady state {_duration(seconds['steady'])}, the way there {_duration(seconds['way_there'])}")  # fmt: skip
+
+
+def _duration(seconds: float) -> str:
+    return f"{1e3 * seconds:.0f} ms" if seconds < 1 else f"{seconds:.1f} s"
+
+
+def _velocities(velocity: dict[str, float], per: str) -> str:
+    units = {name: "mm" if name == "lambda_F" else "rad" for name in velocity}
+    separator = "/" if len(per) == 1 else " "
+    return ", ".join(f"{name} = {value:.5g} {units[name]}{separator}{per}" for name, value in velocity.items())
+
+
+@app.command("optimum")
+def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+    """Print lambda_F, lambda_M, the optimal pressure and the angle chi of the wear velocity in both directions."""
+    from fenwear.assembly import place_case
+
+    system = place_case(load(case, settings))
+    found = {name: system.optimum(d) for d, name in reversed(system.sliding.field.words.items())}
+    if as_json:
+        x = system.pair.x.tolist()
+        print_json(
+            {
+                n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
+                for n, o in found.items()
+            }
+        )
+        return
+    for name, state in found.items():
+        print(f"{name:9}  {_velocities(state.velocity, 's')}")
+        for end in (0, -1):
+            chi = math.degrees(state.tilt[end])
+            names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
+            at = ", ".join(f"{axis} = {c:g}" for axis, c in zip(names, place, strict=False))
+            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")

@@ -1,0 +1,179 @@
+"""Commands of many runs: verification, sensitivity, calibration, life and sweeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json
+from fenwear.errors import CaseError, InputError
+
+
+@app.command("verify")
+def verify_command(
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    only: Annotated[
+        list[str], typer.Option("--only", metavar="NAME", help="Run this case alone; may be repeated.")
+    ] = [],  # noqa: B006
+    list_cases: Annotated[bool, typer.Option("--list", help="Print the names of the cases and end.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Solve problems whose answer is known, and compare: a table, a page and an exit status of 1 where they differ."""
+    from fenwear.verify.command import choose, titles, verify
+
+    cases, paper = choose(only)
+    if list_cases:
+        for name, title in titles().items():
+            if not only or name in only:
+                print(f"{name:24} {title}")
+        return
+    found, directory = verify(cases, paper, output, log if as_json else print)
+    if as_json:
+        print_json(found)
+    log(f"page in {directory}/verification.html")
+    if not found["agree"]:
+        log(f"does not agree: {', '.join(found['differing'])}")
+        raise typer.Exit(1)
+
+
+@app.command("sensitivity")
+def sensitivity_command(
+    case: CaseArgument,
+    quantities: Annotated[
+        list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
+    ],
+    keys: Annotated[
+        list[str], typer.Option("--to", metavar="KEY", help="Such as wear.punch.coefficient; may be repeated.")
+    ],
+    spread: Annotated[float, typer.Option(help="Relative change of the keys in the tornado plot; 0 for none.")] = 0.1,
+    differences: Annotated[bool, typer.Option("--differences", help="By differences of runs throughout.")] = False,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Print the derivatives of quantities of interest to keys of the case, and draw a tornado plot."""
+    from fenwear.life import commands
+
+    loaded = load(case, settings)
+    found, folder = commands.run_sensitivity(
+        loaded, Path(case).stem, quantities, keys, spread, output, log, differences=differences
+    )
+    if as_json:
+        print_json(commands.as_json(found))
+    else:
+        print("\n\n".join(one.text() for one in found))
+    log(f"results in {folder}")
+
+
+@app.command("calibrate")
+def calibrate_command(
+    case: CaseArgument,
+    data: Annotated[list[Path], typer.Argument(metavar="DATA.csv...", help="Files of measurements.")],
+    unknowns: Annotated[
+        list[str], typer.Option("--unknown", metavar="KEY[=LOW..HIGH]", help="A key to find; may be repeated.")
+    ],
+    baseline: Annotated[
+        list[str], typer.Option(metavar="NAME", help="offset or tilt of each trace, to find too; may be repeated.")
+    ] = [],  # noqa: B006
+    each: Annotated[
+        bool, typer.Option("--each", help="Fit every file alone, and print the scatter between them.")
+    ] = False,
+    posterior: Annotated[
+        int | None, typer.Option(metavar="STEPS", help="Sample the posterior too, so many steps of each walker.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
+    settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Find keys of the case from measurements, with standard errors and what the data cannot tell."""
+    from fenwear.life import commands
+
+    loaded = load(case, settings)
+    if each:
+        if posterior is not None:
+            raise CaseError(InputError("--posterior", "given together with --each; expected one of them"))
+        tests, between, folder = commands.run_calibrate_each(
+            loaded, Path(case).stem, data, unknowns, baseline, output, log
+        )
+        if as_json:
+            print_json(commands.each_as_json(tests, between))
+        else:
+            print("\n".join([*(one.text() for one in tests), *between.text]))
+        log(f"results in {folder}")
+        return
+    found, sample, folder = commands.run_calibrate(
+        loaded, Path(case).stem, data, unknowns, baseline, posterior, output, log
+    )
+    if as_json:
+        print_json(found.as_json())
+    else:
+        print(found.text() if sample is None else f"{found.text()}\n{sample.text()}")
+    log(f"results in {folder}")
+
+
+@app.command("life")
+def life_command(
+    case: CaseArgument,
+    until: Annotated[str, typer.Option(help='A level: "depth 0.2 mm", "distance until volume 3 mm^3".')],
+    scatters: Annotated[
+        list[str],
+        typer.Option("--scatter", metavar="KEY=KIND(A, B)", help='"contact.friction=normal(0.25, 8 %)"; repeatable.'),
+    ] = [],  # noqa: B006
+    calibration: Annotated[
+        Path | None, typer.Option("--from", metavar="DIR", help="Folder of a calibration whose result scatters.")
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Size of the sample.")] = 200,
+    seed: Annotated[int, typer.Option(help="Of the sample.")] = 0,
+    wanted: Annotated[str | None, typer.Option(help='A life whose reliability is asked for: "1e6 cycles".')] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the samples in the folder.")] = False,
+    settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Print the distribution of the life of parts whose keys scatter, and what the scatter comes from."""
+    from fenwear.life import commands
+
+    loaded = load(case, settings)
+    found, folder = commands.run_life(
+        loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, output, log, resume=resume
+    )
+    if as_json:
+        print_json(found.as_json())
+    else:
+        print(found.text())
+    log(f"results in {folder}")
+
+
+@app.command("sweep")
+def sweep_command(
+    case: CaseArgument,
+    over: Annotated[
+        list[str],
+        typer.Option(metavar="KEY=VALUES", help="0.1:0.3:9 is nine values; or a list: 10 mm,12 mm; may be repeated."),
+    ] = [],  # noqa: B006
+    of: Annotated[str, typer.Option(metavar="WHAT", help="steady, optimum or run.")] = "steady",
+    zipped: Annotated[bool, typer.Option("--zip", help="First values together, second ones, and so on.")] = False,
+    table: Annotated[Path | None, typer.Option(help="CSV of variants: a heading of keys, then rows.")] = None,
+    processes: Annotated[int | None, typer.Option(help="Local processes; by default cores, where that pays.")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Compute what the folder lacks.")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="No progress.")] = False,
+    settings: SetOption = [],  # noqa: B006
+    as_json: JsonOption = False,
+) -> None:
+    """Compute many variants of a case side by side: keys over their values, in one dataset."""
+    from fenwear.sweeps import command
+
+    dataset, folder = command.run_sweep(
+        load(case, settings), Path(case).stem, over, table, of, output, log,
+        zipped=zipped, resume=resume, processes=processes, quiet=quiet,
+    )  # fmt: skip
+    if as_json:
+        print_json(command.as_json(dataset))
+    else:
+        print(command.text(dataset))
+    log(f"results in {folder}")
+    if (dataset["trouble"].values != "").any():
+        raise typer.Exit(3)

@@ -1,0 +1,72 @@
+"""Strains of the strip's surface at the contact nodes: what displacement changes along the surface."""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import CORNERS, ContactSurface
+from fenwear.stick.interface import Position
+
+
+def along_sliding(position: Position) -> Array:
+    """Return what turns tangential components at each node to those along and across the sliding (n, m, m).
+
+    In the plane along x; where a turning strip does not move, on its axis, along the first tangent.
+    """
+    n, d = position.pair.normal.shape
+    if d == 2:
+        return np.ones((n, 1, 1))
+    moved = position.drive[n:].reshape(2, n).T
+    size = np.linalg.norm(moved, axis=1, keepdims=True)
+    still = size <= 1e-12 * size.max(initial=1e-300)
+    along = np.where(still, [1.0, 0.0], moved / np.where(still, 1.0, size))
+    return np.stack([along, np.column_stack([-along[:, 1], along[:, 0]])], axis=1)
+
+
+def directions(position: Position) -> Array:
+    """Return the unit vectors along and across the sliding at each node (n, m, d)."""
+    return np.einsum("nam,nmc->nac", along_sliding(position), position.frame[:, 1:])
+
+
+def surface_gradient(surface: ContactSurface) -> list[csr_array]:
+    """Return the derivatives along each axis, within the surface, of values at its pressure nodes, d of (n, n).
+
+    At a node of several facets their mean by area.
+    """
+    straight = surface.cell == "triangle"  # values live on the vertices
+    element = basix.create_element(
+        basix.ElementFamily.P,
+        basix.CellType[surface.cell],
+        1 if straight else surface.degree,
+        basix.LagrangeVariant.gll_warped,
+    )
+    table = element.tabulate(1, element.points)[1:, :, :, 0]
+    facets = surface.facets[:, : CORNERS["triangle"]] if straight else surface.facets
+    jacobian = np.einsum("dqk,fkc->fqcd", table, surface.trace[facets])
+    values = np.einsum("fqdc,dqk->cfqk", np.linalg.pinv(jacobian), table)
+    area = np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian)).mean(axis=1)
+    number = np.zeros(len(surface.trace), dtype=np.int64)
+    number[surface.nodes] = np.arange(len(surface.nodes))
+    places, n = number[facets], len(surface.nodes)
+    rows = np.broadcast_to(places[:, :, None], values.shape[1:]).ravel()
+    columns = np.broadcast_to(places[:, None, :], values.shape[1:]).ravel()
+    share = np.bincount(places.ravel(), np.repeat(area, places.shape[1]), n)
+    scaled = values * area[:, None, None]
+    return [csr_array(coo_array((v.ravel() / share[rows], (rows, columns)), shape=(n, n))) for v in scaled]
+
+
+def surface_strain(position: Position, gradient: list[csr_array], on_strip: Array) -> Array:
+    """Return the strip's strains along and across the sliding opposite each contact node (n, m).
+
+    Args:
+        position: The place of the strip.
+        gradient: Of the punch's contact surface.
+        on_strip: Displacement of what the strip was condensed onto (q, d), mm.
+    """
+    u = position.pair.placement.vectors(position.reading @ on_strip)
+    slopes = np.stack([derivative @ u for derivative in gradient], axis=2)  # (n, d of u, d)
+    ways = directions(position)
+    return np.einsum("nac,ncb,nab->na", ways, slopes, ways)

@@ -1,0 +1,241 @@
+"""Materials' properties that depend on the temperature, followed in slow steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from fenwear import Case, Tribosystem, assemble, jump, make_case, march, read_history, run_case, steady
+from fenwear.assembly import outwarmed, taken_at, warmed_system
+from fenwear.cycle import Block, follow
+from fenwear.cycle.state import RunState
+from fenwear.errors import CaseError, ConvergenceError
+from fenwear.heat.field import HeatState
+from fenwear.life.model import Model
+
+HEIGHTS, FAR, SLOPE = (2.0, 3.0), (90.0, 20.0), 0.02
+K0 = (5.0, 1.5)
+Edited = Callable[..., Case]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+
+
+def stack(materials: dict[str, Any], duration: float, half_cycles: int, **heat: Any) -> Case:
+    """Return two blocks on each other without friction, held at temperatures far from the contact."""
+    mechanical = {"young": 1e5, "poisson": 0.3, "density": 1e-9, "expansion": 0.0}
+    return make_case(
+        {
+            "geometry": {
+                "file": "blocks.geo",
+                "degree": 2,
+                "parameters": {"punch_height": HEIGHTS[0], "strip_height": HEIGHTS[1]},
+            },
+            "materials": {name: {**mechanical, **own} for name, own in materials.items()},
+            "punch": {
+                "regions": {"punch_body": "upper"},
+                "supports": [{"on": "punch_sides", "fix": ["x"]}],
+                "loads": [{"on": "punch_far", "traction": [0, -4]}],
+                "temperatures": [{"on": "punch_far", "temperature": FAR[0]}],
+            },
+            "strip": {
+                "regions": {"strip_body": "lower"},
+                "supports": [{"on": "strip_far", "fix": ["x", "z"]}],
+                "temperatures": [{"on": "strip_far", "temperature": FAR[1]}],
+            },
+            "wear": {"punch": {"coefficient": 0}},
+            "motion": {"kind": "reciprocating", "amplitude": 1e-3, "period": 2 * duration},
+            "heat": {"initial": FAR[1], "steps": 1, **heat},
+            "run": {"half_cycles": half_cycles},
+            "output": {"report": False, "fields_at": []},
+        }
+    )
+
+
+def growing(k0: float) -> dict[str, str]:
+    return {"expression": f"{k0} * (1 + {SLOPE} * T)"}
+
+
+def marched(system: Tribosystem, half_cycles: int, start: RunState | None = None) -> list[Block]:
+    def integrate(own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
+        return march(own, half_cycles, start=state, leave=leave)
+
+    return list(follow(system, integrate, start))
+
+
+def by_kirchhoff() -> float:
+    """Return the temperature between the blocks: K = integral of k is linear in each, and the flux the same."""
+
+    def potential(k0: float, t: float) -> float:
+        return k0 * (t + SLOPE * t**2 / 2)
+
+    def unequal(t: float) -> float:
+        above = (potential(K0[0], FAR[0]) - potential(K0[0], t)) / HEIGHTS[0]
+        return above - (potential(K0[1], t) - potential(K0[1], FAR[1])) / HEIGHTS[1]
+
+    return float(brentq(unequal, FAR[1], FAR[0], xtol=1e-12))
+
+
+def test_kirchhoff() -> None:
+    """k = k0 (1 + a T) in two blocks in series: the error falls with the tolerance, down to the mesh's."""
+    exact, errors = by_kirchhoff(), []
+    for tolerance in (0.3, 0.03, 1e-6):
+        materials = {
+            name: {"conductivity": growing(k0), "heat_capacity": 1e9}
+            for name, k0 in zip(("upper", "lower"), K0, strict=True)
+        }
+        case = stack(materials, 1e6, 16, operator="full", property_tolerance=tolerance)
+        last = marched(assemble(case), 16)[-1]
+        assert last.heat is not None
+        np.testing.assert_allclose(last.heat.temperature_punch[-1], last.heat.temperature_strip[-1], rtol=1e-9)
+        errors.append(float(np.abs(last.heat.temperature_punch[-1] - exact).max()))
+    assert errors[1] < 0.1 * errors[0]
+    assert errors[0] < 0.3 * (FAR[0] - FAR[1])
+    assert errors[2] < 1e-5
+
+
+def test_heating_up() -> None:
+    """k(T) and c(T) while the blocks warm up, against finite volumes: first order in the step.
+
+    The punch alone, with nothing conducted at the contact: volumes in z, and backward differences in time.
+    """
+    c0, cells, until = 1e9, 60, 0.2
+    h = HEIGHTS[0] / cells
+
+    def capacity(t: Any) -> Any:
+        return 1 + 0.01 * t
+
+    def rate(_: float, t: Any) -> Any:
+        edges = np.concatenate([FAR[:1], t])
+        k = K0[0] * (1 + SLOPE * (edges[1:] + edges[:-1]) / 2)
+        k[0] *= 2  # half a cell away
+        flux = k * np.diff(edges) / h
+        return (np.append(flux[1:], 0.0) - flux) / h / capacity(t)
+
+    line = solve_ivp(rate, (0, until), np.full(cells, FAR[1]), method="BDF", rtol=1e-9, atol=1e-9).y[:, -1]
+    exact = line[-1] + (line[-1] - line[-2]) / 8  # at the insulated end
+    errors: list[float] = []
+    for steps in (8, 16):
+        own = {"conductivity": growing(K0[0]), "heat_capacity": {"table": [[0, c0], [100, 2 * c0]]}}
+        other = {"conductivity": 1.0, "heat_capacity": c0}
+        heat = {"operator": "full", "property_tolerance": 1e-4, "conductance": 0.0}
+        case = stack({"upper": own, "lower": other}, until / steps, steps, **heat)
+        last = marched(assemble(case), steps)[-1]
+        assert last.heat is not None
+        errors.append(float(last.heat.temperature_punch[-1].mean() - exact))
+    assert 0.3 < errors[1] / errors[0] < 0.7
+    assert abs(2 * errors[1] - errors[0]) < 2e-3 * (exact - FAR[1])
+
+
+def test_uniform_warmth_is_other_constants(edited: Edited) -> None:
+    """Warm all over, the bodies are those of the constants there: gaps, compliances, heat and all."""
+
+    def warm(tables: dict[str, Any]) -> None:
+        tables["materials"]["composite"] |= {
+            "young": {"table": [[0, 130], [100, 80]], "unit": "GPa"},
+            "expansion": {"expression": "3e-5 + 1e-7 * T"},
+            "conductivity": {"expression": "5 + 0.02 * T", "unit": "W/(m K)"},
+            "heat_capacity": {"expression": "1200 + 2 * T", "unit": "J/(kg K)"},
+        }
+
+    def constant(tables: dict[str, Any]) -> None:
+        tables["materials"]["composite"] |= {
+            "young": "100 GPa",
+            "expansion": 9e-6 + 2.7e-5,
+            "conductivity": 6.2,
+            "heat_capacity": "1320 J/(kg K)",
+        }
+
+    cold = assemble(edited("example1-heat", warm, *SMALL))
+    other = assemble(edited("example1-heat", constant, *SMALL))
+    assert cold.bodies.heat is not None
+    at = HeatState.nodal(cold.bodies.heat, [np.full(body.owned, 60.0) for body in cold.bodies.heat])
+    assert outwarmed(cold, at)
+    hot = warmed_system(cold, at)
+    assert not outwarmed(hot, at)
+    assert hot.bodies.punch is not cold.bodies.punch
+    assert np.array_equal(taken_at(hot)[0], np.full(cold.bodies.heat[0].owned, 60.0))
+    for own, its in zip(hot.condensed.punch.arrays().values(), other.condensed.punch.arrays().values(), strict=True):
+        np.testing.assert_allclose(own, its, atol=1e-9 * np.abs(its).max())
+    assert hot.exchange is not None
+    assert other.exchange is not None
+    assert cold.exchange is not None
+    np.testing.assert_allclose(hot.exchange.gap(at), other.exchange.gap(at), rtol=1e-8)
+    assert np.abs(hot.exchange.gap(at) / cold.exchange.gap(at) - 1).max() > 0.05
+    (one,), (two,) = march(hot, 1), march(other, 1)
+    np.testing.assert_allclose(one.pressure, two.pressure, rtol=1e-6)
+    assert one.heat is not None
+    assert two.heat is not None
+    np.testing.assert_allclose(one.heat.temperature_punch, two.heat.temperature_punch, rtol=1e-5)
+
+
+def softening(tables: dict[str, Any]) -> None:
+    """Let the composite soften and conduct better with warmth."""
+    tables["materials"]["composite"] |= {
+        "young": {"table": [[0, 130], [100, 80]], "unit": "GPa"},
+        "conductivity": {"expression": "5 + 0.2 * T", "unit": "W/(m K)"},
+    }
+    tables["heat"]["property_tolerance"] = 0.05
+
+
+def test_jumps_follow_as_marches(edited: Edited) -> None:
+    """Jumped and marched, the properties follow alike, to what they lag behind by."""
+    case = edited("example1-heat", softening, *SMALL, "run.half_cycles=16", "heat.steps=2")
+
+    def integrate(own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
+        return jump(own, 16, tolerance=1e-3, start=state, leave=leave)
+
+    system = assemble(case, heat="reduced")
+    jumped, last = list(follow(system, integrate))[-1], marched(system, 16)[-1]
+    for block in (jumped, last):
+        assert block.system.bodies.warmed is not None
+        assert block.heat is not None
+    assert last.heat is not None
+    assert jumped.heat is not None
+    one, other = last.heat.temperature_punch[-1], jumped.heat.temperature_punch[-1]
+    np.testing.assert_allclose(other, one, atol=0.015 * one.max())
+
+
+@pytest.mark.mpi
+def test_a_run_goes_on_with_its_properties(tmp_path: Path) -> None:
+    """Ended in between and resumed, a run is the one that was not: its properties are those last taken."""
+    materials: dict[str, Any] = {"upper": {"conductivity": growing(K0[0]), "heat_capacity": 1e9}}
+    materials["lower"] = {**materials["upper"], "young": {"expression": "1e5 - 200 * T"}}
+    part = stack(materials, 0.03, 5)
+    whole = part.model_copy(update={"run": part.run.model_copy(update={"half_cycles": 9})})
+    told: list[str] = []
+    run_case(whole, "whole", tmp_path / "whole", told.append, progress="none")
+    assert any("properties are those" in line for line in told)
+    run_case(part, "part", tmp_path / "part", told.append, progress="none")
+    run_case(whole, "part", tmp_path / "part", told.append, resume=True, progress="none")
+    one, other = (read_history(tmp_path / name) for name in ("whole", "part"))
+    for name in ("pressure", "temperature_punch", "wear"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12)
+
+
+def test_refused(edited: Edited) -> None:
+    """What is no property of the temperature alone, what cannot be followed, and values that are none."""
+
+    def composite(**keys: Any) -> Callable[[dict[str, Any]], None]:
+        return lambda tables: tables["materials"]["composite"].update(keys)
+
+    with pytest.raises(CaseError, match="conductivity: expected an expression or a table of the temperature T alone"):
+        edited("example1-heat", composite(conductivity={"expression": "5 + p"}))
+    with pytest.raises(CaseError, match=r"young: .*unit: .*of another kind"):
+        edited("example1-heat", composite(young={"expression": "5 + T", "unit": "W/(m K)"}))
+    with pytest.raises(CaseError, match=r"young: depends on the temperature T, which a case without the table heat"):
+        edited("example1", composite(young={"expression": "1e5 - T"}))
+    with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -1 at T = 0 K"):
+        assemble(edited("example1-heat", composite(conductivity={"expression": "T - 1"}), *SMALL))
+    warm = edited("example1-heat", softening, *SMALL)
+    with pytest.raises(ConvergenceError, match=r"materials.composite.young depends on the temperature"):
+        steady(assemble(warm))
+    with pytest.raises(CaseError, match=r"materials.composite.young: depends on the temperature: not followed here"):
+        Model(warm)
+    sinking = edited("example1-heat", composite(conductivity={"expression": "5 - 0.5 * T"}), *SMALL)
+    with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -"):
+        marched(assemble(sinking), 40)

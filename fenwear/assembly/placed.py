@@ -189,6 +189,11 @@ class Placed:
         return tuple(rigid.pair for rigid in self.rigids)
 
     @property
+    def direction_words(self) -> dict[int, str]:
+        """The words for the two directions d of the sliding, 1 first."""
+        return self.sliding.field.words(self.pair.punch.dim)
+
+    @property
     def strip_wears(self) -> bool:
         """Whether the strip has a wear law."""
         return self.sliding.wear[1] is not None
@@ -449,7 +454,7 @@ def place(
         rigid=rigid,
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        check_equilibrium(one, sliding.field.words[phase.direction], ratio)
+        check_equilibrium(one, placed.direction_words[phase.direction], ratio)
     return placed
 
 

@@ -22,7 +22,7 @@ from fenwear.report.course import (
 from fenwear.report.figures import chosen_half_cycles, nearest_half_cycles, pressure_top
 from fenwear.report.maps import cuts_figure, map_figure, quantities
 from fenwear.report.program import program_figure
-from fenwear.report.style import direction_style, legend_beside, panels, reference_line, run_style, shades
+from fenwear.report.style import direction_style, legend_beside, panels, reference_line, run_style, shades, strip_moves
 from fenwear.report.surface import model_of, radial
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def series_figure(history: xarray.Dataset) -> Figure:
         ax.set_ylabel("temperature (K)")
     for ax in axes[:4]:
         ax.set_ylim(bottom=0)
-    legend_beside(pressure, "strip moves")
+    legend_beside(pressure, strip_moves(history))
     half_cycle_axis(axes[-1], history)
     return figure
 
@@ -112,7 +112,7 @@ def ring_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) ->
         for colour, n in shades(nearest_half_cycles(one_way, half_cycles)):
             ax.plot(x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
         name, *_ = direction_style(history, d)
-        ax.set_title(f"Contact pressure while the strip turns {name}", loc="left")
+        ax.set_title(f"Contact pressure while the {strip_moves(history)} {name}", loc="left")
         ax.set_ylabel("contact pressure p (MPa)")
         ax.set_ylim(0, pressure_top(history, half_cycles))
         if is_conforming(history):  # named in the legend: lines that wear evenly run along it

@@ -250,6 +250,7 @@ def write_fields(
         data.update(_groups(elastic))
     time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
+    attributes["directions"] = " ".join(system.direction_words.values())
     data.update(_contact_surfaces(system, worn, pressure))
     import xarray  # with pandas, half a second that runs without fields spare themselves
 

@@ -78,8 +78,9 @@ def test_history(tmp_path: Path, name: str) -> None:
     across = data.r if "r" in data else data.across
     reach = np.ptp(across.values[worn.values])
     assert reach <= data.scar_width[-1] <= reach + 2 * np.diff(np.unique(across.values.round(6))).max()
-    assert {"forward"} <= set(summary)
-    assert summary["forward"]["mean_pressure_MPa"] * summary["forward"]["contact_area_mm2"] == pytest.approx(load)
+    last = summary["forward" if name == "ball-on-flat" else "counterclockwise"]
+    assert last["mean_pressure_MPa"] * last["contact_area_mm2"] == pytest.approx(load)
+    assert data.attrs["directions"] == ("forward backward" if name == "ball-on-flat" else "counterclockwise clockwise")
     assert ("mean_pressure_MPa" in summary) == (name != "ball-on-flat")
 
 

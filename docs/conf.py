@@ -17,7 +17,15 @@ author = "the fenwear authors"
 copyright = author  # noqa: A001  (Sphinx's name)
 version = release = fenwear.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx_copybutton", "mathml", "from_code"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "mathml",
+    "from_code",
+    "furo_files",
+]
 exclude_patterns = ["_build", "extensions", "static"]
 source_suffix = {".md": "myst-nb", ".ipynb": "myst-nb"}
 nitpicky = True

@@ -55,6 +55,13 @@ def geometry_dofmap(mesh: Mesh) -> NDArray[np.int32]:
     return mesh.geometry.dofmap if maps is None else maps[0]
 
 
+def pattern_rows(pattern: Any) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the columns of a sparsity pattern's rows, and where each row starts; a tuple in some versions."""
+    graph = pattern.graph
+    columns, starts = graph if isinstance(graph, tuple) else (graph.array, graph.offsets)
+    return np.asarray(columns), np.asarray(starts)
+
+
 def geometry_degree(mesh: Mesh) -> int:
     """Return the degree of the elements' shape; from 0.11 on there is one for each cell type."""
     maps = getattr(mesh.geometry, "cmaps", None)

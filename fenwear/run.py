@@ -23,6 +23,7 @@ from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.parallel import on_root
 from fenwear.results import checkpoint
+from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
     HISTORY,
@@ -408,7 +409,8 @@ class _Progress:
     def block(self, block: Block) -> None:
         """Tell of a block."""
         number = int(block.half_cycle[-1])
-        hot = "" if block.heat is None else f", {block.heat.max_temperature[-1]:.1f} K"
+        degrees = degrees_of(block.system.case)
+        hot = "" if block.heat is None else f", {block.heat.max_temperature[-1] - degrees.zero:.1f} {degrees.shown}"
         state = f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
         self.bar.update(number - self.bar.n)
         self.bar.set_postfix_str(state)

@@ -99,6 +99,29 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "run_python" in getattr(item, "fixturenames", ()):
             item.add_marker("process")
+    items[:] = _long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+
+
+def _long_first(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
+    """Return the tests so that each worker, which takes an equal run of them, begins with its share of the long ones.
+
+    So none waits at the end for another's long test, and those that use the same systems still follow each other.
+    """
+    if workers == 1:
+        return items
+    long = [item for mark in ("slow", "process") for item in items if mark == _length(item)]
+    short = [item for item in items if not _length(item)]
+    ordered: list[pytest.Item] = []
+    for worker in range(workers):
+        own = long[worker::workers]
+        size = max(0, (len(items) - len(ordered)) // (workers - worker) - len(own))
+        ordered += [*own, *short[:size]]
+        short = short[size:]
+    return ordered
+
+
+def _length(item: pytest.Item) -> str:
+    return next((mark for mark in ("slow", "process") if item.get_closest_marker(mark)), "")
 
 
 def pytest_runtest_teardown() -> None:

@@ -245,7 +245,13 @@ def test_two_ranks_without_convergence(fenwear: Run, tmp_path: Path) -> None:
 
 
 def test_shell_completion(run_python: Run) -> None:
-    """The shell is told commands and options that begin as what stands there."""
-    for words, place, expected in (("fenwear st", 1, ["steady"]), ("fenwear run --re", 2, ["--resume"])):
+    """The shell is told commands, options, cases and keys that begin as what stands there."""
+    for words, place, expected in (
+        ("fenwear st", 1, ["steady"]),
+        ("fenwear run --re", 2, ["--resume"]),
+        ("fenwear check example1-l", 2, ["example1-lz40", "example1-lz40-heat"]),
+        ("fenwear check example1 --set motion.am", 4, ["motion.amplitude="]),
+        ("fenwear info wear.strip.coefficient.t", 2, ["wear.strip.coefficient.table"]),
+    ):
         variables = {"_FENWEAR_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(place)}
         assert run_python("-m", "fenwear", **variables).stdout.split() == expected

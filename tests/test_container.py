@@ -288,3 +288,65 @@ def test_the_checkout_is_its_own_and_fenwear(shown: Callable[..., Any], places: 
     for path in ("checkout/results", "far/x"):
         assert inside(places / path, mounts) == places / path
     assert mounts[Path("/fenwear")] == places / "checkout"
+
+
+COMPLETE = """
+source "$1/docker/completion.bash"
+shift
+COMP_CWORD=$1
+shift
+COMP_WORDS=("$@")
+_fenwear_words
+printf '%s\\n' "${COMPREPLY[@]}"
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["fenwear", "st"], ["steady"]),
+        (["fenwear", "--b"], ["--build"]),
+        (["fenwear", "test", "-"], ["--fast"]),
+        (["fenwear", "docs", ""], ["--show"]),
+        (["fenwear", "info", "motion.am"], ["/fenwear 2 fenwear info motion.am"]),
+    ],
+)
+@pytest.mark.parametrize("built", [True, False])
+def test_completion_of_the_launcher(words: list[str], expected: list[str], built: bool, tmp_path: Path) -> None:
+    """Commands come from the launcher at once, all else from fenwear, where there is an image: none is built for it."""
+    engine = tmp_path / "docker"
+    engine.write_text(
+        "#!/bin/sh\n"
+        f'case $1 in image) exit {0 if built else 1} ;; build) touch "$0.built" ;; run) ;; *) exit 0 ;; esac\n'
+        "while [ $# -gt 0 ]; do\n"
+        "    case $1 in --workdir) at=$2 ;; COMP_WORDS=*) text=${1#*=} ;;\n"
+        '    COMP_CWORD=*) echo "$at ${1#*=} $text" ;; esac\n'
+        "    shift\ndone\n"
+    )
+    engine.chmod(0o755)
+    variables = {
+        "PATH": f"{tmp_path}:{os.environ['PATH']}",
+        "FENWEAR_ENGINE": "docker",
+        "XDG_CACHE_HOME": str(tmp_path),
+    }
+    command = ["bash", "-c", COMPLETE, "bash", str(ROOT), str(len(words) - 1), *words]
+    env = {**os.environ, **variables}
+    done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=PATIENCE, check=True)
+    from_fenwear = words[1] == "info"
+    assert done.stdout.split("\n")[:-1] == (expected if built or not from_fenwear else [""])
+    assert not (tmp_path / "docker.built").exists()
+
+
+def test_every_command_is_completed(tmp_path: Path) -> None:
+    """An empty first word gives all that the usage names."""
+    done = subprocess.run(
+        [str(ROOT / "docker" / "fenwear"), "--complete", "1", "fenwear", ""],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=True,
+    )
+    from fenwear.cli import app
+
+    names = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}  # type: ignore[union-attr]
+    assert names | {"test", "lint", "docs", "--build", "--suite", "--help"} == set(done.stdout.split())

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
+import time
 from pathlib import Path
+from queue import Empty
 from typing import Any
 
 import pytest
@@ -12,6 +15,9 @@ import pytest
 jupytext = pytest.importorskip("jupytext")
 nbclient = pytest.importorskip("nbclient")
 pytest.importorskip("ipykernel")
+asynchronous, channels, manager = (
+    pytest.importorskip(f"jupyter_client.{name}") for name in ("asynchronous", "channels", "manager")
+)
 
 ROOT = Path(__file__).parents[1]
 DEMOS = ROOT / "demos"
@@ -28,6 +34,28 @@ NAMES = [
     "10_partial_slip",
 ]
 SECONDS = 1800  # ends what hangs, however busy the machine
+
+
+class _Channel(channels.AsyncZMQSocketChannel):
+    """Asks anew every second: asyncio can miss that a message has come, which then lies there until the timeout."""
+
+    async def get_msg(self, timeout: float | None = None) -> dict[str, Any]:
+        end = math.inf if timeout is None else time.monotonic() + timeout
+        while True:
+            left = end - time.monotonic()
+            try:
+                return await super().get_msg(min(1.0, max(0.0, left)))
+            except Empty:
+                if left <= 1.0:
+                    raise
+
+
+class _Client(asynchronous.AsyncKernelClient):
+    shell_channel_class = iopub_channel_class = control_channel_class = _Channel
+
+
+class _Manager(manager.AsyncKernelManager):
+    client_factory = _Client
 
 
 def _cells(notebook: Any) -> list[tuple[str, str]]:
@@ -68,7 +96,11 @@ def test_notebook_runs(name: str, tmp_path: Path) -> None:
         pytest.skip("mpirun is missing")
     notebook = jupytext.read(DEMOS / f"{name}.ipynb")
     client = nbclient.NotebookClient(
-        notebook, timeout=SECONDS, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
+        notebook,
+        timeout=SECONDS,
+        kernel_name="python3",
+        kernel_manager_class=_Manager,
+        resources={"metadata": {"path": str(tmp_path)}},
     )
     # The session's own MPI must not show through to the kernel and the processes that it starts.
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE_", "OMPI_COMM", "OMPI_FILE"))}

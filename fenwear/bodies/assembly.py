@@ -15,7 +15,8 @@ from dolfinx import fem, la
 from petsc4py import PETSc
 from scipy.sparse import bsr_array
 
-from fenwear.arrays import Array
+from fenwear import compat
+from fenwear.arrays import Array, Mask
 from fenwear.parallel import lasting
 
 
@@ -47,6 +48,40 @@ def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: b
     sizes = ((shape[0], maps[0].size_global * blocks[0]), (maps[1].size_local * blocks[1], shape[1]))
     csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
     matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=lasting(form.mesh.comm))
+    matrix.assemble()
+    return matrix
+
+
+def assembled_here(form: fem.Form, bcs: Sequence[fem.DirichletBC], present: Mask) -> PETSc.Mat:
+    """Return what this rank's own cells give to a symmetric matrix, on this rank alone; collective.
+
+    Rows are this rank's own blocks and then its ghosts; only the upper triangle is stored. The sum over the
+    ranks is the matrix.
+
+    Args:
+        form: Compiled, of one space.
+        bcs: Their rows and columns get ones on the diagonal, once among all ranks.
+        present: Which local blocks the cells have (n,); others get ones on the diagonal.
+    """
+    block, count = form.function_spaces[0].dofmap.index_map_bs, len(present)
+    pattern = fem.create_sparsity_pattern(form)
+    pattern.finalize()
+    columns, starts = compat.pattern_rows(pattern)
+    rows = np.repeat(np.arange(count, dtype=np.int32), np.diff(starts[: count + 1]))
+    columns = columns[: len(rows)]
+    upper = np.bincount(rows[(columns >= rows) & (columns < count)], minlength=count)
+    matrix = PETSc.Mat().create(PETSc.COMM_SELF)
+    matrix.setType("seqsbaij")
+    matrix.setSizes((block * count, block * count))
+    matrix.setBlockSize(block)
+    matrix.setOption(PETSc.Mat.Option.IGNORE_LOWER_TRIANGULAR, True)
+    matrix.setPreallocationNNZ(np.maximum(upper, 1).astype(PETSc.IntType))
+    every = np.arange(count, dtype=PETSc.IntType)
+    matrix.setLGMap(PETSc.LGMap().create(every, bsize=block, comm=PETSc.COMM_SELF))
+    fem.petsc.assemble_matrix(matrix, form, bcs=list(bcs))
+    absent = (block * np.flatnonzero(~present)[:, None] + np.arange(block)).ravel().astype(PETSc.IntType)
+    ones = np.arange(len(absent) + 1, dtype=PETSc.IntType)
+    matrix.setValuesIJV(ones, absent, np.ones(len(absent)), addv=PETSc.InsertMode.INSERT, rowmap=absent)
     matrix.assemble()
     return matrix
 

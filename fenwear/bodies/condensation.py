@@ -22,6 +22,7 @@ from fenwear.bodies import kept
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import make_together, solve_together
 from fenwear.bodies.response import Request, respond_together
+from fenwear.bodies.substructure import make_substructures
 
 
 @dataclass(frozen=True)
@@ -132,19 +133,28 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
     """Factor and solve; collective."""
     if not requests:
         return []
-    factors = [
-        one.elastic.begin_factor(number, with_surface=one.by_surface) for number, one in enumerate(reversed(requests))
-    ][::-1]  # the first rank gets the last one
-    make_together(factors)
+    _eliminate(requests)
     found = respond_together(requests)
-    loads = solve_together(factors, [one.elastic.load for one in requests])
+    loads = _under_loads([one.elastic for one in requests])
     condensed = []
     for one, (response, by_temperature), load in zip(requests, found, loads, strict=True):
         q, d, along = one.patterns.shape[1], one.elastic.dim, one.along
         whole = _symmetric(response.reshape(q, d, q, -1), along)
-        by_load = one.patterns.T @ one.elastic.trace.pick(load[:, None])[:, :, 0]
+        by_load = one.patterns.T @ load
         condensed.append(CondensedBody(one.patterns, along, whole, by_load, by_temperature))
     return condensed
+
+
+def _eliminate(requests: Sequence[Request]) -> None:
+    """Eliminate bodies in substructures by all ranks, or factor each on a rank of its own, all at once; collective."""
+    substructures, factors = [], []
+    for owner, one in enumerate(reversed(requests)):  # the first rank gets the last one
+        if one.in_substructures:
+            substructures.append(one.elastic.begin_substructures(backwards=owner % 2 == 1))
+        else:
+            factors.append(one.elastic.begin_factor(owner, with_surface=one.by_surface))
+    make_substructures(substructures)
+    make_together(factors)
 
 
 def _symmetric(response: Array, along: Array) -> Array:
@@ -157,4 +167,23 @@ def _symmetric(response: Array, along: Array) -> Array:
 
 def respond_to_load(elastic: ElasticBody, patterns: csr_array) -> Array:
     """Return the displacement at each pattern under the body's loads (q, d), mm; collective."""
-    return patterns.T @ elastic.trace.pick(elastic.factor.solve(elastic.load)[:, None])[:, :, 0]
+    return np.asarray(patterns.T @ _under_loads([elastic])[0])
+
+
+def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:
+    """Return the displacement of each body's trace nodes under its loads (N, d), mm, all solved at once; collective."""
+    found: dict[int, Array] = {}
+    by_factor = []
+    for number, body in enumerate(bodies):
+        substructures = body.substructures
+        if substructures is not None:
+            found[number] = substructures.surface_solution(body.load[:, None]).reshape(-1, body.dim)
+        else:
+            by_factor.append(number)
+    if by_factor:
+        loads = [bodies[number].load for number in by_factor]
+        for number, solution in zip(
+            by_factor, solve_together([bodies[number].factor for number in by_factor], loads), strict=True
+        ):
+            found[number] = bodies[number].trace.pick(solution[:, None])[:, :, 0]
+    return [found[number] for number in range(len(bodies))]

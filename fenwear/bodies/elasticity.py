@@ -23,6 +23,7 @@ from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.bodies.substructure import Boundary, Substructures
 from fenwear.case import Body, Kind, Load, Support
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
@@ -97,7 +98,9 @@ class ElasticBody:
             self._ufl, self._form = a, fem.form(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
-        self._factors: list[Factor] = []  # none or one, of all bodies that differ by their loads
+        # None or one of each, of all bodies that differ by their loads.
+        self._factors: list[Factor] = []
+        self._substructures: list[Substructures] = []
 
     def _set_loads(self, loads: Sequence[Load]) -> None:
         load = self._assemble_load(loads)
@@ -152,6 +155,32 @@ class ElasticBody:
         values += [function.x.array for function in form.coefficients()]
         nodes = [mesh.geometry.x, compat.geometry_dofmap(mesh), self.space.dofmap.list]
         return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs]
+
+    def solve(self, right: Array) -> Array:
+        """Return K^-1 times right-hand sides on the owned degrees of freedom, (owned,) or (owned, k); collective."""
+        return (self.substructures or self.factor).solve(right)
+
+    @property
+    def substructures(self) -> Substructures | None:
+        """K as substructures, where they are made."""
+        return next((one for one in self._substructures if one.is_made), None)
+
+    @cached_property
+    def boundary(self) -> Boundary:
+        """What this rank's cells share with others and with the contact surface; collective at first use."""
+        return Boundary(self.space, self.surface_dofs)
+
+    def begin_substructures(self, *, backwards: bool = False) -> Substructures:
+        """Return K as substructures, made or yet to be made; collective at first use.
+
+        Args:
+            backwards: Whether the last rank is their owner, and not the first.
+        """
+        if not self._substructures:
+            comm, surface = self.body.mesh.comm, self.surface_dofs
+            parts = (self._form, self._bcs, self.boundary, surface)
+            self._substructures.append(Substructures(*parts, prefix=PREFIX, comm=comm, backwards=backwards))
+        return self._substructures[0]
 
     @property
     def factor(self) -> Factor:

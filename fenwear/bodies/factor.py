@@ -35,6 +35,11 @@ def entries(size: int, dim: int) -> int:
     return int(5 * size * math.log2(max(size, 2)) if dim == 2 else 22 * size ** (4 / 3))
 
 
+def operations(size: int, dim: int) -> float:
+    """Return about how many operations making such a factor takes: 60 n^1.5 in the plane, 8 n² else."""
+    return 60.0 * size**1.5 if dim == 2 else 8.0 * size**2
+
+
 class Factor:
     """The factor of a distributed matrix: `make_together` computes it.
 
@@ -132,19 +137,7 @@ class Factor:
         factor = self._solver
         if factor is None:
             return right
-        sizes = self._sizes if self.is_spread else (len(right), len(right))
-        if right.shape[1] == 1:
-            before = PETSc.Vec().createWithArray(np.ascontiguousarray(right[:, 0]), size=sizes, comm=factor.comm)
-            after = before.duplicate()
-            factor.solve(before, after)
-            solution = np.array(after.array_r)[:, None]
-        else:
-            before = dense(sizes, right, factor.comm)
-            after = before.duplicate()
-            factor.matSolve(before, after)
-            solution = np.array(after.getDenseArray())
-        destroy(before, after)
-        return solution
+        return solved(factor, right, self._sizes if self.is_spread else None)
 
     def solve_sparse(self, right: csr_array) -> Array:
         """Return the solutions (n, k) for the rows of a sparse matrix (k, n), on the owner alone.
@@ -205,16 +198,49 @@ def make_together(factors: Sequence[Factor]) -> None:
     Raises:
         ConvergenceError: a matrix has no factor; on every rank.
     """
+    if not factors:
+        return
     error: ConvergenceError | None = None
     for factor in factors:
         try:
             factor.compute()
         except ConvergenceError as caught:  # raised below, on all ranks
             error = error or caught
-    comm = factors[0].comm
+    raised_together(factors[0].comm, error)
+
+
+def raised_together(comm: MPI.Comm, error: ConvergenceError | None) -> None:
+    """Raise the first error that any rank has, on every rank; collective.
+
+    Raises:
+        ConvergenceError: there is one.
+    """
     found = [one for one in comm.allgather(error) if one is not None]
     if found:
         raise found[0]
+
+
+def solved(factor: PETSc.Mat, right: Array, sizes: tuple[int, int] | None = None) -> Array:
+    """Return the solutions of right-hand sides (rows, k); collective where the factor is spread.
+
+    Args:
+        factor: Computed.
+        right: This rank's rows.
+        sizes: Number of rows here and in all; by default all are here.
+    """
+    sizes = sizes or (len(right), len(right))
+    if right.shape[1] == 1:
+        before = PETSc.Vec().createWithArray(np.ascontiguousarray(right[:, 0]), size=sizes, comm=factor.comm)
+        after = before.duplicate()
+        factor.solve(before, after)
+        solution = np.array(after.array_r)[:, None]
+    else:
+        before = dense(sizes, right, factor.comm)
+        after = before.duplicate()
+        factor.matSolve(before, after)
+        solution = np.array(after.getDenseArray())
+    destroy(before, after)
+    return solution
 
 
 def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[Array]:
@@ -249,6 +275,16 @@ def _moved(matrix: PETSc.Mat, owner: int, kind: str) -> PETSc.Mat | None:
     if whole is not None:
         whole.setOption(PETSc.Mat.Option.SPD, kind == "cholesky")
     return whole
+
+
+def factored_here(matrix: PETSc.Mat, prefix: str, surface: NDArray[np.int64]) -> PETSc.Mat:
+    """Return the Cholesky factor of this rank's own matrix, with the Schur complement of some rows (m,).
+
+    Raises:
+        ConvergenceError: it has no factor.
+    """
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    return _factored(matrix, prefix, "cholesky", repeated=False, surface=surface)
 
 
 def _factored(

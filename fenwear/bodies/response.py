@@ -18,12 +18,14 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import entries, moved
+from fenwear.bodies.factor import entries, moved, operations
 from fenwear.bodies.schur import available
+from fenwear.bodies.substructure import Substructures
 from fenwear.parallel import total
 
 BLOCK = 64  # right-hand sides solved at once: enough for BLAS 3, and the memory stays small
 SURFACE_SHARE = 10  # entries of the factor for each of the Schur complement, from which on that pays
+BOUNDARY_SHARE = 0.5  # of the factor's operations that joining the ranks' boundaries may take
 
 Columns = NDArray[np.int64]
 
@@ -83,12 +85,19 @@ class Request:
         small = surface**2 * SURFACE_SHARE <= entries(self.elastic.size, self.elastic.dim)
         return self.thermal_coupling is None and small and available()
 
+    @property
+    def in_substructures(self) -> bool:
+        """Whether all ranks eliminate the body together: where what they share is small; collective at first use."""
+        elastic = self.elastic
+        cost = elastic.boundary.largest**3
+        return self.by_surface and cost <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
+
 
 def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | None]]:
     """Return the response (q, d, q a) and that to temperature (q, owned), or None, of each body; collective.
 
-    Their factors are made. Each owner solves a block of columns of its body, then all share what they have
-    found: bodies of different owners are solved at once.
+    They are factored, or eliminated in substructures. Each owner solves a block of columns of its body, then
+    all share what they have found: bodies of different owners are solved at once.
     """
     answers = [_Answer(one) for one in requests]
     for number in range(max(len(answer.blocks) for answer in answers)):
@@ -104,8 +113,9 @@ class _Answer:
 
     def __init__(self, request: Request) -> None:
         """Bring to the owner what it needs; collective."""
-        self.request, self.factor = request, request.elastic.factor
         elastic, coupling = request.elastic, request.thermal_coupling
+        self.request = request
+        self.factor = elastic.begin_substructures() if request.in_substructures else elastic.factor
         self.comm: MPI.Comm = self.factor.comm
         held = np.zeros(len(elastic.load))
         held[elastic.supported] = 1.0
@@ -135,7 +145,10 @@ class _Answer:
         elastic, forces = self.request.elastic, self.request.forces(columns)
         at_surface = forces.reshape(-1, len(columns))
         at_surface[self._held] = 0.0
-        if self.factor.is_spread:
+        if isinstance(self.factor, Substructures):
+            displacement = self.factor.solve_on_surface(at_surface)
+            displacement[self._held] = 0.0
+        elif self.factor.is_spread:
             solution = self.factor.solve(elastic.trace.place(at_surface.reshape(forces.shape)))
             displacement = elastic.trace.pick(solution)
         elif self.factor.schur is not None and self._coupling is None:

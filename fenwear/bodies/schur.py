@@ -18,6 +18,8 @@ from petsc4py import PETSc
 from fenwear.arrays import Array
 from fenwear.compat import petsc_library
 
+INVERTED = 2  # PETSc's MAT_FACTOR_SCHUR_INVERTED
+
 
 @cache
 def _library() -> ctypes.CDLL | None:
@@ -30,11 +32,15 @@ def _library() -> ctypes.CDLL | None:
     for name, count in (
         ("MatFactorSetSchurIS", 2),
         ("MatFactorCreateSchurComplement", 3),
+        ("MatFactorGetSchurComplement", 3),
         ("MatDenseGetArrayRead", 2),
         ("MatDenseRestoreArrayRead", 2),
         ("MatDestroy", 1),
+        ("MatZeroEntries", 1),
     ):
         getattr(library, name).argtypes = [pointer] * count
+    library.MatShift.argtypes = [pointer, ctypes.c_double]
+    library.MatFactorRestoreSchurComplement.argtypes = [pointer, pointer, ctypes.c_int]
     return library
 
 
@@ -64,6 +70,22 @@ def schur_complement(factor: PETSc.Mat, size: int) -> Array:
     _call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
     _call("MatDestroy", ctypes.byref(matrix))
     return complement
+
+
+def condense_only(factor: PETSc.Mat) -> None:
+    """Make a computed factor solve for what is eliminated alone, as if S were the identity.
+
+    For right-hand sides f_i and f_s its solutions are then
+
+        x_s = f_s - K_si K_ii^-1 f_i,    x_i = K_ii^-1 (f_i - K_is x_s).
+
+    MUMPS needs no more of S than its inverse, which is given to it as the identity.
+    """
+    matrix, status = ctypes.c_void_p(), ctypes.c_int()
+    _call("MatFactorGetSchurComplement", factor.handle, ctypes.byref(matrix), ctypes.byref(status))
+    _call("MatZeroEntries", matrix)
+    _call("MatShift", matrix, 1.0)
+    _call("MatFactorRestoreSchurComplement", factor.handle, ctypes.byref(matrix), INVERTED)
 
 
 def _call(name: str, *arguments: object) -> None:

@@ -14,11 +14,10 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from fenwear.case.laws import Dependence
-from fenwear.case.schema import Case, Written
+from fenwear.case.schema import OFFSET, Case, Written
 
 HOT = 2000.0  # K: most metals have melted, and no friction couple is used there
 NUMBER_AND_UNIT = re.compile(r"\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*(.*?)\s*", re.DOTALL)
-OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", re.IGNORECASE)
 COLD = 150.0  # K: below it a table over T beside absolute temperatures is one over degrees Celsius
 ABSOLUTE = 200.0  # K: initial temperatures above it are absolute, not differences
 

@@ -13,7 +13,7 @@ import pydantic
 from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
 from fenwear.case.program import check_length, half_cycles_of, with_program
-from fenwear.case.schema import Case
+from fenwear.case.schema import Case, Written
 from fenwear.case.units import shown
 from fenwear.errors import CaseError, InputError
 
@@ -154,4 +154,7 @@ def changed_case(case: Case, *settings: str) -> Case:
     data = case.resolved()
     for setting in settings:
         _apply(data, setting)
-    return make_case(data, case.folder)
+    changed = make_case(data, case.folder)
+    own, before = changed.written, case.written  # quantities are resolved now: how they were written is known of before
+    as_were = {key: before.united.get(key, text) for key, text in own.united.items()}
+    return changed.at(case.folder, Written(own.bare, as_were))

@@ -6,6 +6,7 @@ the punch) is checked where the geometry is read, and reported with the same key
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,8 @@ from fenwear.case.materials import Material
 from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
 from fenwear.case.quantities import Part
 from fenwear.case.thermal import Heat
+
+OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -127,6 +130,11 @@ class Case(Part):
         if kind != "plane" and self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' but in plane models")
         return problems
+
+    @property
+    def in_degrees(self) -> bool:
+        """Whether a temperature of it was written in degrees, not in kelvin."""
+        return self.heat is not None and any(OFFSET.search(text) for text in self.written.united.values())
 
     @property
     def initial_materials(self) -> dict[str, Material]:
@@ -237,7 +245,10 @@ class Case(Part):
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
             "contact.solver: expected 'condensed'": self.contact.solver == "full",
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
-            "heat: expected none": self.heat is not None,
+            "heat: expected none in a solid": self.heat is not None and self.model.kind == "solid",
+            "heat.track: expected none": self.heat is not None and self.heat.track is not None,
+            "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
+            "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
             "program: expected none": self.program is not None,
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes,

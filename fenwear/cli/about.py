@@ -8,13 +8,19 @@ from typing import Annotated
 import typer
 
 from fenwear.case import builtin_cases
+from fenwear.cli import suggestions
 from fenwear.cli.base import JsonOption, app, print_json
 
 
 @app.command("info")
 def info_command(
     key: Annotated[
-        str | None, typer.Argument(metavar="KEY", help="Explain this key of the case file, or this table.")
+        str | None,
+        typer.Argument(
+            metavar="KEY",
+            help="Explain this key of the case file, or this table.",
+            autocompletion=suggestions.keys,
+        ),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -10,6 +10,7 @@ import typer
 from mpi4py import MPI
 
 from fenwear.case import Case, load_case
+from fenwear.cli import suggestions
 from fenwear.parallel import on_root
 
 app = typer.Typer(
@@ -21,9 +22,22 @@ app = typer.Typer(
 
 DEFAULT_CASE = "example1-heat"
 
-CaseArgument = Annotated[str, typer.Argument(metavar="CASE", help="A case file (TOML) or the name of a built-in case.")]
+CaseArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CASE",
+        help="A case file (TOML) or the name of a built-in case.",
+        autocompletion=suggestions.cases,
+    ),
+]
 SetOption = Annotated[
-    list[str], typer.Option("--set", metavar="KEY=VALUE", help='Override a key: --set motion.amplitude="2 mm"')
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help='Override a key: --set motion.amplitude="2 mm"',
+        autocompletion=suggestions.settings,
+    ),
 ]
 FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whatever earlier runs have kept on disk.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]

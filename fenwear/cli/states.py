@@ -94,6 +94,7 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     The load over the whole surface is a pressure only where the surfaces lie on each other before they wear.
     """
     from fenwear.cycle.state import pressure_scale
+    from fenwear.results.degrees import degrees_of
     from fenwear.results.scar import conforming
 
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
@@ -108,8 +109,10 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     print(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
     if state.heat is not None:
-        punch, strip = state.heat.punch.max(), state.heat.strip.max()
-        print(f"  largest temperature at the contact: punch {punch:.3f} K, strip {strip:.3f} K")
+        degrees = degrees_of(system.case)
+        punch, strip = (degrees.of(body.max()) for body in (state.heat.punch, state.heat.strip))
+        unit = degrees.shown
+        print(f"  largest temperature at the contact: punch {punch:.3f} {unit}, strip {strip:.3f} {unit}")
     sys.stdout.flush()
 
 

@@ -12,20 +12,24 @@ open, such as the wear of the step they belong to.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Phases
+from fenwear.contact.operators import Operator, Phases
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedies
 
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
+MANY = 400  # nodes from which on only what those near contact ask for is made
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
 
@@ -65,6 +69,9 @@ class Layer(Protocol):
     def opening(self, pressure: Array) -> Array:
         """Return the added gap (m, n), mm, from the pressures (m, n)."""
 
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
+
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n): its derivative, of phase k to pressures j, is L_k R_j, mm/MPa."""
 
@@ -87,7 +94,8 @@ class CondensedContact:
 
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
     PETSc's absolute tolerances mean the same for every case. Phases meet in the layer only: where
-    there are many, one small elimination for each of them takes the place of one of all.
+    there are many, one small elimination for each of them takes the place of one of all. Where nodes are
+    many, no matrix of all of them is made: see `fenwear.contact.blocks`.
     """
 
     def __init__(self, phases: Sequence[SlidingContact], remedies: Remedies | None = None) -> None:
@@ -105,27 +113,41 @@ class CondensedContact:
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
         self._unit = np.concatenate([np.full(n, self._pressure_scale), self._rigid_scale])
-        self._blocks = np.zeros((m, size, size))
+        self._many = n > MANY
+        self._dense: Array = np.zeros((m, 0 if self._many else size, size))
+        self._blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
         self.press(1.0)
-        for phase, block in zip(self.phases, self._blocks, strict=True):
-            block[:n, n:] = phase.interface.rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
         self._ratios = [phase.friction_ratio for phase in self.phases]
-        for k, ratio in enumerate(self._ratios):
-            self._fill_friction(k, ratio)
+        self._slide(range(m))
         self._coupling: Array | None = None
         self._layer: Layer | None = None
-        self._right: Array | None = None  # of the layer's border
-        self._elastic: Phases | None = None
-        self._operator: Phases | None = None
+        self._slope: Array | None = None  # of the layer
+        self._elastic: Operator | None = None
+        self._operator: Operator | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         self.inequality = Inequality(lower, np.full(m * size, np.inf), self._residual, self._jacobian, PREFIX, NAME)
 
-    def _fill_friction(self, k: int, ratio: Array) -> None:
-        n, interface = self.shape[1], self.phases[k].interface
-        balance = interface.rigid.equilibrium(ratio)
-        self._blocks[k, :n, :n] = interface.compliance(ratio) * (self._pressure_scale / self._gap_scale)
-        self._blocks[k, n:, :n] = balance * (self._pressure_scale / self._resultant_scale[:, None])
+    def _slide(self, phases: Iterable[int]) -> None:
+        """Take the friction of phases."""
+        n, scale = self.shape[1], self._pressure_scale / self._gap_scale
+        blocks: list[PhaseBlock | None] = [*self._blocks] or [None] * len(self.phases)
+        for k in phases:
+            interface, ratio = self.phases[k].interface, self._ratios[k]
+            modes = interface.rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
+            balance = interface.rigid.equilibrium(ratio) * (self._pressure_scale / self._resultant_scale[:, None])
+            if self._many:
+                blocks[k] = PhaseBlock(
+                    Columns(n, partial(_scaled_columns, interface, ratio, scale)),
+                    interface.own_compliance(ratio) * scale,
+                    modes,
+                    balance,
+                    iterated=len(self.phases) == 1,
+                )
+            else:
+                self._dense[k, :n, :n] = interface.compliance(ratio) * scale
+                self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
+        self._blocks = [block for block in blocks if block is not None]
 
     def press(self, factor: float) -> None:
         """Take all loads times a factor."""
@@ -136,11 +158,12 @@ class CondensedContact:
 
     def slide(self, ratios: Sequence[Array]) -> None:
         """Set tau of each phase, (n, d) each."""
-        for k, (ratio, before) in enumerate(zip(ratios, self._ratios, strict=True)):
-            if ratio is not before and not np.array_equal(ratio, before):
-                self._fill_friction(k, ratio)
-                self._elastic = self._operator = None
+        pairs = enumerate(zip(ratios, self._ratios, strict=True))
+        changed = [k for k, (ratio, before) in pairs if ratio is not before and not np.array_equal(ratio, before)]
         self._ratios = list(ratios)
+        if changed:
+            self._slide(changed)
+            self._elastic = self._operator = None
 
     def _residual(self, x: Array) -> Array:
         f = self._linear.multiply(x)
@@ -152,24 +175,36 @@ class CondensedContact:
         return f
 
     @property
-    def _linear(self) -> Phases:
+    def _linear(self) -> Operator:
         """The derivative of the residual without the layer."""
         if self._elastic is None:
-            coupling = self._coupling
-            scaled = None if coupling is None else coupling * (self._pressure_scale / self._gap_scale)
-            self._elastic = Phases(self._blocks, scaled)
+            self._elastic = ManyNodes(self._blocks) if self._many and self._coupling is None else self._as_phases()
         return self._elastic
 
-    def _jacobian(self, x: Array) -> Phases:
+    def _as_phases(self, border: tuple[Array, Array] | None = None) -> Phases:
+        """Return the derivative by matrices of all nodes."""
+        scale = self._pressure_scale / self._gap_scale
+        dense = np.array([block.matrix() for block in self._blocks]) if self._many else self._dense
+        return Phases(dense, None if self._coupling is None else self._coupling * scale, border)
+
+    def _jacobian(self, x: Array) -> Operator:
         if self._layer is None:
             return self._linear
         m, n = self.shape
-        left, right = self._layer.border(x.reshape(m, -1)[:, :n] * self._pressure_scale)
-        if self._operator is None or self._right is None or not np.array_equal(right, self._right):
-            scale = self._pressure_scale / self._gap_scale
-            coupling = None if self._coupling is None else self._coupling * scale
-            self._right, self._operator = right, Phases(self._blocks, coupling, (left, right * scale))
-        return self._operator
+        pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._pressure_scale / self._gap_scale
+        slope = self._layer.local(pressure) if self._many and self._coupling is None else None
+        left: Array | None = None
+        if slope is None:
+            left, slope = self._layer.border(pressure)
+        last = self._operator
+        if last is None or self._slope is None or not np.array_equal(slope, self._slope):
+            self._slope = slope
+            if left is None:
+                before = last if isinstance(last, ManyNodes) else None
+                self._operator = ManyNodes(self._blocks, slope * scale, before)
+            else:
+                self._operator = self._as_phases((left, slope * scale))
+        return self._operator or self._linear
 
     def solve(
         self,
@@ -229,3 +264,7 @@ class CondensedContact:
         full[:, : self.shape[1]] = 1.0
         yield full, False, FULL_START
         yield full, True, FULL_START_SEARCH
+
+
+def _scaled_columns(interface: Interface, ratio: Array, scale: float, nodes: NDArray[np.int64]) -> Array:
+    return interface.compliance_of(ratio, nodes) * scale

@@ -47,7 +47,8 @@ def gmres_solution(
     multiply: Callable[[Array], Array],
     precondition: Callable[[Array], Array],
     b: Array,
-    count: Callable[[int], None],
+    count: Callable[[int], None] = lambda _: None,
+    enough: float = 0.0,
 ) -> Array:
     """Return the solution of a square system (size,).
 
@@ -56,6 +57,7 @@ def gmres_solution(
         precondition: That with a matrix near its inverse.
         b: Right-hand side (size,).
         count: Told of the iterations.
+        enough: Residual that ends them in any case.
 
     Raises:
         NotSolvedError: the accuracy was not reached.
@@ -70,6 +72,7 @@ def gmres_solution(
         LinearOperator(shape, matvec=multiply, dtype=float),
         b,
         rtol=ACCURACY,
+        atol=enough,
         restart=min(RESTART, len(b)),
         maxiter=RESTARTS,
         M=LinearOperator(shape, matvec=precondition, dtype=float),

@@ -29,6 +29,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.contact.krylov import NotSolvedError, gmres_solution
 from fenwear.contact.operators import Dense, Indices, Solve, Updating, eliminate
 
+ENOUGH = 2e-12  # residual, scaled to 1, that ends the iterations
 WHOLE = 600
 
 
@@ -352,7 +353,7 @@ class _Reduced:
         target = -self._rows(p, none, none[0], np.zeros(r))
         target[len(target) - r :] += forces[0]
         target[len(target) - r - len(self.shaped) : len(target) - r] += wear[self.shaped]
-        y = gmres_solution(self.multiply, self.precondition, target, self._count)
+        y = gmres_solution(self.multiply, self.precondition, target, self._count, ENOUGH)
         thermal, omega, velocity = self._opened(y)
         p, a = self.pressed(gaps - thermal - omega, forces)
         return np.concatenate([p.ravel(), omega, a.ravel(), velocity])

@@ -33,6 +33,7 @@ def prepare_exchange(
     thickness: float,
     *,
     reduced: bool,
+    at_rest: bool = False,
 ) -> HeatExchange:
     """Return the exchange over the half-cycles of the motion; collective.
 
@@ -46,6 +47,7 @@ def prepare_exchange(
         friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), in all phases.
         thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
+        at_rest: Whether the strip's material stays where it is, whatever the motion.
 
     Raises:
         CaseError: the half-cycles of the motion last unequally long.
@@ -56,7 +58,7 @@ def prepare_exchange(
     count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
     duration = motion.phases[0].duration / count
     speeds = motion.mean_speeds(count)
-    signed = [[d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
+    signed = [[0.0 if at_rest else d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
     velocities = sorted({velocity for row in signed for velocity in row})
     of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
     plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
@@ -36,6 +37,16 @@ class Interface:
         """
         traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
         return np.einsum("ijd,jd->ij", self.gap_by_force, traction)
+
+    def compliance_of(self, friction_ratio: Array, nodes: NDArray[np.int64]) -> Array:
+        """Return the columns of S of some nodes (n, k), mm/MPa."""
+        traction = (self.pair.normal[nodes] + friction_ratio[nodes]) * self.pair.weights[nodes, None]
+        return np.einsum("ijd,jd->ij", self.gap_by_force[:, nodes], traction)
+
+    def own_compliance(self, friction_ratio: Array) -> Array:
+        """Return the diagonal of S (n,), mm/MPa."""
+        traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
+        return np.einsum("iid,id->i", self.gap_by_force, traction)
 
     @cached_property
     def elastic_length(self) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from fenwear.report.course import shown_unit
 from fenwear.report.style import BLUE, GREY, RED, panels
 
 if TYPE_CHECKING:
@@ -64,5 +65,5 @@ def boundary_figure(fields: xarray.Dataset) -> Figure:
     along.axvspan(closed[0].min(), closed[0].max(), color="0.92", zorder=0)
     along.set_xlabel("x (mm)")
     for ax in (around, along):
-        ax.set_ylabel("temperature (K)")
+        ax.set_ylabel(f"temperature ({shown_unit(str(fields.punch_temperature.attrs.get('units', 'K')))})")
     return figure

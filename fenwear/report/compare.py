@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
 from fenwear.report.compare_surfaces import surface_comparison
 from fenwear.report.course import directions_present, mark_few
 from fenwear.report.figures import read_history
-from fenwear.report.key_numbers import flat, number_text, read_case, read_summary
+from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
+from fenwear.report.shapes import worn_range
 from fenwear.report.style import (
     DIRECTIONS,
     contact_axis,
@@ -25,7 +27,9 @@ from fenwear.report.style import (
     strip_moves,
 )
 from fenwear.report.surface import model_of
+from fenwear.results.degrees import in_kelvin
 from fenwear.results.disk import writing
+from fenwear.results.sheet import BODIES, LINES, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,15 +61,73 @@ class Comparison:
         return {"runs": self.names, "numbers": numbers, "cases": self.cases, "versions": self.versions}
 
     def text(self) -> str:
-        """Return the tables for people, a column per run."""
+        """Return the tables for people, a column per run: names and units of results, keys of cases."""
         parts = []
         tables = {"differences of the cases": self.cases, "differences of the versions": self.versions}
-        for title, table in {"results": self.numbers, **tables}.items():
+        for title, table in {**self.named(), **tables}.items():
             if table:
                 parts.append(_columns(title, self.names, table))
         if not self.cases:
             parts.append("the cases are equal")
         return "\n\n".join(parts)
+
+    def named(self) -> dict[str, dict[str, list[Any]]]:
+        """Return the results by their names and units: the sheet, what is at the same places, and the rest."""
+        of_sheet = {f"{part}.{key}" for part in ("sliding", *BODIES) for key in LINES}
+        # At quarters of each run's own contact: not the same places.
+        own_places = ("x_mm", "wear_mm", "pressure_MPa", "temperature_punch_", "temperature_strip_")
+        rest = {
+            _name(key): row
+            for key, row in self.numbers.items()
+            if key not in of_sheet and not key.rpartition(".")[2].startswith(own_places)
+        }
+        return {"results": self._sheet(), "at the same places": at_same_places(self.histories), "further": rest}
+
+    def _sheet(self) -> dict[str, list[Any]]:
+        """Return what stands on a tribometer's sheet, in the units in which it is read."""
+        found = {}
+        for part in ("sliding", *BODIES):
+            for key, line in LINES.items():
+                row = self.numbers.get(f"{part}.{key}")
+                if row is not None:
+                    unit = f" ({line.unit})" if line.unit else ""
+                    of = "" if part == "sliding" else f", {part}"
+                    found[f"{line.label}{of}{unit}"] = [shown(value, line) for value in row]
+        return found
+
+
+def at_same_places(histories: Sequence[xarray.Dataset]) -> dict[str, list[Any]]:
+    """Return depths and pressures at the end of plane runs at places that all of them have, by names with units."""
+    if any(model_of(history) != "plane" for history in histories):
+        return {}
+    low, high = (pick(float(end(history.x)) for history in histories) for pick, end in ((max, np.min), (min, np.max)))
+    if high <= low:
+        return {}
+    places = (low + high) / 2 + (high - low) * np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
+    places = np.round(places, 9) + 0.0
+    found: dict[str, list[Any]] = {}
+    values = {
+        "worn depth of the punch (µm)": ("wear", "x", 1e3),
+        "worn depth of the strip (µm)": ("wear_strip", "x_strip", 1e3),
+        "pressure, last half-cycle (MPa)": ("pressure", "x", 1.0),
+    }
+    for name, (variable, along, factor) in values.items():
+        if not any(variable in history for history in histories):
+            continue
+        rows = [
+            np.interp(places, history[along], factor * history[variable].isel(half_cycle=-1))
+            if variable in history
+            else np.full(len(places), np.nan)
+            for history in histories
+        ]
+        for k, x in enumerate(places):
+            found[f"{name} at x = {x:.4g} mm"] = [float(row[k]) for row in rows]
+    return found
+
+
+def _name(key: str) -> str:
+    unit = unit_of(key)
+    return f"{label_of(key)} ({unit})" if unit else label_of(key)
 
 
 def compare(directories: Sequence[Path]) -> Comparison:
@@ -80,7 +142,7 @@ def compare(directories: Sequence[Path]) -> Comparison:
     read = []
     for directory in directories:
         try:
-            read.append((read_history(directory), read_summary(directory), read_case(directory)))
+            read.append((in_kelvin(read_history(directory)), read_summary(directory), read_case(directory)))
         except CaseError as error:
             problems += error.problems
     if problems:
@@ -103,14 +165,18 @@ def comparison_figure(comparison: Comparison) -> Figure:
     runs = list(zip(comparison.names, comparison.histories, strict=True))
     present = [d for d in DIRECTIONS if any(d in directions_present(h) for h in comparison.histories)]
     hot = [h for h in comparison.histories if "max_temperature" in h]
-    count = 2 + len(present) + (1 if hot else 0)
+    stripped = [h for h in comparison.histories if "wear_strip" in h]
+    count = 2 + len(present) + (1 if hot else 0) + (1 if stripped else 0)
     figure, axes = panels(count, 2.5, share_x=False)
+    strip = axes.pop(1) if stripped else None
     shape, *pressures = axes[: 1 + len(present)]
     for number, (name, history) in enumerate(runs):
         # Thinner from run to run: where two agree, both are seen.
         style = {**run_style(number), "linewidth": max(1.2, 3.0 - 0.7 * number)}
         few = mark_few(history.half_cycle)
         shape.plot(history.x, 1e3 * history.wear.isel(half_cycle=-1), label=name, **style)
+        if strip is not None and "wear_strip" in history:
+            strip.plot(history.x_strip, 1e3 * history.wear_strip.isel(half_cycle=-1), label=name, **style)
         for ax, d in zip(pressures, present, strict=True):
             rows = history.direction.values == d
             if rows.any():
@@ -118,8 +184,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
         for ax, variable in zip(axes[1 + len(present) :], ("max_pressure", "max_temperature"), strict=False):
             if variable in history:
                 ax.plot(history.half_cycle, _larger_of_cycle(history, variable), label=name, **style, **few)
-    shape.set_title("Worn shape at the end", loc="left")
+    shape.set_title("Worn shape of the punch at the end", loc="left")
     shape.set_ylabel("worn depth w (µm)")
+    if strip is not None:
+        strip.set_title("Worn shape of the strip at the end", loc="left")
+        strip.set_ylabel("worn depth (µm)")
+        ends = [worn_range(history) for history in stripped]
+        strip.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
+        strip.set_ylim(bottom=0)
+        strip.set_xlabel("position along the strip x (mm)")
     for ax, d in zip(pressures, present, strict=True):
         ax.set_title(f"Pressure at the end, {strip_moves(runs[0][1])} {direction_words(runs[0][1])[d]}", loc="left")
         ax.set_ylabel("pressure p (MPa)")
@@ -132,7 +205,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         ax.set_ylabel(label)
         ax.set_xscale("log")
         ax.set_xlabel("half-cycle n")
-    for ax in axes:
+    for ax in (*axes, *([] if strip is None else [strip])):
         legend_beside(ax, "run")
     return figure
 

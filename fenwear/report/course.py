@@ -34,11 +34,10 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw largest pressure, width in contact and, with heat, largest temperature."""
     hot = "max_temperature" in history
     figure, axes = panels(3 if hot else 2, 2.5, look=look)
-    unit = history.max_temperature.attrs.get("units", "K") if hot else "K"
     over = {
         "max_pressure": "largest pressure (MPa)",
         "contact_width": "width in contact (mm)",
-        "max_temperature": f"largest temperature ({shown_unit(unit)})",
+        "max_temperature": f"largest temperature ({temperature_unit(history)})",
     }
     for ax, (name, label) in zip(axes, over.items(), strict=False):
         by_direction(ax, history, name, look)
@@ -176,6 +175,12 @@ def directions_present(history: xarray.Dataset) -> list[int]:
 def shown_unit(unit: str) -> str:
     """Return a unit as figures show it."""
     return {"degC": "°C"}.get(unit, unit)
+
+
+def temperature_unit(history: xarray.Dataset) -> str:
+    """Return the unit of the temperatures of a history as figures show it."""
+    known = "max_temperature" in history
+    return shown_unit(str(history.max_temperature.attrs.get("units", "K"))) if known else "K"
 
 
 def mark_few(points: Sized) -> dict[str, Any]:

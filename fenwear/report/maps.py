@@ -9,6 +9,7 @@ import numpy as np
 import xarray
 
 from fenwear.arrays import Array
+from fenwear.report.course import temperature_unit
 from fenwear.report.figures import pressure_top
 from fenwear.report.style import GREY, WIDTH, legend_beside, panels, shades
 from fenwear.report.surface import Surface, centre_of_wear, surface_of
@@ -34,15 +35,16 @@ class Quantity(NamedTuple):
 
 def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
     """Return what there are maps of, by the figure's name."""
+    warm = temperature_unit(history)
     found = {
         "pressure_map": Quantity("pressure", "punch", "Contact pressure", "MPa", 1.0, "YlGnBu"),
         "wear_map": Quantity("wear", "punch", "Worn depth of the punch", "µm", 1e3, "YlOrBr"),
         "wear_strip_map": Quantity("wear_strip", "strip", "Worn depth of the strip", "µm", 1e3, "YlOrBr"),
         "temperature_map": Quantity(
-            "temperature_punch", "punch", "Temperature of the punch's contact surface", "K", 1.0, "YlOrRd"
+            "temperature_punch", "punch", "Temperature of the punch's contact surface", warm, 1.0, "YlOrRd"
         ),
         "temperature_strip_map": Quantity(
-            "temperature_strip", "punch", "Temperature of the strip's surface below the punch", "K", 1.0, "YlOrRd"
+            "temperature_strip", "punch", "Temperature of the strip's surface below the punch", warm, 1.0, "YlOrRd"
         ),
     }
     return {name: q for name, q in found.items() if q.variable in history}

@@ -19,6 +19,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
 from fenwear.report.solid_pictures import draw_solids
 from fenwear.report.style import direction_words, save_gif, strip_moves
@@ -208,6 +209,7 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View, image: NDArray[n
 
     direction, half_cycle = int(data.attrs["direction"]), int(data.attrs["half_cycle"])
     name, unit, colours = SHOWN[field]
+    unit = shown_unit(str(data[f"punch_{field}"].attrs.get("units", unit)))
     low, high = view.ranges[field]
     values = np.concatenate([data[f"{b}_{field}"].values[_inside(data, b, view.box)] for b in BODIES])
     beyond = values.max() > high

@@ -15,7 +15,7 @@ ACTED = {
     "load": "normal force (N)",
     "load_factor": "loads over the case's",
     "speed": "mean speed",
-    "ambient": "ambient (K)",
+    "ambient": "ambient",
 }
 
 
@@ -28,7 +28,8 @@ def program_figure(history: xarray.Dataset) -> Figure:
     for ax, name in zip(axes, shown or ["load_factor"], strict=True):
         held = "steps-pre" if name in ("speed", "ambient") else "default"  # constant since the record before
         ax.plot(history.time, history[name], color="0", marker=".", markersize=3, linewidth=1, drawstyle=held)
-        unit = {"mm s-1": " (mm/s)"}.get(str(history[name].attrs.get("units")), "") if name == "speed" else ""
+        units = {"mm s-1": " (mm/s)", "rad s-1": " (rad/s)", "K": " (K)", "degC": " (°C)"}
+        unit = units.get(str(history[name].attrs.get("units")), "") if name in ("speed", "ambient") else ""
         ax.set_ylabel(f"{ACTED[name]}{unit}")
         low, high = float(history[name].min()), float(history[name].max())
         ax.set_ylim(min(0.0, 1.1 * low), 1.1 * max(high, 1e-300))

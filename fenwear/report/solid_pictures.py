@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
+from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
 from fenwear.report.style import GREY
 
@@ -187,6 +188,7 @@ def solid_figure(data: xarray.Dataset, field: str, view: SolidView, named: tuple
 
     solid = data.attrs["model"] == "solid"
     name, unit, colours = named
+    unit = shown_unit(str(data[f"punch_{field}"].attrs.get("units", unit)))
     low, high = view.ranges[field]
     bodies = [mesh(data, b, deformed(data, b, view), field) for b in BODIES]
     images = [_image(bodies, field, view, colours, whole=True, solid=solid)]

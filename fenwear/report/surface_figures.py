@@ -18,6 +18,7 @@ from fenwear.report.course import (
     mark_few,
     mean_pressure,
     nominal_width,
+    temperature_unit,
 )
 from fenwear.report.figures import chosen_half_cycles, nearest_half_cycles, pressure_top
 from fenwear.report.maps import cuts_figure, map_figure, quantities
@@ -82,7 +83,7 @@ def series_figure(history: xarray.Dataset) -> Figure:
     for ax in rest:
         by_direction(ax, history, "max_temperature")
         ax.set_title("Largest temperature of the contact surfaces, at the end of each half-cycle", loc="left")
-        ax.set_ylabel("temperature (K)")
+        ax.set_ylabel(f"temperature ({temperature_unit(history)})")
     for ax in axes[:4]:
         ax.set_ylim(bottom=0)
     legend_beside(pressure, strip_moves(history))
@@ -149,7 +150,7 @@ def ring_temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int])
         for colour, n in shades(half_cycles):
             ax.plot(x, history[f"temperature_{body}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
         ax.set_title(f"Temperature of the {body}'s contact surface", loc="left")
-        ax.set_ylabel("temperature (K)")
+        ax.set_ylabel(f"temperature ({temperature_unit(history)})")
         ax.margins(x=0.01)
         legend_beside(ax, "after half-cycle")
     axes[-1].set_xlabel(label)

@@ -65,13 +65,22 @@ def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
     comm, new = system.comm, directory / NEW
     on_root(comm, lambda: _begin(new, system, state))
     if state.temperature is not None:
-        for basis, function in zip(state.temperature.bases, state.temperature.functions(), strict=True):
-            _write_function(comm, new, f"temperature_{basis.body.body.name}", function)
+        write_temperatures(new, comm, state.temperature)
     if system.bodies.warmed is not None and system.bodies.heat is not None:
         for body, taken in zip(system.bodies.heat, system.bodies.warmed, strict=True):
             _write_function(comm, new, f"{WARMED}_{body.body.name}", body.function(taken))
     comm.Barrier()
     on_root(comm, lambda: swap(directory))
+
+
+def write_temperatures(folder: Path, comm: MPI.Comm, state: HeatState) -> None:
+    """Write the temperatures of both bodies into a folder; collective.
+
+    Raises:
+        OutputError: they cannot be written.
+    """
+    for basis, function in zip(state.bases, state.functions(), strict=True):
+        _write_function(comm, folder, f"temperature_{basis.body.body.name}", function)
 
 
 def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function) -> None:
@@ -144,7 +153,7 @@ def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
     folder = on_root(comm, lambda: find(directory))
     if bodies is None or not on_root(comm, (folder / f"{WARMED}_punch.bp").exists):
         return None
-    punch, strip = (_read_temperature(folder, body, WARMED) for body in bodies)
+    punch, strip = (read_temperature(folder, body, WARMED) for body in bodies)
     return punch, strip
 
 
@@ -175,7 +184,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     temperature = None
     if system.bodies.heat is not None:
         bulk = None if np.isnan(arrays[BULK]) else float(arrays[BULK])
-        read = [_read_temperature(folder, body) for body in system.bodies.heat]
+        read = [read_temperature(folder, body) for body in system.bodies.heat]
         temperature = HeatState.nodal(system.bodies.heat, read, bulk)
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
@@ -186,8 +195,12 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, *numbers)
 
 
-def _read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
-    """Return the temperatures of this rank's own nodes of a body; collective."""
+def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
+    """Return the temperatures of this rank's own nodes of a body; collective.
+
+    Raises:
+        CaseError: they cannot be read.
+    """
     comm, function = body.body.mesh.comm, body.function(body.initial())
     readable = True
     try:

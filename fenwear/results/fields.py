@@ -28,6 +28,7 @@ from fenwear.compat import interpolation_points
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
+from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import check_room, writing
 from fenwear.results.series import step_of
 from fenwear.results.subcells import linear_cells
@@ -140,7 +141,7 @@ def _solve(
         coupling.destroy()
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
-    displacement.x.array[:owned] = elastic.factor.solve(force)
+    displacement.x.array[:owned] = elastic.solve(force)
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
@@ -252,9 +253,20 @@ def write_fields(
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
     attributes["directions"] = " ".join(system.direction_words.values())
     data.update(_contact_surfaces(system, worn, pressure))
+    _in_degrees(data, system)
     import xarray  # with pandas, half a second that runs without fields spare themselves
 
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder, stem))
+
+
+def _in_degrees(data: dict[str, Any], system: Tribosystem) -> None:
+    """Put temperatures on the scale of the case."""
+    degrees = KELVIN if system.made_from is None else degrees_of(system.case)
+    for body in ("punch", "strip"):
+        name = f"{body}_temperature"
+        if name in data and degrees is not KELVIN:
+            over, values, attributes = data[name]
+            data[name] = (over, None if values is None else degrees.of(values), {**attributes, "units": degrees.unit})
 
 
 def _frame(system: Tribosystem) -> dict[str, Any]:

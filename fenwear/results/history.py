@@ -21,6 +21,7 @@ from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
 from fenwear.results import sheet
+from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.scar import conforming
 from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, surface_columns
@@ -199,6 +200,7 @@ class HistoryWriter:
         self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
         self._variables = _variables(system)
         self._columns = _columns(system)
+        self._degrees = degrees_of(system.case)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
         self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
@@ -238,7 +240,8 @@ class HistoryWriter:
                 kind = int if name in INTEGERS else float
                 inner = tuple(sizes[d] for d in dimensions[1:])
                 variable = file.create_variable(name, dimensions, kind, chunks=(_chunk(inner), *inner))
-                variable.attrs.update(units=units, long_name=long_name, **on_mesh(dimensions, system.pair.punch.dim))
+                own = self._degrees.unit if units == KELVIN.unit else units
+                variable.attrs.update(units=own, long_name=long_name, **on_mesh(dimensions, system.pair.punch.dim))
         self._twin.replace(self.path)
 
     def _cut(self, half_cycle: int) -> None:
@@ -246,6 +249,8 @@ class HistoryWriter:
         try:
             with h5netcdf.File(self.path, "r") as file:
                 stored = file["half_cycle"][:]
+                if "max_temperature" in file:  # a run goes on in the degrees that it began with
+                    self._degrees = degrees_in(str(file["max_temperature"].attrs["units"]))
                 missing = [n for n, (d, _, _) in self._variables.items() if file[n].ndim != len(d)]
             if missing:
                 raise KeyError(missing[0])  # of an older version
@@ -266,6 +271,9 @@ class HistoryWriter:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
         rows = _rows(block, self._variables)
+        for name, (_, units, _) in self._variables.items():
+            if units == KELVIN.unit:
+                rows[name] = self._degrees.of(rows[name])
         keep = (block.half_cycle - 1) // self._phases % self._every == 0
         self._pending.append({name: values[keep] for name, values in rows.items()})
         before = self._last or {name: values[:0] for name, values in rows.items()}
@@ -446,15 +454,15 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
 
 def _heat_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     assert last.heat is not None
-    heat, along = last.heat, {}
+    heat, along, degrees = last.heat, {}, degrees_of(system.case)
     if system.case.model.kind == "plane":
         places, interpolate = _places(system), system.pair.interpolate
         along = {
-            "temperature_punch_K": interpolate(heat.temperature_punch[-1], places).tolist(),
-            "temperature_strip_K": interpolate(heat.temperature_strip[-1], places).tolist(),
+            f"temperature_punch_{degrees.unit}": degrees.of(interpolate(heat.temperature_punch[-1], places)).tolist(),
+            f"temperature_strip_{degrees.unit}": degrees.of(interpolate(heat.temperature_strip[-1], places)).tolist(),
         }
     return {
-        "max_temperature_K": float(heat.max_temperature[-1]),
+        f"max_temperature_{degrees.unit}": float(heat.max_temperature[-1]) - degrees.zero,
         **along,
         "heat_mJ": dict(zip(TERMS, heat.terms[-1].tolist(), strict=True)),
     }

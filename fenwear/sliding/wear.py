@@ -131,6 +131,12 @@ class PhasesWear:
                 right[k, strip:] = self.pairs[k].deposit.toarray() * slope
         return self._left, right
 
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
+        if self.strip is not None or self.punch is None:
+            return None
+        return self.punch.slope(pressure)
+
     def slopes(self, pressure: Array) -> list[csr_array]:
         """Return the gap opened in the first phase by unit pressures of each phase (n, n), the same as L_1 R_k."""
         m, n = pressure.shape
@@ -168,6 +174,11 @@ class WornLayer:
     def opening(self, pressure: Array) -> Array:
         """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
         return self.repeats * self.wear.opening(pressure)
+
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
+        found = self.wear.local(pressure)
+        return None if found is None else self.repeats * found
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of its derivative L_k R_j."""

@@ -5,75 +5,107 @@ from __future__ import annotations
 import os
 import shutil
 import zipfile
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, OutputError
+from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
-from fenwear.results.checkpoint import ARRAYS, CASE, NEW, check_case, damaged, find, swap
+from fenwear.results.checkpoint import (
+    ARRAYS,
+    CASE,
+    NEW,
+    check_case,
+    damaged,
+    find,
+    read_temperature,
+    swap,
+    write_temperatures,
+)
 from fenwear.results.disk import check_room, writing
+from fenwear.stick.cycle import Rig
 from fenwear.stick.jump import Cycle
 
 ROOT = "cycle"
 
 
-def save(directory: Path, case: Case, cycle: Cycle, comm: MPI.Comm) -> None:
+def save(directory: Path, case: Case, rig: Rig, cycle: Cycle) -> None:
     """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
+
+    Temperatures are written as functions on the meshes: bases are not the same on any number of ranks.
 
     Raises:
         OutputError: it cannot be written; the old one stays.
     """
-    on_root(comm, lambda: _save(directory, case, cycle))
-
-
-def _save(directory: Path, case: Case, cycle: Cycle) -> None:
-    new, arrays = directory / NEW, dict[str, Any]()
-    _pack(cycle, ROOT, arrays)
+    comm = rig.interface.bodies.comm
     try:
-        check_room(directory, sum(values.nbytes + 512 for values in arrays.values()))
-        with writing(new):
-            shutil.rmtree(new, ignore_errors=True)
-            new.mkdir()
-            (new / CASE).write_text(case.to_toml(), "utf-8")
-            with (new / ARRAYS).open("wb") as file:
-                np.savez(file, **arrays)
-                file.flush()
-                os.fsync(file.fileno())
-    except OutputError:
-        shutil.rmtree(new, ignore_errors=True)
+        on_root(comm, lambda: _begin(directory / NEW, case, cycle))
+        if rig.heat is not None:
+            for name, values in (("end", cycle.end.temperature), ("warm", cycle.warm)):
+                if values is not None:
+                    on_root(comm, partial((directory / NEW / name).mkdir))
+                    write_temperatures(directory / NEW / name, comm, rig.heat.exchange.at(values))
+        comm.Barrier()
+    except OutputError:  # on all ranks
+        on_root(comm, lambda: shutil.rmtree(directory / NEW, ignore_errors=True))
         raise
-    swap(directory)
+    on_root(comm, lambda: swap(directory))
 
 
-def load(directory: Path, case: Case, nodes: int, comm: MPI.Comm) -> Cycle:
+def _begin(new: Path, case: Case, cycle: Cycle) -> None:
+    arrays = dict[str, Any]()
+    _pack(cycle, ROOT, arrays)
+    check_room(new.parent, sum(values.nbytes + 512 for values in arrays.values()))
+    with writing(new):
+        shutil.rmtree(new, ignore_errors=True)
+        new.mkdir()
+        (new / CASE).write_text(case.to_toml(), "utf-8")
+        with (new / ARRAYS).open("wb") as file:
+            np.savez(file, **arrays)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def load(directory: Path, case: Case, rig: Rig) -> Cycle:
     """Return the cycle of a run's checkpoint; collective.
 
     Args:
         directory: Of the run.
         case: To go on with.
-        nodes: Of its contact.
-        comm: The ranks.
+        rig: Of the case.
 
     Raises:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
-    return on_root(comm, lambda: _load(directory, case, nodes))
+    folder, cycle = on_root(rig.interface.bodies.comm, lambda: _load(directory, case, len(rig.weights)))
+    end, warm = (_temperature(folder / name, rig) for name in ("end", "warm"))
+    return replace(cycle, end=replace(cycle.end, temperature=end), warm=warm)
 
 
-def _load(directory: Path, case: Case, nodes: int) -> Cycle:
+def _temperature(folder: Path, rig: Rig) -> Array | None:
+    """Return the temperatures (dim,) in a folder of a checkpoint; collective."""
+    bodies = rig.interface.bodies
+    if rig.heat is None or bodies.heat is None or not on_root(bodies.comm, folder.is_dir):
+        return None
+    state = HeatState.nodal(bodies.heat, [read_temperature(folder, body) for body in bodies.heat])
+    return rig.heat.exchange.own(state).values
+
+
+def _load(directory: Path, case: Case, nodes: int) -> tuple[Path, Cycle]:
     folder = find(directory)
     check_case(folder, case)
     cycle = _read(folder)
     contact = cycle.end.contact
     if contact.pressure.shape != (nodes,) or not all(np.isfinite(a).all() for a in (contact.pressure, contact.trial)):
         raise damaged(folder)
-    return cycle
+    return folder, cycle
 
 
 def _read(folder: Path) -> Cycle:

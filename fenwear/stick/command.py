@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.case import Case
+from fenwear.errors import CaseError, InputError
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape, stick_zone
@@ -45,6 +46,8 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
+    if case.heat is not None:
+        raise CaseError(InputError("heat", "expected none for `steady` of contact with stick: `run` and jumps take it"))
     rig = make_rig(case)
     check_touching(rig)
     found = final_shape(rig, stick_zone(rig))

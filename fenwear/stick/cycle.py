@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
 from fenwear.arrays import Array, Mask
+from fenwear.cycle.fixed_point import fixed_point
 from fenwear.sliding.wear import Worn
+from fenwear.stick.heat import StickHeat
 from fenwear.stick.increment import advance
 from fenwear.stick.interface import Position, StickInterface
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.stick.wear import LocalWear
+
+CLOSE = 1e-9  # change of heat and pressure over their largest that ends the iterations of a step
+APART = "contact with stick and heat did not come together: expected more stick.steps, or less friction heat; tried"
 
 
 @dataclass(frozen=True)
@@ -37,6 +43,10 @@ class Records:
         strain: Of the strip's surface opposite each node, along and across the sliding (k, n, m).
         iterations: Newton steps (k,).
         unique: Whether the answer was the only one near (k,).
+        duration: s (k,).
+        heat: Terms of the balance of heat (k, 6), mJ, as `heat.exchange.TERMS`; (k, 0) without heat, as the next two.
+        temperature: Of both contact surfaces, punch and strip, at the end (k, 2, n), K.
+        conductance: Of each node (k, n), N/(mm s K); NaN where none conducts.
     """
 
     displacement: Array
@@ -54,6 +64,10 @@ class Records:
     strain: Array
     iterations: Array
     unique: Mask
+    duration: Array
+    heat: Array
+    temperature: Array
+    conductance: Array
 
     def __len__(self) -> int:
         return len(self.force)
@@ -86,12 +100,23 @@ class Records:
 
 @dataclass(frozen=True)
 class RigState:
-    """Where a run is: the contact, what is imposed on it, the worn depths, and the number of the next time step."""
+    """Where a run is.
+
+    Attributes:
+        contact: With what it remembers.
+        imposed: On it, expansion by heat among it.
+        worn: Depths.
+        next_step: Its number in the cycle.
+        temperature: Of both bodies, on the bases of the rig's heat (dim,); None without heat.
+        heating: Heat of friction of the nodes in the last step (n,), mW/mm²; None without heat.
+    """
 
     contact: StickState
     imposed: Imposed
     worn: Worn
     next_step: int = 0
+    temperature: Array | None = None
+    heating: Array | None = None
 
 
 class Rig:
@@ -102,6 +127,7 @@ class Rig:
         program: Of a cycle.
         wear: By local slip.
         friction: mu (n,).
+        heat: Of friction; None without.
         watch: Called before every time step: may raise InterruptedRunError.
     """
 
@@ -112,14 +138,21 @@ class Rig:
         wear: LocalWear,
         friction: Array,
         watch: Callable[[], None] = lambda: None,
+        heat: StickHeat | None = None,
     ) -> None:
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
-        self.weights, self.watch = interface.middle.pair.weights, watch
+        self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
 
     def watched(self, watch: Callable[[], None]) -> Rig:
         """Return the same, watched."""
-        return Rig(self.interface, self.program, self.wear, self.friction, watch)
+        return Rig(self.interface, self.program, self.wear, self.friction, watch, self.heat)
+
+    @cached_property
+    def reach(self) -> float:
+        """Largest way of the strip's supports, or a fraction of the contact where a force is imposed, mm."""
+        ways = [abs(step.displacement) for step in self.program.steps if step.displacement is not None]
+        return max(ways, default=0.0) or 1e-3 * float(self.weights.sum())
 
     def unworn(self) -> Worn:
         """Return the worn depths at the start: none."""
@@ -146,8 +179,10 @@ class Rig:
             before = replace(before, displacement=None, force=state.force)
         at = RigState(state, before, worn)
         for step in program.lead_in:
-            at, _ = self.step(at, step)
-        return replace(at, next_step=0)
+            at = self._stepped(at, step)
+        if self.heat is None:
+            return replace(at, next_step=0)
+        return replace(at, next_step=0, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
 
     def opening(self, position: Position, worn: Worn) -> Array:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
@@ -162,11 +197,55 @@ class Rig:
 
     def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
         """Return the state after a time step, and its record; the shape stays."""
+        after = self._stepped(at, step)
+        return after, self._record(at, after, step)
+
+    def _stepped(self, at: RigState, step: TimeStep) -> RigState:
         self.watch()
         position, imposed = self.imposed(step, at.worn)
-        state = advance(self.interface, at.contact, at.imposed, imposed, self.friction, position)
-        number = (at.next_step + 1) % len(self.program.steps)
-        return RigState(state, imposed, at.worn, number), self._record(at, state, imposed, position, step)
+        if self.heat is None or at.temperature is None or at.heating is None:
+            state, warm, heating = self._advance(at, imposed, position), None, None
+        else:
+            state, imposed, warm, heating = self._with_heat(
+                self.heat, (at.temperature, at.heating), at, step, imposed, position
+            )
+        return RigState(state, imposed, at.worn, (at.next_step + 1) % len(self.program.steps), warm, heating)
+
+    def _advance(self, at: RigState, imposed: Imposed, position: Position) -> StickState:
+        return advance(self.interface, at.contact, at.imposed, imposed, self.friction, position)
+
+    def _with_heat(
+        self,
+        heat: StickHeat,
+        warmth: tuple[Array, Array],
+        at: RigState,
+        step: TimeStep,
+        imposed: Imposed,
+        position: Position,
+    ) -> tuple[StickState, Imposed, Array, Array]:
+        """Return contact, what is imposed, temperature and heat of friction of a step in which they belong together.
+
+        Raises:
+            ConvergenceError: they do not come together.
+        """
+        number, n = at.next_step, len(self.weights)
+        pressure = float(at.contact.pressure.max())
+        flux = float((self.friction * at.contact.pressure).max()) * self.reach / step.duration
+        units = np.repeat([1 / max(flux, 1e-300), 1 / max(pressure, 1e-300)], n)
+
+        def once(x: Array) -> tuple[Array, tuple[StickState, Imposed], bool]:
+            q, p = np.split(x / units, 2)
+            warm, _ = heat.step(number, warmth[0], q, heat.conductance(p))
+            expanded = replace(imposed, loaded=heat.expanded(imposed.loaded, warm, step.offset))
+            state = self._advance(at, expanded, position)
+            made = state.heat / step.duration
+            return units * np.concatenate([made, state.pressure]), (state, expanded), False
+
+        start = units * np.concatenate([warmth[1], at.contact.pressure])
+        state, expanded = fixed_point(once, start, lambda change, _: float(np.abs(change).max()) < CLOSE, APART)
+        made = np.asarray(state.heat / step.duration)
+        warm, _ = heat.step(number, warmth[0], made, heat.conductance(state.pressure))
+        return state, expanded, warm, made
 
     def half_cycle(self, at: RigState) -> tuple[RigState, Records]:
         """Return the state at the end of the half-cycle that comes next, and its records; the shape stays."""
@@ -198,16 +277,16 @@ class Rig:
                 strip += self.interface.position(place).pair.deposit @ depth
         return Worn(records.punch_depth.sum(axis=0), strip)
 
-    def _record(self, at: RigState, state: StickState, imposed: Imposed, position: Position, step: TimeStep) -> Records:
-        before, weights = at.contact, position.pair.weights
+    def _record(self, at: RigState, after: RigState, step: TimeStep) -> Records:
+        before, state, position = at.contact, after.contact, self.interface.position(step.offset)
+        weights = position.pair.weights
         f = np.concatenate([state.pressure, state.traction.T.ravel()])
         force = position.in_space(f * position.weights)
         back = position.reading.T @ position.pair.placement.back(force)
         stored = np.vdot(force, state.on_punch - before.on_punch) - np.vdot(back, state.on_strip - before.on_strip)
-        lowered = float(imposed.loaded.resultant @ (state.rigid - before.rigid))
+        lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
         work = state.force * (state.displacement - before.displacement) + lowered
-        slid = np.linalg.norm(state.slip, axis=1)
-        punch, strip = self.wear.depths(state.pressure, slid, step.duration)
+        punch, strip = self.wear.depths(state.pressure, np.linalg.norm(state.slip, axis=1), step.duration)
         values = (
             state.displacement,
             state.force,
@@ -217,12 +296,23 @@ class Rig:
             state.gap,
             work,
             stored,
-            -(state.traction * state.slip).sum(axis=1),
+            state.heat,
             weights @ (state.pressure * state.approach),
             punch,
             strip,
             surface_strain(position, self._gradient, state.on_strip),
             float(state.iterations),
             state.unique,
+            step.duration,
+            *self._heat_record(at, after),
         )
         return Records(*(np.asarray(value)[None] for value in values))
+
+    def _heat_record(self, at: RigState, after: RigState) -> tuple[Array, Array, Array]:
+        """Return the terms of the heat, the contact temperatures, and the conductances; empty without heat."""
+        heat, none = self.heat, np.zeros(0)
+        if heat is None or at.temperature is None or after.temperature is None or after.heating is None:
+            return none, np.zeros((2, 0)), none
+        conductance = heat.conductance(after.contact.pressure)
+        _, terms = heat.step(at.next_step, at.temperature, after.heating, conductance)
+        return terms, heat.surfaces(after.temperature), conductance

@@ -9,6 +9,9 @@ Rosenbrock method of second order (J. G. Verwer et al., SIAM J. Sci. Comput. 20,
 which is of second order for any matrix A, and stable for jumps far beyond the explicit limit where A is
 near dF/dy: the slip of each node, times its pressure's answer to depth while the contact stays as it is.
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
+
+With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
+is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
 """
 
 from __future__ import annotations
@@ -24,8 +27,10 @@ from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig, RigState
+from fenwear.stick.heat import Course
 from fenwear.stick.interface import Position
 
+MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 GAMMA = 1 + np.sqrt(0.5)
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
@@ -40,10 +45,12 @@ class Cycle:
         worn: Depths at its shape.
         half_cycles: Records of its half-cycles.
         rate: Depths that a cycle wears there.
-        error: Estimated error of the depths of the jump that led there, over what it wore; 0 where there was none.
+        error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
+            of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
         end: State at its end; after a march's cycle its wear is taken off. What comes next follows from it.
         length: Cycles of the next jump, as wished.
+        warm: Temperatures at the start of its records (dim,); None without heat.
     """
 
     number: int
@@ -54,6 +61,7 @@ class Cycle:
     first_step: int
     end: RigState
     length: int = 1
+    warm: Array | None = None
 
     @property
     def records(self) -> Records:
@@ -89,7 +97,7 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
     Args:
         rig: The bodies and what is done to them.
         cycles: How many in all.
-        tolerance: Largest estimated error of the depths of one jump over what it wears.
+        tolerance: Largest estimated error of one jump.
         start: The one to go on after; by default the unworn one, which is yielded.
 
     Raises:
@@ -97,7 +105,7 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
     """
     now = start
     if now is None:
-        now = _rate(rig, rig.beginning(), rig.unworn(), 0, 0.0)
+        now = _rate(rig, rig.beginning(), rig.unworn(), 0)
         yield now
     length = now.length
     while now.number < cycles:
@@ -119,15 +127,46 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
         yield now
 
 
-def _rate(rig: Rig, at: RigState, worn: Worn, number: int, error: float) -> Cycle:
-    """Return the cycle at a shape, after half a cycle that leads to it."""
+def _rate(rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None = None) -> Cycle:
+    """Return the cycle at a shape, after one that leads to it, half a one without heat.
+
+    Raises:
+        ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
+    """
+    program, heat = rig.program, rig.heat
     at = replace(at, worn=worn)
-    for _ in range(1 if rig.program.half_cycles == 2 else rig.program.half_cycles):
+    for _ in range(1 if program.half_cycles == 2 and heat is None else program.half_cycles):
         at, _ = rig.half_cycle(at)
-    first = at.next_step
+    if heat is not None and before is None:
+        at = replace(at, temperature=heat.initial())
+    if heat is None or before is None or before.warm is None or before.end.temperature is None:
+        return _recorded(rig, at, worn, number)
+    cycles, rate = number - before.number, before.end.temperature - before.warm
+    over = heat.through(_course(before, len(program.steps)))
+    warm = over.after(before.warm, cycles)
+    for _ in range(MOST_HEATINGS):
+        found = _recorded(rig, replace(at, temperature=warm), worn, number)
+        over = heat.through(_course(found, len(program.steps)))
+        again = over.after(before.warm, cycles)
+        warmest = float(np.abs(heat.surfaces(again)).max())
+        if np.abs(heat.surfaces(again) - heat.surfaces(warm)).max() <= SAME_HEAT * warmest:
+            wrong = heat.surface_changes(over.error(before.warm, again, rate, cycles))
+            return replace(found, error=float(np.abs(wrong).max() / max(warmest, 1e-300)))
+        warm = again
+    raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
+
+
+def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> Cycle:
+    first, warm = at.next_step, at.temperature
     at, parts = rig.cycle(at)
-    records = Records.joined(parts)
-    return Cycle(number, worn, parts, rig.worn_in(records, first), error, first, at)
+    return Cycle(number, worn, parts, rig.worn_in(Records.joined(parts), first), 0.0, first, at, warm=warm)
+
+
+def _course(cycle: Cycle, steps: int) -> Course:
+    """Return the heat of a cycle's time steps."""
+    records = cycle.records
+    numbers = [(cycle.first_step + k) % steps for k in range(len(records))]
+    return Course(numbers, records.dissipated / records.duration[:, None], records.conductance)
 
 
 def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
@@ -144,16 +183,16 @@ def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     factor = scipy.linalg.lu_factor(matrix)
     begin, rate = whole(now.worn), whole(now.rate)
     first = scipy.linalg.lu_solve(factor, rate)
-    middle = _rate(rig, now.end, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, 0.0)
+    middle = _rate(rig, now.end, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, now)
     second = scipy.linalg.lu_solve(factor, whole(middle.rate) - 2 * first)
     end = np.maximum(begin + cycles * (1.5 * first + 0.5 * second), begin)
-    then = _rate(rig, middle.end, parted(end), now.number + cycles, 0.0)
+    then = _rate(rig, middle.end, parted(end), now.number + cycles, now)
     missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
     area = np.concatenate([pair.weights, pair.strip.weights])
     scale = area @ (end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing) / max(scale, 1e-300))
-    return replace(then, error=error)
+    return replace(then, error=max(error, then.error))
 
 
 def _derivative(rig: Rig, now: Cycle) -> Array:

@@ -14,6 +14,7 @@ from fenwear.case import Case
 from fenwear.results.surfaces import DIMENSIONS, Variable, columns_of_pair, on_mesh
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.heat_results import HEAT_VARIABLES, heat_summary, heat_values
 from fenwear.stick.jump import Cycle
 from fenwear.stick.strain import along_sliding, directions
 
@@ -101,6 +102,7 @@ def row_of(rig: Rig, case: Case, cycle: Cycle) -> Row:
         "stick_width": float(weights @ records.sticking.all(axis=0)),
         "contact_width": float(((records.pressure > 0) @ weights).max()),
         "jump_error": cycle.error,
+        **heat_values(cycle, order),
     }
     if len(traction) > 1:
         values |= {"traction_across": traction[1], "slip_across": slip[1]}
@@ -129,7 +131,8 @@ def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
     """Return the kept cycles as a data set."""
     solid = case.model.kind == "solid"
     data = {}
-    for name, (dimensions, units, text) in {**VARIABLES, **(ACROSS if solid else {})}.items():
+    variables = {**VARIABLES, **(ACROSS if solid else {}), **({} if rig.heat is None else HEAT_VARIABLES)}
+    for name, (dimensions, units, text) in variables.items():
         values = np.array([row.values[name] for row in rows])
         new, unit, meaning = IN_SOLIDS.get(name, (name, units, text)) if solid else (name, units, text)
         over = tuple(DIMENSIONS.get(d, d) for d in dimensions) if solid else dimensions
@@ -205,4 +208,5 @@ def summary_of(data: xarray.Dataset, worn: Worn) -> dict[str, Any]:
         "worn_volume_punch_mm3" if solid else "worn_area_punch_mm2": float(data.weight.values @ worn.punch),
         "largest_energy_balance_error": float(data.energy_balance_error.max()),
         "largest_jump_error": float(data.jump_error.max()),
+        **heat_summary(data),
     }

@@ -107,7 +107,7 @@ class _Run:
         self.cycles = max(case.run.half_cycles // rig.program.half_cycles, 1)
         self.jumps = case.run.integration == "jump"
         self.rig, self.resume = rig.watched(self._watch), resume
-        self.last = checkpoint.load(directory, case, len(rig.weights), comm) if resume else None
+        self.last = checkpoint.load(directory, case, rig) if resume else None
         if self.last is not None and self.done >= self.cycles:
             message = f"the run has done {self.done} cycles already; expected more half-cycles to go on to"
             raise CaseError(InputError("run.half_cycles", message))
@@ -197,7 +197,7 @@ class _Run:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
         on_root(self.comm, lambda: None if self.writer is None else self.writer.flush())
         if self.last is not None:
-            checkpoint.save(self.directory, self.case, self.last, self.comm)
+            checkpoint.save(self.directory, self.case, self.rig, self.last)
         self._save_due = time.monotonic() + self.case.output.checkpoint
 
     def _finish(self, how: dict[str, Any], *, report: bool) -> dict[str, Any]:

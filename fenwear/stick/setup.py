@@ -14,6 +14,7 @@ from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface
 from fenwear.stick.program import make_program
 from fenwear.stick.wear import local_wear
@@ -57,12 +58,22 @@ def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None =
     mu = case.contact.friction
     if not isinstance(mu, float):
         raise CaseError(InputError("contact.friction", "expected a constant with contact.law = 'coulomb'"))
-    return Rig(interface, make_program(case, steps), wear, np.full(len(middle.pair.weights), mu))
+    rig = Rig(interface, make_program(case, steps), wear, np.full(len(middle.pair.weights), mu))
+    return heated(rig, case)
 
 
 def with_steps(rig: Rig, case: Case, steps: int) -> Rig:
     """Return the same with other time steps."""
-    return Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction, rig.watch)
+    return heated(Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction, rig.watch), case)
+
+
+def heated(rig: Rig, case: Case) -> Rig:
+    """Return the same with the heat of the case for its time steps; collective."""
+    if case.heat is None:
+        return rig
+    steps = len(rig.program.steps) // rig.program.half_cycles
+    heat = stick_heat(rig.interface, case, steps)
+    return Rig(rig.interface, rig.program, rig.wear, rig.friction, rig.watch, heat)
 
 
 def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.stick.interface import Loaded, StickInterface
@@ -80,6 +82,11 @@ class StickState:
     iterations: int = 0
     unique: bool = True
     parts: int = 1
+
+    @property
+    def heat(self) -> NDArray[Any]:
+        """Work of friction in the step over the area of each node (n,), N/mm."""
+        return -(self.traction * self.slip).sum(axis=1)
 
     @property
     def closed(self) -> Mask:

@@ -50,7 +50,7 @@ def displacement(body: ElasticBody, force: Array) -> fem.Function:
     """Return the displacement of a supported body under nodal forces; collective."""
     force[body.supported] = 0.0
     u = fem.Function(body.space)
-    u.x.array[: len(force)] = body.factor.solve(force)
+    u.x.array[: len(force)] = body.solve(force)
     u.x.scatter_forward()
     return u
 

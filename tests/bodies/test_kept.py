@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import CaseError, Tribosystem, assemble, load_case
-from fenwear.bodies import factor, kept
+from fenwear.bodies import factor, kept, substructure
 
 SMALL = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 Setup = Callable[..., tuple[Tribosystem, int]]
@@ -25,8 +25,9 @@ def setup(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv(kept.LIMIT, "1")
     monkeypatch.setattr(kept, "_told", [])
     made: list[object] = []
-    compute = factor.Factor.compute
-    monkeypatch.setattr(factor.Factor, "compute", lambda self: (made.append(self), compute(self))[1])
+    for kind, name in ((factor.Factor, "compute"), (substructure.Substructures, "eliminate")):
+        compute = getattr(kind, name)
+        monkeypatch.setattr(kind, name, lambda self, compute=compute: (made.append(self), compute(self))[1])
 
     def setup(*settings: str, name: str = "example1", fresh: bool = False) -> tuple[Tribosystem, int]:
         made.clear()

@@ -6,34 +6,40 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
-from fenwear.bodies import factor, response
+from fenwear.bodies import factor, response, substructure
+from fenwear.bodies.assembly import times
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.errors import ConvergenceError
 
 SMALL = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
-WAYS: dict[str, tuple[int, int]] = {  # of the Schur complement's share and of the largest factor on one rank
-    "surface": (0, factor.SPREAD),
-    "columns": (10**9, factor.SPREAD),
-    "spread": (0, 0),
+WAYS: dict[str, tuple[int, float, int]] = {  # shares of the surface, of boundaries; the largest factor on one rank
+    "substructures": (0, np.inf, factor.SPREAD),
+    "surface": (0, 0, factor.SPREAD),
+    "columns": (10**9, 0, factor.SPREAD),
+    "spread": (0, 0, 0),
 }
 
 
-def condensed(name: str, way: str, monkeypatch: pytest.MonkeyPatch) -> tuple[Tribosystem, list[CondensedBody]]:
-    share, spread = WAYS[way]
+def condensed(
+    name: str, way: str, monkeypatch: pytest.MonkeyPatch, *changes: str
+) -> tuple[Tribosystem, list[CondensedBody]]:
+    share, boundary, spread = WAYS[way]
     monkeypatch.setattr(response, "SURFACE_SHARE", share)
+    monkeypatch.setattr(response, "BOUNDARY_SHARE", boundary)
     monkeypatch.setattr(factor, "SPREAD", spread)
     settings = SMALL if name.startswith("example") else ()
-    system = assemble(load_case(name, settings), heat="none")
+    system = assemble(load_case(name, (*settings, *changes)), heat="none")
     return system, [system.condensed.punch, system.condensed.strip]
 
 
-@pytest.mark.parametrize("way", ["surface", "spread"])
+@pytest.mark.parametrize("way", ["substructures", "surface", "spread"])
 @pytest.mark.parametrize("name", ["example1", "example1-heat", "ball-on-flat", "ring-on-ring"])
 @pytest.mark.mpi
 def test_all_ways_give_the_same(name: str, way: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Eliminated down to the surface, by columns on one rank, or by columns on all of them."""
+    """Eliminated down to the surface by all ranks or by one, by columns on one rank, or by columns on all of them."""
     for one, other in zip(
         condensed(name, way, monkeypatch)[1], condensed(name, "columns", monkeypatch)[1], strict=True
     ):
@@ -57,15 +63,34 @@ def test_each_rank_has_the_same_bits(way: str, monkeypatch: pytest.MonkeyPatch) 
             assert len(set(system.comm.allgather(values.tobytes()))) == 1
 
 
-def test_one_factor_for_the_loads_of_all_phases(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("way", ["substructures", "columns"])
+def test_one_factor_for_the_loads_of_all_phases(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bodies that differ by their loads share it, whichever is asked first."""
     made: list[object] = []
-    compute = factor.Factor.compute
-    monkeypatch.setattr(factor.Factor, "compute", lambda self: (made.append(self), compute(self))[1])
+    for kind, name in ((factor.Factor, "compute"), (substructure.Substructures, "eliminate")):
+        compute = getattr(kind, name)
+        monkeypatch.setattr(kind, name, lambda self, compute=compute: (made.append(self), compute(self))[1])
     table = "[[0, 0.5], [0.5, 1], [1, 0.5]]"
-    system = assemble(load_case("example1", [*SMALL, f"punch.loads.0.over_cycle={table}"]))
-    assert len({id(body.punch.factor) for body in system.loaded}) == 1
+    condensed("example1", way, monkeypatch, f"punch.loads.0.over_cycle={table}")
     assert len({id(one) for one in made}) == 2
+
+
+@pytest.mark.parametrize("name", ["example1", "ball-on-flat", "ring-on-ring"])
+@pytest.mark.mpi
+def test_substructures_solve_for_any_forces(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Inside, on the boundaries between ranks and on supports: K times the solution is the forces again."""
+    system, _ = condensed(name, "substructures", monkeypatch)
+    for body in (system.bodies.punch, system.bodies.strip):
+        assert body.substructures is not None
+        first, last = body.stiffness.getOwnershipRange()
+        forces = np.sin(np.outer(np.arange(first, last), (1.0, 2.0)))
+        forces[body.supported] = 0.0
+        both, one = body.solve(forces), body.solve(forces[:, 0])
+        rest = np.abs(times(body.stiffness, both) - forces)
+        found = [np.abs(both), rest, np.abs(one - both[:, 0]), np.abs(both[body.supported])]
+        largest, *errors = np.max(system.comm.allgather([array.max(initial=0.0) for array in found]), axis=0)
+        bounds = (1e-12 * body.stiffness.norm(PETSc.NormType.INFINITY) * largest, 1e-9 * largest, 0.0)
+        assert (np.array(errors) <= bounds).all(), (errors, bounds)
 
 
 @pytest.mark.mpi

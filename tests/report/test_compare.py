@@ -9,9 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from fenwear import CaseError, load_case
-from fenwear.report.compare import compare, comparison_figure, draw_comparison
+from fenwear.cli import app
+from fenwear.report.compare import at_same_places, compare, comparison_figure, draw_comparison
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "run.half_cycles=6")
@@ -90,3 +92,47 @@ def test_command(folders: list[Path], tmp_path: Path, fenwear: Callable[..., Any
     done = fenwear("compare", folders[0], tmp_path, "-o", out)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
+
+
+def test_names_and_places(folders: list[Path]) -> None:
+    """The table has names with units; depths and pressures are those of the histories at the same places."""
+    comparison = compare(folders[:2])
+    text = comparison.text()
+    assert "worn volume, punch (mm³)" in text
+    assert "max_pressure_MPa" not in text
+    assert "wear_mm" not in text
+    (row,) = [
+        row for name, row in comparison.named()["at the same places"].items() if name.endswith("µm) at x = 15 mm")
+    ]
+    for value, history in zip(row, comparison.histories, strict=True):
+        assert value == pytest.approx(1e3 * float(history.wear[-1].interp(x=15.0)))
+    narrow = comparison.histories[1].sel(x=slice(-30, 20))
+    places = at_same_places([comparison.histories[0], narrow])
+    last = float(narrow.x.max())
+    assert float(list(places)[-1].partition("x = ")[2].removesuffix(" mm")) == pytest.approx(last, abs=1e-3)
+    assert not any(name.endswith("at x = 30 mm") for name in places)
+
+
+def test_worn_strips_are_drawn(tmp_path: Path) -> None:
+    """A panel for the strip, where one wears; temperatures in degrees are put beside those in kelvin."""
+    for name, settings in {"one": [], "other": ["wear.strip.coefficient=2e-8"]}.items():
+        case = load_case("fretting", ["geometry.degree=1", "run.half_cycles=2", "run.integration=explicit", *settings])
+        run_case(case, name, tmp_path / name, lambda message: None)
+    comparison = compare([tmp_path / "one", tmp_path / "other"])
+    titles = [ax.get_title("left") for ax in comparison_figure(comparison).axes]
+    assert any("strip at the end" in title for title in titles)
+    assert any(name.startswith("worn depth of the strip") for name in comparison.named()["at the same places"])
+
+
+def test_marched_against_jumped(tmp_path: Path) -> None:
+    """One command runs both and compares them."""
+    settings = [f"--set={one}" for one in (*SMALL, "run.half_cycles=40")]
+    done = CliRunner().invoke(app, ["compare", "--jumped", "example1", *settings, "-o", str(tmp_path / "both.png")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "both.png").exists()
+    for way in ("marched", "jumped"):
+        assert (tmp_path / f"example1-{way}" / "history.nc").exists()
+    assert "run.integration" in done.output
+    refused = CliRunner().invoke(app, ["compare", "a", "b", "--set=run.half_cycles=2"])
+    assert isinstance(refused.exception, CaseError)
+    assert "expected together with --jumped" in str(refused.exception)

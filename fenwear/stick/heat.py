@@ -1,0 +1,219 @@
+"""Heat of friction by the local slip: into both bodies in every time step, and back to the contact as expansion.
+
+A node that slips makes the heat q = -t . s / dt for its area, with the slip s of its time step dt. Both bodies
+conduct it on their reduced bases (see `heat.exchange`), and what they expand by at the end of the step, in every
+direction, moves their surfaces in that step as loads do. Contact and heat of a step are solved together.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from fenwear.arrays import Array
+from fenwear.assembly import Bodies
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.case import Case
+from fenwear.errors import CaseError, InputError
+from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.field import ReducedBasis
+from fenwear.heat.prepare import prepare_exchange
+from fenwear.sliding.motion import make_motion
+from fenwear.stick.interface import Loaded, StickInterface
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """What a body's reduced temperature moves its contact by: u = by_coordinates s + at_lift, along all axes, mm.
+
+    Attributes:
+        by_coordinates: (q, d, dim).
+        at_lift: (q, d).
+    """
+
+    by_coordinates: Array
+    at_lift: Array
+
+    def __call__(self, coordinates: Array) -> Array:
+        """Return the displacement (q, d), mm."""
+        return self.at_lift + self.by_coordinates @ coordinates
+
+
+class StickHeat:
+    """Temperatures of both bodies over the time steps of a cycle.
+
+    Args:
+        exchange: With a phase for each time step; takes heat in place of pressures.
+        expansions: Of the punch and of the strip.
+        interface: The bodies in contact.
+    """
+
+    def __init__(
+        self, exchange: HeatExchange, expansions: tuple[Expansion, Expansion], interface: StickInterface
+    ) -> None:
+        self.exchange, self.expansions, self._interface = exchange, expansions, interface
+        self._split = len(exchange.bases[0])
+
+    def initial(self) -> Array:
+        """Return the temperatures at the start (dim,)."""
+        return self.exchange.initial().values
+
+    def conductance(self, pressure: Array) -> Array:
+        """Return what each node conducts (n,), N/(mm s K); NaN for nothing."""
+        return self.exchange.conductance(pressure)
+
+    def step(self, number: int, temperature: Array, heat: Array, conductance: Array) -> tuple[Array, Array]:
+        """Return the temperatures after a time step (dim,), and the terms of its balance, mJ.
+
+        Args:
+            number: Of the time step in the cycle.
+            temperature: Before (dim,).
+            heat: Of friction (n,), mW/mm².
+            conductance: Of the nodes (n,).
+
+        Raises:
+            HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
+        """
+        after, terms = self.exchange.half_cycle(self.exchange.at(temperature), number, heat, conductance)
+        return after.values, terms
+
+    def expanded(self, loaded: Loaded, temperature: Array, offset: float) -> Loaded:
+        """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset."""
+        punch, strip = (
+            expansion(part)
+            for expansion, part in zip(self.expansions, np.split(temperature, [self._split]), strict=True)
+        )
+        if self._interface.moves and offset:  # the field stays under the punch, the material moves through it
+            x = self._interface.middle.pair.strip.trace[:, 0]
+            order = np.argsort(x)
+            strip = np.stack([np.interp(x + offset, x[order], column[order]) for column in strip.T], axis=1)
+        return replace(loaded, on_punch=loaded.on_punch + punch, on_strip=loaded.on_strip + strip)
+
+    def surfaces(self, temperature: Array) -> Array:
+        """Return the contact temperatures of punch and strip (2, n), K."""
+        return np.array(self.exchange.contact_temperatures(self.exchange.at(temperature)))
+
+    def surface_changes(self, changes: Array) -> Array:
+        """Return the changes of both contact temperatures (2, n) by changes of the temperatures (dim,), K."""
+        return np.array(self.exchange.contact_changes(changes))
+
+    def through(self, course: Course) -> CycleMap:
+        """Return what a cycle of this heat makes of the temperatures at its start."""
+        exchange, dim = self.exchange, sum(len(basis) for basis in self.exchange.bases)
+        through: Array = np.eye(dim)
+        source: Array = np.zeros(dim)
+        for k, number in enumerate(course.numbers):
+            heat: Array = course.heat[k]
+            conductance: Array = course.conductance[k]
+            through, _ = exchange.change(number, conductance, changes=through)
+            source = exchange.half_cycle(exchange.at(source), number, heat, conductance)[0].values
+        return CycleMap(through, source)
+
+
+@dataclass(frozen=True)
+class CycleMap:
+    """What a cycle of constant heat makes of temperatures, s -> P s + b, with P (dim, dim) and b (dim,)."""
+
+    through: Array
+    source: Array
+
+    def after(self, temperature: Array, cycles: float) -> Array:
+        """Return the temperatures after so many cycles in one implicit Euler step: (I + N (I - P)) s' = s + N b."""
+        return np.asarray(scipy.linalg.solve(self._matrix(cycles), temperature + cycles * self.source))
+
+    def error(self, before: Array, after: Array, rate: Array, cycles: float) -> Array:
+        """Return about the error of such a step (dim,), by the trapezoidal rule with the rate of change before it."""
+        now = self.through @ after + self.source - after
+        missing = after - before - cycles / 2 * (rate + now)
+        return np.asarray(scipy.linalg.solve(self._matrix(cycles), missing))
+
+    def _matrix(self, cycles: float) -> Array:
+        eye = np.eye(len(self.source))
+        return np.asarray(eye + cycles * (eye - self.through))
+
+
+@dataclass(frozen=True)
+class Course:
+    """The heat of a cycle: numbers of its k time steps, heat (k, n), mW/mm², conductance (k, n), N/(mm s K)."""
+
+    numbers: list[int]
+    heat: Array
+    conductance: Array
+
+
+def balance_error(terms: Array) -> float:
+    """Return what is missing in a balance of heat (k, 6) of all steps together, over its largest term."""
+    friction, debris, stored, convected, held, carried = terms.sum(axis=0)
+    largest = max(np.abs(terms).sum(axis=0).max(), 1e-300)
+    return float(abs(friction - debris - stored - convected - held - carried) / largest)
+
+
+def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat | None:
+    """Return the heat of a case with this many time steps in a half-cycle; None without heat; collective.
+
+    Raises:
+        CaseError: half-cycles of unequal duration; a solid.
+        HeatError: no basis gives temperatures that die out.
+    """
+    bodies = interface.bodies
+    if case.heat is None or bodies.heat is None:
+        return None
+    if interface.dim == 3:
+        raise CaseError(InputError("heat", "expected none in solids with contact.law = 'coulomb'"))
+    middle = interface.middle.pair
+    nothing = tuple(np.zeros((1, body.owned)) for body in bodies.heat)
+    exchange = prepare_exchange(
+        case.heat,
+        bodies.heat,
+        middle,
+        (nothing[0], nothing[1]),
+        interface.sliding.field,
+        make_motion(case.motion.model_copy(update={"positions": steps})),
+        np.ones(len(middle.weights)),
+        case.model.thickness,
+        reduced=True,
+        at_rest=case.stick.force is not None,
+    )
+    return StickHeat(heated_directly(exchange), expansions(interface, exchange, bodies, case.heat.initial), interface)
+
+
+def heated_directly(exchange: HeatExchange) -> HeatExchange:
+    """Return the exchange that takes the heat of friction in place of pressures."""
+    other = copy.copy(exchange)
+    other.plans = [[replace(plan, speed=1.0) for plan in plans] for plans in exchange.plans]
+    return other.with_friction(np.ones_like(exchange.friction))
+
+
+def expansions(
+    interface: StickInterface, exchange: HeatExchange, bodies: Bodies, initial: float
+) -> tuple[Expansion, Expansion]:
+    """Return the thermal expansion of both bodies on the bases of their temperatures; collective."""
+    found = []
+    for elastic, condensed, basis in (
+        (bodies.punch, interface.punch, exchange.bases[0]),
+        (bodies.strip, interface.strip, exchange.bases[1]),
+    ):
+        if not isinstance(basis, ReducedBasis):
+            raise CaseError(InputError("heat.operator", "expected 'reduced' with contact.law = 'coulomb'"))
+        fields = np.hstack([basis.columns, (basis.lift - initial)[:, None]])
+        picked = _free_expansion(elastic, basis, fields)
+        at_patterns = np.einsum("qN,Ndk->qdk", condensed.patterns.T.toarray(), picked)
+        found.append(Expansion(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
+    return found[0], found[1]
+
+
+def _free_expansion(elastic: ElasticBody, basis: ReducedBasis, fields: Array) -> Array:
+    """Return the displacement of the trace nodes (N, d, k) by temperatures (owned, k) without contact; collective."""
+    coupling = elastic.thermal_coupling(basis.body.space)
+    theta, force = coupling.createVecs()
+    forces = []
+    for field in fields.T:
+        theta.array[:] = field
+        coupling.mult(theta, force)
+        forces.append(force.array.copy())
+    for one in (coupling, theta, force):
+        one.destroy()
+    return elastic.trace.pick(elastic.solve(np.stack(forces, axis=1)))

@@ -1,0 +1,49 @@
+"""What a run with stick and heat leaves besides: temperatures of each time step, and the balance of heat of a cycle."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from fenwear.heat.exchange import TERMS
+from fenwear.results.history import HEAT_TERMS
+from fenwear.stick.heat import balance_error
+from fenwear.stick.jump import Cycle
+
+# name: (dimensions, units, long_name)
+HEAT_VARIABLES = {
+    "temperature_punch": (("cycle", "step", "x"), "K", "temperature of the punch's contact surface at the end"),
+    "temperature_strip": (("cycle", "step", "x"), "K", "temperature of the strip's contact surface at the end"),
+    "max_temperature": (("cycle",), "K", "largest temperature of the contact surfaces"),
+    "heat_balance_error": (("cycle",), "1", "missing heat of a half-cycle over its largest term, the larger one"),
+    **{f"heat_{name}": (("cycle",), "mJ", text.replace("half-cycle", "cycle")) for name, text in HEAT_TERMS.items()},
+}
+
+
+def heat_values(cycle: Cycle, order: NDArray[np.int64]) -> dict[str, Any]:
+    """Return the values of `HEAT_VARIABLES` of a cycle, its time steps in this order; none without heat."""
+    records = cycle.records
+    if not records.heat.size:
+        return {}
+    totals = records.heat.sum(axis=0)
+    return {
+        "temperature_punch": records.temperature[order, 0],
+        "temperature_strip": records.temperature[order, 1],
+        "max_temperature": float(records.temperature.max()),
+        "heat_balance_error": max(balance_error(part.heat) for part in cycle.half_cycles),
+        **{f"heat_{name}": float(total) for name, total in zip(TERMS, totals, strict=True)},
+    }
+
+
+def heat_summary(history: xarray.Dataset) -> dict[str, Any]:
+    """Return the key numbers of the heat at the end of a run; none without heat."""
+    if "max_temperature" not in history:
+        return {}
+    return {
+        "max_temperature_K": float(history.max_temperature[-1]),
+        "largest_temperature_K": float(history.max_temperature.max()),
+        "largest_heat_balance_error": float(history.heat_balance_error.max()),
+    }

@@ -1,0 +1,121 @@
+"""Heat by local slip: its balance, the limit of gross sliding, expansion along the surface, jumps, a resumed run."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from fenwear import CaseError, assemble, load_case
+from fenwear.cycle import march as march_sliding
+from fenwear.run import run_case
+from fenwear.stick.command import final_of
+from fenwear.stick.cycle import Rig
+from fenwear.stick.heat import balance_error
+from fenwear.stick.jump import jump, march
+from fenwear.stick.setup import make_rig
+
+WARM = (
+    "materials.steel={young='200 GPa', poisson=0.3, conductivity='45 W/(m K)', heat_capacity='460 J/(kg K)', "
+    "density='7800 kg/m^3', expansion='1.2e-5 1/K'}",
+    "heat={convection='20 W/(m^2 K)', steps=5}",
+    "strip.temperatures=[{on='strip_bottom', temperature='0 K'}]",
+    "motion.period='0.001 s'",
+    "geometry.follow_wear='never'",
+)
+SMALL = ("geometry.parameters.elements_along_contact=16", *WARM, "stick.steps=10")
+FAST = "wear.punch.coefficient='1e-6 1/MPa'"
+
+
+@lru_cache
+def rig(*settings: str) -> Rig:
+    return make_rig(load_case("fretting-partial-slip", [*SMALL, *settings]))
+
+
+@pytest.mark.parametrize("settings", [(), ("stick.force='60 N'",), ("heat.partition=0.3", "heat.debris=0.1")])
+def test_work_of_friction_is_the_heat(settings: tuple[str, ...]) -> None:
+    """In each half-cycle, to rounding; and what rig and loads put in is stored or dissipated, expansion or not."""
+    warm = rig(*settings)
+    for cycle in march(warm, 2):
+        for part in cycle.half_cycles:
+            assert part.heat[:, 0].sum() == pytest.approx(part.energy(warm.weights), rel=1e-10)
+            assert balance_error(part.heat) < 1e-10
+            assert part.balance_error(warm.weights) < 1e-10
+            assert (part.temperature[-1] > 0).all()
+
+
+def test_expansion_moves_the_surfaces_in_every_direction() -> None:
+    """An even temperature of a free body: what expands by alpha T in every direction."""
+    corner = "{at=[0, 0], fix=['x']}"
+    warm = rig("strip.temperatures=[]", f"strip.supports=[{{on='strip_bottom', fix=['z']}}, {corner}]")
+    assert warm.heat is not None
+    punch, strip = warm.heat.exchange.bases
+    even = np.concatenate([basis.coordinates(np.full(basis.body.owned, 10.0)) for basis in (punch, strip)])
+    _, moved = (e(s) for e, s in zip(warm.heat.expansions, np.split(even, [len(punch)]), strict=True))
+    at = warm.interface.middle.pair.transfer @ warm.interface.middle.pair.strip.trace
+    alpha = 1.2e-5 * 1.3  # plane strain
+    bottom = 6.0
+    assert np.ptp(moved[:, 0] - alpha * 10 * at[:, 0]) < 1e-4 * np.ptp(moved[:, 0])
+    assert np.ptp(moved[:, 1]) < 1e-4 * np.abs(moved[:, 1]).max()
+    assert moved[:, 1].mean() == pytest.approx(alpha * 10 * bottom, rel=1e-3)
+
+
+def test_long_strokes_are_as_warm_as_in_gross_sliding() -> None:
+    """What is missing is the elastic share of the stroke, which falls as the stroke grows."""
+    missing = []
+    for amplitude in (25, 100):
+        settings = [*SMALL, f"motion.amplitude='{amplitude} um'", "motion.positions=1", "run.half_cycles=4",
+                    "run.integration='explicit'", "heat.steps=10", "wear.strip.coefficient=0"]  # fmt: skip
+        known = assemble(load_case("fretting-partial-slip", ["wear={punch={coefficient=1e-30}}", *settings[:-1],
+                                                             "contact.law='gross-sliding'", "stick={}"]))  # fmt: skip
+        end = list(march_sliding(known, 4))[-1].heat
+        assert end is not None
+        cycle = list(march(make_rig(load_case("fretting-partial-slip", settings)), 2))[-1]
+        punch = cycle.records.temperature[-1, 0]
+        missing.append(np.abs(punch - end.temperature_punch[-1]).max() / end.temperature_punch[-1].max())
+    assert missing[0] < 0.1
+    assert missing[1] < 0.4 * missing[0]
+
+
+@pytest.mark.slow
+def test_jumps_get_as_warm_as_the_march() -> None:
+    """The error of the temperatures falls with the tolerance of the jumps."""
+    warm, cycles = rig(FAST), 30
+    marched = list(march(warm, cycles + 1))[-1].records.temperature[-1, 0].max()
+    errors = []
+    for tolerance in (0.1, 5e-4):
+        cycle = list(jump(warm, cycles, tolerance))[-1]
+        assert cycle.number == cycles
+        assert balance_error(cycle.records.heat) < 1e-10
+        errors.append(abs(cycle.records.temperature[-1, 0].max() / marched - 1))
+    assert errors[1] < 0.5 * errors[0] < 0.02
+
+
+def run(folder: Path, count: int, *, resume: bool = False) -> xarray.Dataset:
+    settings = [*SMALL, FAST, "output.report=false", "run.integration='explicit'", f"run.half_cycles={count}"]
+    case = load_case("fretting-partial-slip", [*settings, "stick.step_tolerance=1"])
+    summary, _ = run_case(case, "warm", folder, lambda _: None, resume=resume, progress="none")
+    assert summary["largest_heat_balance_error"] < 1e-8
+    assert summary["max_temperature_K"] > 0
+    return xarray.load_dataset(folder / "history.nc", engine="h5netcdf")
+
+
+def test_a_resumed_run_goes_on_as_warm(tmp_path: Path) -> None:
+    """Temperatures go through the checkpoint; history and summary have them."""
+    run(tmp_path / "parts", 2)
+    resumed, whole = run(tmp_path / "parts", 6, resume=True), run(tmp_path / "whole", 6)
+    for variable in ("temperature_punch", "pressure", "wear", "heat_friction"):
+        difference, expected = np.abs(resumed[variable] - whole[variable]), np.abs(whole[variable])
+        assert float(difference.max()) < 1e-9 * float(expected.max())
+
+
+def test_what_does_not_go_with_heat_is_told() -> None:
+    """The end by wear, a full operator, the split."""
+    with pytest.raises(CaseError, match=r"heat: expected none for `steady`"):
+        final_of(load_case("fretting-partial-slip", list(SMALL)))
+    for setting, message in (("operator='full'", "heat.operator"), ("coupling='split'", "heat.coupling")):
+        with pytest.raises(CaseError, match=f"{message}: expected"):
+            load_case("fretting-partial-slip", [*SMALL, f"heat.{setting}"])

@@ -14,11 +14,14 @@ from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
 from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
+from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat, CycleJump
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn
 
 FLAT = 1e-9  # mm: depths below it count as none
+MANY = 300  # contact nodes above which heat is lagged
+SMOOTH = 15  # changes of pressure that are combined: the heat of few patterns is not small
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
     'set heat.conducting = "nominal", or take weaker dependences: contact and what depends on it, the nodes that '
@@ -121,6 +124,8 @@ class Coupled:
         start: ContactState,
         solve: SolveContact,
         passing: Passing | None = None,
+        *,
+        lagged: bool = False,
     ) -> tuple[ContactState, Array | None]:
         """Return contact, and temperature (dim,) at the start of its cycle, `cycles` cycles on in one implicit step.
 
@@ -133,6 +138,8 @@ class Coupled:
             start: Where contact starts from.
             solve: Contact at the friction and wear last taken.
             passing: How depths follow from the pressures, where coefficients depend on depth or distance.
+            lagged: Whether contact of many nodes is solved at the heat of pressures that are known, again and again:
+                the factor without heat serves all of them, where one with heat is of all phases together.
 
         Raises:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
@@ -167,7 +174,9 @@ class Coupled:
                 if known is None or known[0] != key:
                     known = (key, heat.jump(temperature, cycles, conductances))
                 end = known[1]
-                contact = solve(end.gap, end.coupling * self.mu, contact)
+                contact = (
+                    self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling * self.mu, contact)
+                )
                 state = end.state(self.mu * contact.pressure)
                 same = np.array_equal(heat.conductances(contact.pressure), conductances, equal_nan=True)
                 if warm:
@@ -177,6 +186,26 @@ class Coupled:
             return unknowns.joined([contact.pressure.ravel(), *found]), (contact, state), same and constant
 
         return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE)
+
+    def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
+        """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""
+        shape = start.pressure.shape
+        if shape[1] <= MANY:
+            return solve(end.gap, end.coupling * self.mu, start)
+        contact = start
+
+        def advance(x: Array) -> tuple[Array, ContactState, bool]:
+            nonlocal contact
+            contact = solve(end.gaps(self.mu * x.reshape(shape)), None, contact)
+            return contact.pressure.ravel(), contact, False
+
+        def close(change: Array, x: Array) -> bool:
+            return float(np.abs(change).max()) <= CLOSE * max(float(np.abs(x).max()), 1e-300)
+
+        try:
+            return fixed_point(advance, start.pressure.ravel(), close, DISAGREE, depth=SMOOTH)
+        except ConvergenceError:  # heat that is no small part
+            return solve(end.gap, end.coupling * self.mu, start)
 
     def at_friction(self) -> CycleHeat | None:
         """Return the heat of whole cycles at the friction last taken."""

@@ -29,6 +29,7 @@ def fixed_point(
     close: Callable[[Array, Array], bool],
     failure: str,
     iterations: int = MAX_ITERATIONS,
+    depth: int = DEPTH,
 ) -> T:
     """Return what belongs to x = g(x).
 
@@ -38,6 +39,7 @@ def fixed_point(
         close: Whether a change of x, its first argument, is small against the x that is its second.
         failure: What is said where they do not come together.
         iterations: At most so many.
+        depth: Residuals that are combined.
 
     Raises:
         ConvergenceError: x and g(x) do not come together.
@@ -54,7 +56,7 @@ def fixed_point(
         if size > WORSE * best:
             share, points, residuals = max(LEAST, share / 2), [], []
         best = min(best, size)
-        points, residuals = [*points[-DEPTH:], x.ravel()], [*residuals[-DEPTH:], residual]
+        points, residuals = [*points[-depth:], x.ravel()], [*residuals[-depth:], residual]
         x = _mixed(points, residuals, share).reshape(start.shape)
     raise ConvergenceError(f"{failure} in {iterations} iterations")
 

@@ -296,6 +296,7 @@ class _Stepper:
                 gap if thermal is None else gap + thermal, near, cycles, coupling
             ),
             self._passing(worn, cycles),
+            lagged=True,
         )
         heated: Array = np.zeros(0)
         if begin is not None:

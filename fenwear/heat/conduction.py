@@ -374,7 +374,7 @@ class _StepForms:
 
 
 class HeatStep:
-    """One factored step of a body: A theta = B theta_before + f + C q.
+    """One step of a body: A theta = B theta_before + f + C q.
 
     Attributes:
         body: Whose step it is.
@@ -410,8 +410,13 @@ class HeatStep:
         self.a, self.b = a, b
         self._is_held = np.zeros(body.owned, dtype=bool)
         self._is_held[body.held] = True
-        self._factor = self._factored(repeated=duration < np.inf)
+        self._repeated = duration < np.inf
         self._pivoted, self._solved = duration == np.inf, 0
+
+    @cached_property
+    def _factor(self) -> Factor:
+        """Made at the first solution, as reduced steps need none; collective."""
+        return self._factored(repeated=self._repeated)
 
     def advance(self, theta: Array, *, sources: bool = True) -> Array:
         """Return the temperature at the end without any flux through the contact; collective.
@@ -440,9 +445,16 @@ class HeatStep:
         """Return A and B times several fields (owned, k); collective."""
         return times(self.a, fields), times(self.b, fields)
 
+    def free_factor(self) -> None:
+        """Free its factor, which the next solution makes again; collective."""
+        made = self.__dict__.pop("_factor", None)
+        if made is not None:
+            made.free()
+            self._pivoted = not self._repeated
+
     def free(self) -> None:
         """Free its matrices and its factor, after which it advances nothing; collective."""
-        self._factor.free()
+        self.free_factor()
         destroy(self.a, self.b)
 
     def _solve_many(self, rhs: Array) -> Array:

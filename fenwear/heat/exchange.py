@@ -25,7 +25,9 @@ from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.errors import HeatError
 from fenwear.heat.field import Basis, Field, Functional, HeatState, ReducedBasis
+from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
 
+FEW = 300  # contact nodes up to which fluxes are worth a matrix
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 # What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
 OVERSHOOT, DRIFT = 0.1, 1e-3
@@ -79,18 +81,25 @@ class StepPlan:
 
 
 @dataclass(frozen=True)
-class _FluxMap:
-    """The fluxes (q_1, q_2) of a step, linear in what they come from; both surfaces concatenated.
+class _Ends:
+    """What there is at the ends of a half-cycle.
 
     Attributes:
-        by_temperature: From the surfaces' temperatures without flux (2 n, 2 n).
-        by_heat: From the friction heat (2 n, n).
-        by_ambient: From the temperature of the surroundings (2 n,).
+        stored: Heat in both bodies at its start and at its end, per thickness.
+        surfaces: Temperatures of both contact surfaces at its end (n,), K, where coordinates do not say them.
     """
 
-    by_temperature: Array
-    by_heat: Array
-    by_ambient: Array
+    stored: tuple[float, float]
+    surfaces: tuple[Array, Array] | None
+
+
+@dataclass(frozen=True)
+class StepMap:
+    """One step for given conductances: s' = propagator s + source + response Q, Q the friction heat (n,)."""
+
+    propagator: Array
+    source: Array
+    response: Array
 
 
 class HeatExchange:
@@ -119,8 +128,10 @@ class HeatExchange:
         self.heat, self.sides, self.plans = heat, sides, plans
         self.duration, self.friction, self.weights, self.thickness = duration, friction, weights, thickness
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
-        self._contact_responses = [[side.contact.of_changes(r) for r in side.field.responses] for side in sides]
-        self._flux_maps: dict[tuple[int, int, bytes], _FluxMap] = {}
+        self._contact_responses = [
+            side.field.contact_responses or [side.contact.of_changes(r) for r in side.field.responses] for side in sides
+        ]
+        self._flux_maps: dict[tuple[int, int, bytes], Fluxes] = {}
 
     @property
     def reduced(self) -> bool:
@@ -169,7 +180,10 @@ class HeatExchange:
 
     def contact_temperatures(self, state: HeatState) -> tuple[Array, Array]:
         """Return the temperatures of the two contact surfaces at the interface nodes (n,), K."""
-        punch, strip = self._parts(self.own(state).values)
+        state = self.own(state)
+        if state.surfaces is not None:
+            return state.surfaces
+        punch, strip = self._parts(state.values)
         return self.sides[0].contact(punch), self.sides[1].contact(strip)
 
     def contact_changes(self, changes: Array) -> tuple[Array, Array]:
@@ -207,9 +221,9 @@ class HeatExchange:
         Raises:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
-        values, terms, stored = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
-        self._check_bounds(*stored, terms[0] - terms[1])
-        return self.at(values), terms * self.thickness
+        values, terms, ends = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
+        self._check_bounds(*ends.stored, terms[0] - terms[1])
+        return HeatState(self.bases, values, surfaces=ends.surfaces), terms * self.thickness
 
     def change(
         self, phase: int, conductance: Array, changes: Array | None = None, pressure: Array | None = None
@@ -232,8 +246,8 @@ class HeatExchange:
 
     def _conduct(
         self, values: Array, phase: int, pressure: Array, conductance: Array, *, sources: bool
-    ) -> tuple[Array, Array, tuple[float, float]]:
-        """Return the coordinates at the end, the heat terms, and the heat stored at the start and at the end.
+    ) -> tuple[Array, Array, _Ends]:
+        """Return the coordinates at the end, the heat terms, and what else there is at the ends.
 
         Args:
             values: Coordinates at the start (dim,), or without sources their changes (dim, k).
@@ -242,14 +256,25 @@ class HeatExchange:
         """
         terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
         before = start = self._balances(values, sources=sources)
+        surfaces = None
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             heat = (self.friction[phase] * plan.speed * pressure.T).T
-            values, fluxes = self._step(kinds, values, heat, conductance, sources=sources)
+            values, fluxes, bare = self._step(kinds, values, heat, conductance, sources=sources)
             after = self._balances(values, sources=sources)
             terms += self._account(kinds, heat, fluxes, before, after, sources=sources)
             before = after
-        return values, terms, (start[0][0] + start[1][0], before[0][0] + before[1][0])
+        if sources and any(side.field.contact_responses is not None for side in self.sides):
+            surfaces = self._surfaces(kinds, bare, fluxes)
+        return values, terms, _Ends((start[0][0] + start[1][0], before[0][0] + before[1][0]), surfaces)
+
+    def _surfaces(self, kinds: tuple[int, int], bare: list[Array], fluxes: list[Array]) -> tuple[Array, Array]:
+        """Return the temperatures of both contact surfaces at the end of a step."""
+        first, second = (
+            free + responses[kind] @ q
+            for free, responses, kind, q in zip(bare, self._contact_responses, kinds, fluxes, strict=True)
+        )
+        return first, second
 
     def _step(
         self,
@@ -260,8 +285,8 @@ class HeatExchange:
         *,
         sources: bool,
         further: Array | None = None,
-    ) -> tuple[Array, list[Array]]:
-        """Return the coordinates at the end of a step, and the fluxes q_1 and q_2 into the bodies.
+    ) -> tuple[Array, list[Array], list[Array]]:
+        """Return the coordinates at the end of a step, the fluxes q_1 and q_2, and surface temperatures without them.
 
         Args:
             further: What else flows into both (2 n, k).
@@ -274,14 +299,15 @@ class HeatExchange:
             side.contact(part) if sources else side.contact.of_changes(part)
             for side, part in zip(self.sides, free, strict=True)
         ]
-        fluxes = self._fluxes(kinds, bare, heat, conductance, self.heat.ambient if sources else 0.0)
+        ambient = self.heat.ambient if sources else 0.0
+        fluxes = np.split(self._flux_map(kinds, conductance).of(np.concatenate(bare), heat, ambient), 2)
         if further is not None:
             fluxes = [q + part for q, part in zip(fluxes, np.split(further, 2), strict=True)]
         ends = [
             part + side.field.responses[kind] @ q
             for part, side, kind, q in zip(free, self.sides, kinds, fluxes, strict=True)
         ]
-        return np.concatenate(ends), fluxes
+        return np.concatenate(ends), fluxes, bare
 
     def _balances(self, values: Array, *, sources: bool) -> list[Array]:
         """Return what enters the balance of both bodies."""
@@ -329,11 +355,11 @@ class HeatExchange:
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             heat = self.friction[phase] * plan.speed * pressure
-            values, _ = self._step(kinds, values, heat, conductance, sources=True)
-            first, second = self.contact_temperatures(self.at(values))
+            values, fluxes, bare = self._step(kinds, values, heat, conductance, sources=True)
+            first, second = self._surfaces(kinds, bare, fluxes)
             missing = np.where(conducts, second - first, 0.0)
-            further = scipy.linalg.inv(self._flux_matrix(kinds, conductance))[:, :n] * missing
-            changes, _ = self._step(kinds, changes, np.zeros((n, n)), conductance, sources=False, further=further)
+            further = scipy.linalg.inv(self._exchanged(kinds, conductance).matrix())[:, :n] * missing
+            changes, _, _ = self._step(kinds, changes, np.zeros((n, n)), conductance, sources=False, further=further)
         return changes
 
     def _account(
@@ -360,18 +386,29 @@ class HeatExchange:
         seconds = 1.0 if np.isinf(self.duration) else self.duration
         return np.array([friction, debris, stored, convected, held, carried]) * seconds
 
-    def _fluxes(
-        self, kinds: tuple[int, int], bare: list[Array], heat: Array, conductance: Array, ambient: float
-    ) -> list[Array]:
-        """Return q_1 and q_2 into the bodies (n,) or (n, k), mW/mm², from the temperatures without flux."""
-        fluxes = self._flux_map(kinds, conductance)
-        total = fluxes.by_temperature @ np.concatenate(bare) + fluxes.by_heat @ heat
-        if ambient:
-            total += fluxes.by_ambient * ambient
-        n = len(conductance)
-        return [total[:n], total[n:]]
+    def step_map(self, kinds: tuple[int, int], conductance: Array) -> StepMap:
+        """Return what a step does to the coordinates; for both on a small basis.
 
-    def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> _FluxMap:
+        Args:
+            kinds: Which prepared step each body takes.
+            conductance: Of each node.
+        """
+        fluxes, parts = self._flux_map(kinds, conductance), [np.eye(len(basis)) for basis in self.bases]
+        free, bare, source, bare_source = [], [], [], []
+        for side, kind, every in zip(self.sides, kinds, parts, strict=True):
+            free.append(side.field.advance(kind, every, sources=False))
+            bare.append(side.contact.of_changes(free[-1]))
+            source.append(side.field.advance(kind, np.zeros(len(every))))
+            bare_source.append(side.contact(source[-1]))
+        responses = scipy.linalg.block_diag(
+            *(side.field.responses[kind] for side, kind in zip(self.sides, kinds, strict=True))
+        )
+        propagator = scipy.linalg.block_diag(*free)
+        propagator += responses @ fluxes.of(scipy.linalg.block_diag(*bare), None, 0.0)
+        at_rest = fluxes.of(np.concatenate(bare_source), None, self.heat.ambient)
+        return StepMap(propagator, np.concatenate(source) + responses @ at_rest, fluxes.heat_of(responses))
+
+    def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
         """Return the map to the fluxes; kept for conductances met before."""
         key = (*kinds, conductance.tobytes())
         if key not in self._flux_maps:
@@ -380,27 +417,11 @@ class HeatExchange:
             self._flux_maps[key] = self._make_flux_map(kinds, conductance)
         return self._flux_maps[key]
 
-    def _make_flux_map(self, kinds: tuple[int, int], conductance: Array) -> _FluxMap:
-        conducts, own, jump = _row_factors(conductance)
-        kept, h, n = 1 - self.heat.debris, self.heat.convection, len(conductance)
-        inverse = scipy.linalg.inv(self._flux_matrix(kinds, conductance))
-        loss = np.where(conducts, 0.0, h)
-        first, second = inverse[:, :n], inverse[:, n:]
-        by_temperature = np.hstack([first * (-jump * conducts - loss), first * (jump * conducts) - second * loss])
-        by_heat = (first * (own * self.heat.partition) + second) * (kept * conducts)
-        return _FluxMap(by_temperature, by_heat, first @ loss + second @ loss)
+    def _make_flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
+        step = self._exchanged(kinds, conductance)
+        return FluxMap.made(step) if len(conductance) <= FEW else FluxFactor(step)
 
-    def _flux_matrix(self, kinds: tuple[int, int], conductance: Array) -> Array:
-        t1, t2 = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
-        conducts, own, jump = (a[:, None] for a in _row_factors(conductance))
-        eye, h = np.eye(len(conductance)), self.heat.convection
-        first = np.hstack([np.where(conducts, own * eye + jump * t1, eye + h * t1), np.where(conducts, -jump * t2, 0)])
-        second = np.hstack([np.where(conducts, eye, 0), np.where(conducts, eye, eye + h * t2)])
-        return np.vstack([first, second])
-
-
-def _row_factors(conductance: Array) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Return where nodes conduct, and the factors of q_1 and of theta_1 - theta_2 in their first row."""
-    perfect = np.isinf(conductance)
-    jump = np.where(perfect, 1.0, np.nan_to_num(conductance, nan=0.0, posinf=0.0))
-    return ~np.isnan(conductance), np.where(perfect, 0.0, 1.0), jump
+    def _exchanged(self, kinds: tuple[int, int], conductance: Array) -> Exchanged:
+        first, second = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
+        heat = self.heat
+        return Exchanged((first, second), conductance, heat.convection, heat.partition, heat.debris)

@@ -16,11 +16,13 @@ import numpy as np
 import scipy.linalg
 from dolfinx import fem
 from mpi4py import MPI
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, HeatStep
 from fenwear.parallel import total
+
+CHUNK = 256  # right-hand sides at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,11 +104,14 @@ class HeatState:
         bases: Of the punch and of the strip.
         values: Coordinates on the punch's and then on the strip's basis.
         told: Temperature of the bulk of a closed track, K, where no basis has it; None for the initial one.
+        surfaces: Temperatures of both contact surfaces at the interface nodes (n,), K, at the end of a step: a basis
+            may leave out what fades within one. None where the coordinates say all.
     """
 
     bases: tuple[Basis, Basis]
     values: Array
     told: float | None = None
+    surfaces: tuple[Array, Array] | None = None
 
     @classmethod
     def nodal(
@@ -180,6 +185,10 @@ class Field(Protocol):
     def responses(self) -> Sequence[Array]:
         """Coordinates from unit fluxes at the interface nodes in each step, each (dim, n)."""
 
+    @property
+    def contact_responses(self) -> Sequence[Array] | None:
+        """Contact temperature at these nodes from the same (n, n) where coordinates do not say it all, else None."""
+
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Return what a step without flux through the contact makes of coordinates.
 
@@ -200,7 +209,9 @@ class Field(Protocol):
 class FullField:
     """The temperature of all nodes, distributed over the ranks; all calls are collective."""
 
-    def __init__(self, body: HeatBody, steps: Sequence[HeatStep], inflow: Array) -> None:
+    contact_responses: Sequence[Array] | None = None
+
+    def __init__(self, body: HeatBody, steps: Sequence[HeatStep], inflow: csc_array) -> None:
         """Keep the responses to the fluxes.
 
         Args:
@@ -209,7 +220,7 @@ class FullField:
             inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
         """
         self.steps, self.basis = list(steps), Basis(body)
-        self.responses: Sequence[Array] = [step.respond(inflow) for step in self.steps]
+        self.responses: Sequence[Array] = [step.respond(inflow.toarray()) for step in self.steps]
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Solve one step."""
@@ -221,17 +232,32 @@ class FullField:
 
 
 class ReducedField:
-    """Galerkin projection theta = lift + V s onto a basis V, the same coordinates s on every rank."""
+    """Galerkin projection theta = lift + V s onto a basis V, the same coordinates s on every rank.
 
-    def __init__(self, steps: Sequence[HeatStep], inflow: Array, basis: ReducedBasis) -> None:
+    V may leave out what is gone by the end of the next step: fields of short wave length in a layer below the
+    contact. Within a step the contact meets them all the same: its response to the fluxes is then that of the full
+    steps, which in structural dynamics is called a static correction.
+
+    Attributes:
+        contact_responses: That response (n, n), of each step; None where V has all of it.
+    """
+
+    def __init__(
+        self,
+        steps: Sequence[HeatStep],
+        inflow: csc_array,
+        basis: ReducedBasis,
+        contact_responses: Sequence[Array] | None = None,
+    ) -> None:
         """Project the steps; collective.
 
         Args:
-            steps: Factored steps of the body.
+            steps: Of the body.
             inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
             basis: V with its lift.
+            contact_responses: Of the full steps, for a basis of what later steps feel alone.
         """
-        self.basis = basis
+        self.basis, self.contact_responses = basis, contact_responses
         self._propagators: list[Array] = []
         self._sources: list[Array] = []
         self.responses: list[Array] = []
@@ -243,7 +269,7 @@ class ReducedField:
             self._propagators.append(scipy.linalg.solve(a, self._sum(columns.T @ b_basis)))
             source = columns.T @ (step.source + (b_lift - a_lift)[:, 0])
             self._sources.append(scipy.linalg.solve(a, self._sum(source)))
-            self.responses.append(scipy.linalg.solve(a, self._sum(columns.T @ inflow)))
+            self.responses.append(scipy.linalg.solve(a, self._sum((inflow.T @ columns).T)))
 
     def spectral_radius(self, cycle: Sequence[int]) -> float:
         """Return the factor by which some temperature changes in every cycle of these steps, the largest in size."""
@@ -261,3 +287,22 @@ class ReducedField:
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional; collective to make, not to call."""
         return Functional(self._sum(rows @ self.basis.columns), self._sum(rows @ self.basis.lift))
+
+
+def contact_responses(steps: Sequence[HeatStep], inflow: csc_array, contact_rows: csr_array) -> list[Array]:
+    """Return the contact temperature from unit fluxes (n, n) at the end of each full step; collective.
+
+    Args:
+        steps: Of a body. Their factors are made and freed one after the other.
+        inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
+        contact_rows: Temperature at the contact nodes (n, owned).
+    """
+    n, found = inflow.shape[1], []
+    for step in steps:
+        response: Array = np.empty((n, n))
+        for begin in range(0, n, CHUNK):
+            some = slice(begin, begin + CHUNK)
+            response[:, some] = contact_rows @ step.respond(inflow[:, some].toarray())
+        step.free_factor()
+        found.append(total(step.body.body.mesh.comm, response))
+    return found

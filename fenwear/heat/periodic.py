@@ -8,18 +8,22 @@ periodic state itself, which is N -> infinity: (I - P_c) s = b_c + Q_c p.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.exchange import HeatExchange, StepMap
+
+KEPT = 8  # cycles of different conducting nodes
 
 
 @dataclass(frozen=True)
 class PhaseMap:
-    """One phase: s' = propagator s + source + response p, with the thermal gap of its end."""
+    """One phase: s' = propagator s + source + response p."""
 
     propagator: Array
     source: Array
@@ -27,24 +31,65 @@ class PhaseMap:
 
 
 @dataclass(frozen=True)
+class _Passed:
+    """What is there after a phase of a cycle: through s + source + responses p, s at its start, p of all phases."""
+
+    through: Array
+    source: Array
+    responses: Array  # (dim, m n)
+
+
 class CycleJump:
     """Where a jump ends, as a function of the pressures of its phases.
 
-    Attributes:
-        gap: Thermal gap at the end of each phase of the cycle that starts there, without pressure (m, n), mm.
-        coupling: Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa.
-        end: State at the end without pressure (dim,).
-        end_response: Its response to the pressures (dim, m n).
+    Args:
+        start: What the end solves for without pressure and without what cycles bring (dim,).
+        weight: How many cycles bring it.
+        matrix: Of the end (dim, dim).
+        passed: The cycle, phase by phase.
+        gap_rows: Thermal gap of the coordinates (n, dim), mm.
+        gap_constant: The same where they are zero (n,), mm.
     """
 
-    gap: Array
-    coupling: Array
-    end: Array
-    end_response: Array
+    def __init__(
+        self,
+        start: Array,
+        weight: float,
+        matrix: Array,
+        passed: Sequence[_Passed],
+        gap_rows: Array,
+        gap_constant: Array,
+    ) -> None:
+        self._start, self._weight, self._passed = start, weight, passed
+        self._gap_rows, self._gap_constant = gap_rows, gap_constant
+        self._factor = scipy.linalg.lu_factor(matrix)
 
     def state(self, pressure: Array) -> Array:
         """Return the state at the end of the jump (dim,) for pressures (m, n)."""
-        return self.end + self.end_response @ pressure.ravel()
+        last = self._passed[-1]
+        brought = last.source + last.responses @ pressure.ravel()
+        return np.asarray(scipy.linalg.lu_solve(self._factor, self._start + self._weight * brought))
+
+    def gaps(self, pressure: Array) -> Array:
+        """Return the thermal gap at the end of each phase of the cycle that starts there (m, n), mm, at pressures."""
+        end, p = self.state(pressure), pressure.ravel()
+        return (
+            np.array([self._gap_rows @ (one.through @ end + one.source + one.responses @ p) for one in self._passed])
+            + self._gap_constant
+        )
+
+    @cached_property
+    def gap(self) -> Array:
+        """The same without pressure."""
+        return self.gaps(np.zeros((len(self._passed), len(self._gap_constant))))
+
+    @cached_property
+    def coupling(self) -> Array:
+        """Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa."""
+        m, n = len(self._passed), len(self._gap_constant)
+        end_response = scipy.linalg.lu_solve(self._factor, self._weight * self._passed[-1].responses)
+        parts = [self._gap_rows @ (one.through @ end_response + one.responses) for one in self._passed]
+        return np.array(parts).reshape(m, n, m, n)
 
 
 class CycleHeat:
@@ -55,7 +100,7 @@ class CycleHeat:
         dim = sum(len(basis) for basis in exchange.bases)
         self.gap_rows = exchange.gap_change(np.eye(dim))
         self._gap_constant = exchange.gap(exchange.at(np.zeros(dim)))
-        self._maps: dict[bytes, list[PhaseMap]] = {}
+        self._maps: dict[bytes, tuple[list[PhaseMap], list[_Passed]]] = {}
 
     def initial(self) -> Array:
         """Return the initial state (dim,)."""
@@ -67,46 +112,53 @@ class CycleHeat:
 
     def maps(self, conductances: Array) -> list[PhaseMap]:
         """Return the map of each phase for its conductances (m, n); the last few are kept."""
+        return self._cycle(conductances)[0]
+
+    def _cycle(self, conductances: Array) -> tuple[list[PhaseMap], list[_Passed]]:
+        """Return the map of each phase, and what is there after each one of a cycle."""
         key = conductances.tobytes()
         if key not in self._maps:
-            if len(self._maps) > 8:
+            if len(self._maps) > KEPT:
                 self._maps.clear()
-            self._maps[key] = [self._phase_map(phase, conductances[phase]) for phase in range(len(conductances))]
+            maps = [self._phase_map(phase, conductances[phase]) for phase in range(len(conductances))]
+            self._maps[key] = maps, self._passed(maps)
         return self._maps[key]
 
     def _phase_map(self, phase: int, conductance: Array) -> PhaseMap:
-        exchange, dim, n = self.exchange, self.gap_rows.shape[1], len(conductance)
-        propagator, _ = exchange.change(phase, conductance, changes=np.eye(dim))
-        response, _ = exchange.change(phase, conductance, pressure=np.eye(n))
-        rest, _ = exchange.half_cycle(exchange.at(np.zeros(dim)), phase, np.zeros(n), conductance)
-        return PhaseMap(propagator, rest.values, response)
+        exchange, dim = self.exchange, self.gap_rows.shape[1]
+        steps: dict[tuple[int, int], StepMap] = {}
+        propagator: Array = np.eye(dim)
+        source: Array = np.zeros(dim)
+        response: Array = np.zeros((dim, len(conductance)))
+        for plan in exchange.plans[phase]:
+            kinds = (plan.punch, plan.strip)
+            if kinds not in steps:
+                steps[kinds] = exchange.step_map(kinds, conductance)
+            one = steps[kinds]
+            propagator, source = one.propagator @ propagator, one.propagator @ source + one.source
+            response = one.propagator @ response + one.response * (exchange.friction[phase] * plan.speed)
+        return PhaseMap(propagator, source, response)
 
-    def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
-        """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""
-        maps = self.maps(conductances)
-        m, n = conductances.shape
-        dim = len(self.gap_rows[0])
-        # The cycle: after phase k the state is through[k] s + source + responses of the phases up to k.
+    @staticmethod
+    def _passed(maps: Sequence[PhaseMap]) -> list[_Passed]:
+        m, (dim, n) = len(maps), maps[0].response.shape
         through: Array = np.eye(dim)
         source: Array = np.zeros(dim)
         responses: Array = np.zeros((dim, m, n))
-        ends: list[tuple[Array, Array, Array]] = []
+        passed = []
         for phase, one in enumerate(maps):
             through, source = one.propagator @ through, one.propagator @ source + one.source
-            responses = (one.propagator @ responses.reshape(dim, -1)).reshape(dim, m, n)
-            responses[:, phase] += one.response
-            ends.append((through, source, responses.copy()))
+            for before in range(phase):
+                responses[:, before] = one.propagator @ responses[:, before]
+            responses[:, phase] = one.response
+            passed.append(_Passed(through, source, responses.reshape(dim, -1).copy()))
+        return passed
+
+    def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
+        """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""
+        _, passed = self._cycle(conductances)
+        changes = np.eye(len(passed[0].source)) - passed[-1].through
         if np.isinf(cycles):
-            matrix, weight = np.eye(dim) - through, 1.0
-            start: Array = np.zeros(dim)
-        else:
-            matrix, weight, start = np.eye(dim) + cycles * (np.eye(dim) - through), cycles, state
-        columns = np.hstack([(start + weight * source)[:, None], weight * responses.reshape(dim, -1)])
-        solved = scipy.linalg.solve(matrix, columns)
-        end, end_response = solved[:, 0], solved[:, 1:]
-        gaps, couplings = [], []
-        for before, constant, added in ends:  # phases of the cycle that starts from the end state
-            gaps.append(self.gap_rows @ (before @ end + constant))
-            couplings.append(self.gap_rows @ (before @ end_response + added.reshape(dim, -1)))
-        coupling = np.array(couplings).reshape(m, n, m, n)
-        return CycleJump(np.array(gaps) + self._gap_constant, coupling, end, end_response)
+            return CycleJump(np.zeros(len(changes)), 1.0, changes, passed, self.gap_rows, self._gap_constant)
+        matrix = np.eye(len(changes)) + cycles * changes
+        return CycleJump(state, cycles, matrix, passed, self.gap_rows, self._gap_constant)

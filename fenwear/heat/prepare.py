@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
-from fenwear.heat.field import FullField, ReducedField
+from fenwear.heat.field import FullField, ReducedField, contact_responses
 from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
@@ -19,6 +20,7 @@ from fenwear.parallel import total
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
 
+MANY = 300  # contact nodes above which a basis holds what is felt a step later alone
 NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
 
 
@@ -76,7 +78,8 @@ def prepare_exchange(
         if heat.track is not None and body.body.name == "strip":
             field = _on_track(heat, heat.track, body, steps, inflow, own, duration, around, cycle, thickness)
         elif reduced:
-            field = _reduced(body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle)
+            lasting = contact_rows(body, pair) if len(pair.weights) > MANY else None
+            field = _reduced(body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle, lasting)
         else:
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
@@ -114,21 +117,26 @@ def prepare_steady(
 def _reduced(
     body: HeatBody,
     steps: list[HeatStep],
-    inflow: Array,
+    inflow: csc_array,
     speeds: Sequence[float],
     duration: float,
     tolerance: float,
     surroundings: Surroundings,
     cycle: Sequence[int],
+    lasting: csr_array | None = None,
 ) -> ReducedField:
     """Return the field on a basis whose cycle of steps lets every temperature die out; collective.
+
+    Args:
+        lasting: Temperature at the contact nodes, for a basis of what is felt a step later; None for all.
 
     Raises:
         HeatError: none does.
     """
+    exact = None if lasting is None else contact_responses(steps, inflow, lasting)
     while True:
-        basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings)
-        field = ReducedField(steps, inflow, basis)
+        basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings, lasting=lasting is not None)
+        field = ReducedField(steps, inflow, basis, exact)
         growth = field.spectral_radius(cycle)
         if growth <= 1 + NEUTRAL:
             return field
@@ -146,7 +154,7 @@ def _on_track(
     track: Track,
     body: HeatBody,
     steps: list[HeatStep],
-    inflow: Array,
+    inflow: csc_array,
     speeds: Sequence[float],
     duration: float,
     surroundings: Surroundings,
@@ -164,7 +172,7 @@ def _on_track(
     # What enters at a kelvin, as large as a unit flux: what is small against the largest is dropped from the basis.
     comm, entering = body.body.mesh.comm, steps[0].entering
     fluxes, unit = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], np.abs(entering).sum()]))
-    both = np.hstack([inflow, entering[:, None] * (fluxes / unit)])
+    both = csc_array(hstack([inflow, csc_array(entering[:, None] * (fluxes / unit))]))
     moving = [speeds[step] for step in cycle]
     inner = _reduced(body, steps, both, moving, duration, heat.reduction_tolerance, surroundings, cycle)
     kelvins = [abs(speed / speeds[0]) * unit / fluxes for speed in speeds]
@@ -187,10 +195,20 @@ def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, r
     return Surroundings(renewed, body.place(bare), sliding)
 
 
-def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[Array, Array]:
+def contact_rows(body: HeatBody, pair: ContactPair) -> csr_array:
+    """Return what gives the temperature of a body at the interface nodes, (n, owned) of this rank."""
+    onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
+    return csr_array(onto_nodes @ body.trace.rows)
+
+
+def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[csc_array, csc_array]:
     """Return the loads of unit fluxes at the interface nodes on each body (owned, n), mm."""
-    weights = np.diag(pair.weights)
-    return bodies[0].place(pair.punch.spread @ weights), bodies[1].place(pair.transfer.T @ weights)
+    weights = diags_array(pair.weights)
+    punch, strip = (
+        csc_array(body.trace.rows.T @ (onto @ weights))
+        for body, onto in zip(bodies, (pair.punch.spread, pair.transfer.T), strict=True)
+    )
+    return punch, strip
 
 
 def _exchange(
@@ -215,8 +233,6 @@ def _side(
     cooled: bool,
 ) -> Side:
     body = field.basis.body
-    onto_nodes = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
-    contact_rows = onto_nodes @ body.trace.rows
     convected = body.convected
     if surroundings.exposed is not None:
         convected = convected + body.heat.convection * surroundings.exposed
@@ -229,7 +245,7 @@ def _side(
     capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
     side = Side(
         field,
-        field.observe(contact_rows),
+        field.observe(contact_rows(body, pair)),
         field.observe(gap_rows).less(initial),
         field.observe(rows),
         [step.held_source for step in steps],

@@ -2,7 +2,15 @@
 
 Only n fluxes go into a body, so its temperatures stay near the responses to these fluxes over all
 time scales, from a step to the steady state: a rational Krylov space with the time steps as poles.
-Its parts that matter are picked by the singular values in the norm of the heat capacity.
+Its parts that matter are picked by the singular values in the norm of the heat capacity, scale by
+scale, the slowest first: of each, what lies beside the basis so far. In the end they are picked again, of all together.
+
+Where there are many fluxes, most of them differ over a short wave length l, and warm a layer as thin as
+that for a time of l²/(4 pi² a) with the diffusivity a. What a step leaves of such fields no later one
+sees: there the singular values are those of the fields one step later, so that the basis stays as small
+on any mesh, and `ReducedField` adds what it leaves out to the contact temperature of the step itself.
+The fluxes whose fields last are found by subspace iteration from random ones, in place of all n of them
+(Halko, Martinsson and Tropp, SIAM Review 53, 2011).
 """
 
 from __future__ import annotations
@@ -11,10 +19,11 @@ from collections.abc import Sequence
 
 import numpy as np
 from mpi4py import MPI
+from scipy.sparse import csc_array, diags_array
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
-from fenwear.heat.conduction import ALONE, HeatBody, Surroundings
+from fenwear.heat.conduction import ALONE, HeatBody, HeatStep, Surroundings
 from fenwear.heat.field import ReducedBasis
 from fenwear.parallel import total
 
@@ -22,15 +31,20 @@ RATIO = 4.0  # of one time scale to the next
 SCALES = 9  # of them, from a step on; then come the last ones, to the steady state
 ROUNDING = 1e-7  # of the largest singular value: what is left of a dependent field, squared in the Gram matrix
 FAST = 4  # scales over which a motion to and fro does not average out
+SOME = 200  # fluxes that are tried first, where there are many
+SHARPER = 0.3  # of the tolerance, for what is felt a step later: at a corner of the contact many such fields add up
+SWEEPS = 2  # of the subspace iteration: the singular values fall fast, and enter by their fourth power
 
 
 def reduced_basis(
     body: HeatBody,
-    inflow: Array,
+    inflow: csc_array,
     speeds: Sequence[float],
     duration: float,
     tolerance: float,
     surroundings: Surroundings = ALONE,
+    *,
+    lasting: bool = False,
 ) -> ReducedBasis:
     """Return a basis, with a lift that has the held temperatures; collective.
 
@@ -41,63 +55,159 @@ def reduced_basis(
         duration: Of one step, s: the shortest time scale.
         tolerance: Singular values below this fraction of the largest are dropped.
         surroundings: What lies beyond the mesh.
+        lasting: Whether it holds what is felt a step later alone.
     """
     mean = float(np.mean(speeds))
     moving = sorted({min(speeds), max(speeds)} - {mean})
     lift = body.initial()
     # Fluxes of the same power: the singular values then weigh temperatures as friction makes them.
-    even = inflow / np.sqrt(total(body.body.mesh.comm, np.abs(inflow).sum(axis=0)))
+    even = csc_array(inflow @ diags_array(1 / np.sqrt(total(body.body.mesh.comm, abs(inflow).sum(axis=0)))))
+    fluxes, later = even.toarray() if not lasting else np.zeros((0, 0)), None
+    if lasting:
+        tolerance *= SHARPER
+        fluxes = _lasting_fluxes(body, even, duration, tolerance, surroundings)
+        later = body.step(0.0, duration, surroundings)
     scales = [duration * RATIO**k for k in range(SCALES)]
     scales += [np.inf] if body.loses_heat(mean, surroundings) else [scales[-1] * 100]
     # What is new on both sides does not average out: material that leaves is cooled on either way.
     unlike = len(scales) if surroundings.renewed and min(speeds) * max(speeds) < 0 else FAST
-    uniform = np.ones((body.owned, 1))  # carries the balance of energy
-    uniform[body.held] = 0.0
-    snapshots: list[Array] = []
+    basis = _Growing(body, later)
     relaxed: list[Array] = []
-    largest = 0.0
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
         for velocity in [mean, *(moving if k < unlike else [])]:
             step = body.step(velocity, scale, surroundings)
-            fields, values = _principal(body, _uneven(body, uniform, step.respond(even)), tolerance, largest)
-            largest = max(largest, values[-1])
-            snapshots.append(fields)
+            basis.add(step.respond(fluxes), tolerance)
             if np.isinf(scale):
                 lift = step.advance(np.zeros(body.owned))
             else:
                 relaxed.append(step.advance(body.initial() - lift, sources=False)[:, None])
             step.free()
-    start = (body.initial() - lift)[:, None]
-    hottest = body.body.mesh.comm.allreduce(float(np.abs(start).max(initial=0.0)), MPI.MAX)
-    warm = hottest > 0
-    exact = np.hstack([uniform, start / hottest]) if warm else uniform
-    exact[body.held] = 0.0
-    exact = _orthonormal(body, exact, 0.0)
-    if warm:  # how the initial temperature dies out
-        rest = np.hstack(relaxed)
-        rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
-        exact = _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0)
-    rest = np.hstack(snapshots)
-    rest -= exact @ total(body.body.mesh.comm, exact.T @ body.store(rest))
-    return ReducedBasis(body, lift, _orthonormal(body, np.hstack([exact, _orthonormal(body, rest, tolerance)]), 0.0))
+    basis.compress(tolerance)
+    if later is not None:
+        later.free()
+    basis.start_from(body.initial() - lift, np.hstack(relaxed), tolerance)
+    return ReducedBasis(body, lift, basis.columns)
 
 
-def _uneven(body: HeatBody, uniform: Array, fields: Array) -> Array:
-    """Return fields without their mean, which is in the basis already; collective.
+class _Growing:
+    """An orthonormal basis in the norm of the heat capacity, that begins with the uniform temperature; collective.
 
-    In a body that hardly loses heat it is far larger than all else, which would be small against it and dropped.
+    The uniform one carries the balance of energy. In a body that hardly loses heat it is far larger than all
+    else, which would be small against it and dropped.
+
+    Args:
+        body: The body.
+        later: The step by whose end fields are weighed; None to weigh them as they are.
     """
-    stored = body.store(uniform)
-    means = total(body.body.mesh.comm, stored.T @ np.hstack([fields, uniform]))
-    return fields - uniform @ (means[:, :-1] / means[:, -1:])
+
+    def __init__(self, body: HeatBody, later: HeatStep | None) -> None:
+        self.body, self._later = body, later
+        self._largest = 0.0
+        self.columns = np.ones((body.owned, 1))
+        self.columns[body.held] = 0.0
+        stored = _gram(body, self.columns)[0, 0]
+        self.columns = self.columns / np.sqrt(stored) if stored > 0 else self.columns[:, :0]
+        self._uniform = self.columns
+        self._added: list[Array] = []  # in coordinates of the basis as it was then
+
+    def add(self, fields: Array, tolerance: float) -> None:
+        """Add the principal parts of fields (owned, k) beside the basis, down to a share of the largest ever."""
+        rest = self._beside(fields)
+        felt = rest if self._later is None else self._later.advance(rest, sources=False)
+        parts, values, largest = _principal(self.body, felt, tolerance, self._largest)
+        self._largest = max(self._largest, largest)
+        self._append(rest @ (parts / values))
+        self._added.append(total(self.body.body.mesh.comm, self.columns.T @ self.body.store(fields)))
+
+    def compress(self, tolerance: float) -> None:
+        """Keep the principal parts of all that was added together, and the uniform temperature."""
+        dim, first = self.columns.shape[1], self._uniform.shape[1]
+        if dim == first:
+            return
+        added = np.hstack([np.pad(one, ((0, dim - len(one)), (0, 0))) for one in self._added])[first:]
+        columns = self.columns[:, first:]
+        felt = columns if self._later is None else self._later.advance(columns, sources=False)
+        factor = np.linalg.cholesky(_gram(self.body, felt)).T  # the norm of x is that of factor @ x
+        parts, values, _ = np.linalg.svd(factor @ added, full_matrices=False)
+        self.columns = self._uniform
+        self._append(columns @ np.linalg.solve(factor, parts[:, values > max(tolerance, ROUNDING) * values[0]]))
+
+    def start_from(self, field: Array, relaxed: Array, tolerance: float) -> None:
+        """Add a field (owned,) exactly, and how it dies out, fields (owned, k), to a tolerance of its own."""
+        hottest = self.body.body.mesh.comm.allreduce(float(np.abs(field).max(initial=0.0)), MPI.MAX)
+        if hottest == 0:
+            return
+        start = field[:, None] / hottest
+        start[self.body.held] = 0.0
+        for fields, share in ((start, 0.0), (relaxed / hottest, tolerance)):
+            _, values, largest = _principal(self.body, fields, 0.0, 0.0)
+            rest = self._beside(fields)
+            parts, values, _ = _principal(self.body, rest, share, largest)
+            self._append(rest @ (parts / values))
+
+    def _beside(self, fields: Array) -> Array:
+        """Return fields without what the basis has of them."""
+        comm = self.body.body.mesh.comm
+        for _ in range(2):  # once more: rounding
+            fields = fields - self.columns @ total(comm, self.columns.T @ self.body.store(fields))
+        return fields
+
+    def _append(self, fields: Array) -> None:
+        """Append independent fields that lie beside the basis."""
+        if not fields.shape[1]:
+            return
+        for _ in range(2):  # once more: rounding
+            fields = fields @ np.linalg.inv(np.linalg.cholesky(_gram(self.body, fields))).T
+            fields = self._beside(fields)
+        self.columns = np.hstack([self.columns, fields])
+
+
+def _lasting_fluxes(
+    body: HeatBody, even: csc_array, duration: float, tolerance: float, surroundings: Surroundings
+) -> Array:
+    """Return loads (owned, k) of the fluxes whose fields are felt a step later; collective.
+
+    The principal ones of fields in material at rest, where they last longest. The first is nearly the mean, which
+    the basis has: the second sets the scale.
+
+    Args:
+        even: Loads of single fluxes of the same power (owned, n).
+        duration: Of the step, s.
+        tolerance: Share of the largest down to which they count.
+        surroundings: What lies beyond the mesh.
+    """
+    step, comm = body.step(0.0, duration, surroundings), body.body.mesh.comm
+
+    def felt(fluxes: Array) -> Array:
+        """Return S^T M S times fluxes (n, k), S = (A^-1 B) A^-1 C their fields a step later: A, B are symmetric."""
+        fields = step.advance(step.respond(even @ fluxes), sources=False)
+        return total(comm, even.T @ step.advance(step.respond(body.store(fields)), sources=False))
+
+    size, tried = even.shape[1], min(SOME, even.shape[1])
+    random = np.random.default_rng(0)  # the same on every rank and in every run
+    space: Array = np.zeros((size, 0))
+    while True:
+        space = np.hstack([space, random.standard_normal((size, tried - space.shape[1]))])
+        for _ in range(SWEEPS):
+            space = np.linalg.qr(felt(np.linalg.qr(space)[0]))[0]
+        squares, vectors = np.linalg.eigh(space.T @ felt(space))
+        values = np.sqrt(np.maximum(squares, 0.0))
+        least = max(tolerance, ROUNDING) * values[-2 if len(values) > 1 else -1]
+        if values[0] <= least or tried == size:
+            break
+        tried = min(2 * tried, size)
+    step.free()
+    return np.asarray(even @ (space @ vectors[:, values > least]))
 
 
 def _gram(body: HeatBody, fields: Array) -> Array:
     return total(body.body.mesh.comm, fields.T @ body.store(fields))
 
 
-def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) -> tuple[Array, Array]:
-    """Return the principal fields (owned, kept) with their size, and their singular values; collective.
+def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) -> tuple[Array, Array, float]:
+    """Return the combinations of fields that are principal (k, kept), their singular values, and the largest of all.
+
+    Collective.
 
     Raises:
         ConvergenceError: there are none, or they are no numbers.
@@ -112,11 +222,4 @@ def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) 
     values, vectors = np.linalg.eigh(gram)
     values = np.sqrt(np.maximum(values, 0.0))
     kept = values > max(tolerance, ROUNDING) * max(largest, values[-1])
-    return fields @ vectors[:, kept], values[kept] if kept.any() else np.zeros(1)
-
-
-def _orthonormal(body: HeatBody, fields: Array, tolerance: float) -> Array:
-    """Return an orthonormal basis of the fields' principal parts (owned, dim); collective."""
-    fields, values = _principal(body, fields, tolerance, 0.0)
-    fields = fields / values
-    return fields @ np.linalg.inv(np.linalg.cholesky(_gram(body, fields))).T  # once more: rounding
+    return vectors[:, kept], values[kept], float(values[-1])

@@ -59,6 +59,8 @@ class TrackField:
         thickness: Of a plane model, mm.
     """
 
+    contact_responses: Sequence[Array] | None = None
+
     def __init__(
         self,
         inner: ReducedField,

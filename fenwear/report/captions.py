@@ -42,7 +42,7 @@ OF_SURFACES = {  # of solids and rings
     "line for each chosen half-cycle.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
     "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
-    "program": "Load, sliding speed and ambient temperature over the time of the run, where they change.",
+    "program": "Load, sliding speed and ambient temperature over the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
     "temperature": "Temperature of the contact surfaces of punch and strip along the contact, a line for each "

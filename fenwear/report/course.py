@@ -208,8 +208,3 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Look, *, logarithmic: bool
     elif last > first:
         ax.set_xlim(0 if not logarithmic else first, last)
     ax.set_xlabel(look.label)
-
-
-def half_cycle_axis(ax: Axes, history: xarray.Dataset) -> None:
-    """Label the axis of cycles of a figure of solids or rings."""
-    run_axis(ax, history, STANDARD)

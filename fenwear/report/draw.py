@@ -48,7 +48,7 @@ def draw_figures(
     if model_of(history) == "plane":
         drawn = all_figures(history, half_cycles, look) | field_figures(directory, read_case(directory), look)
     else:
-        drawn = surface_figures(history, half_cycles)
+        drawn = surface_figures(history, half_cycles, look)
     folder.mkdir(exist_ok=True)
     paths = []
     for name, figure in drawn.items():

@@ -187,7 +187,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
         drawn["scar"] = scar_figure(history, look)
         drawn["friction"] = friction_figure(history, look)
     if "load_factor" in history:
-        drawn["program"] = program_figure(history)
+        drawn["program"] = program_figure(history, look)
     drawn["convergence"] = convergence_figure(history, look)
     if "max_temperature" in history:
         drawn["temperature"] = temperature_figure(history, chosen, look)

@@ -63,14 +63,14 @@ def _write_report(
 ) -> list[Path]:
     case = read_case(directory)
     if case.get("contact", {}).get("law") == "coulomb":
-        return write_stick_report(directory)
+        return write_stick_report(directory, formats)
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()), look, formats)
     if complete:
         from fenwear.report.animation import draw_animation
 
         paths.append(draw_animation(directory))
         try:
-            paths += draw_pictures(directory)
+            paths += draw_pictures(directory, formats)
         except DrawingError as error:
             log(f"warning: {error}")
     report = directory / REPORT

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
 from fenwear.report.solid_pictures import draw_solids
-from fenwear.report.style import direction_words, save_gif, strip_moves
+from fenwear.report.style import direction_words, further, save_gif, strip_moves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -64,7 +64,7 @@ def field_files(directory: Path) -> list[Path]:
     return sorted((directory / FIELDS).glob("half_cycle_*.nc"))
 
 
-def draw_pictures(directory: Path) -> list[Path]:
+def draw_pictures(directory: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the bodies at every half-cycle with fields, and an animation of several; return the files.
 
     Raises:
@@ -74,7 +74,7 @@ def draw_pictures(directory: Path) -> list[Path]:
         return []
     display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     start = [] if display or not shutil.which("xvfb-run") else ["xvfb-run", "-a"]
-    command = [*start, sys.executable, "-m", "fenwear.report.pictures", str(directory)]
+    command = [*start, sys.executable, "-m", "fenwear.report.pictures", str(directory), *formats]
     # A process started from one of several ranks is none of them.
     inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE", "OMPI", "PMI_"))}
     package = str(Path(__file__).resolve().parents[2])
@@ -97,8 +97,8 @@ def draw_pictures(directory: Path) -> list[Path]:
     return [Path(line) for line in done.stdout.splitlines() if line]
 
 
-def draw_here(directory: Path) -> list[Path]:
-    """Draw in this process, which needs a display; return the files."""
+def draw_here(directory: Path, formats: Sequence[str] = ()) -> list[Path]:
+    """Draw in this process, which needs a display, as PNG and in further formats; return the files."""
     from PIL import Image
 
     files = field_files(directory)
@@ -110,7 +110,7 @@ def draw_here(directory: Path) -> list[Path]:
     paths = []
     model = datasets[0].attrs.get("model", "plane")
     if model != "plane":
-        paths = draw_solids(datasets, folder, SHOWN)
+        paths = draw_solids(datasets, folder, SHOWN, formats)
         if model == "solid":
             return paths
     view = common_view(datasets)
@@ -119,8 +119,10 @@ def draw_here(directory: Path) -> list[Path]:
         for data in datasets:
             paths.append(folder / f"bodies_{field}_{int(data.attrs['half_cycle']):06d}.png")
             figure = bodies_figure(data, field, view, bodies_image(data, field, view))
-            figure.savefig(paths[-1], dpi=150)
-            with Image.open(paths[-1]) as picture:
+            png = paths[-1]
+            figure.savefig(png, dpi=150)
+            paths += further(figure, png, formats)
+            with Image.open(png) as picture:
                 small = picture.convert("RGB").resize((picture.width * 2 // 3, picture.height * 2 // 3))
                 frames.append(small.quantize(128, method=Image.Quantize.FASTOCTREE))
         if len(frames) > 1:
@@ -145,7 +147,9 @@ def common_view(datasets: Sequence[xarray.Dataset]) -> View:
     for field in SHOWN:
         names = [f"{b}_{field}" for b in BODIES]
         if all(name in data for data in datasets for name in names):
-            values = np.concatenate([data[f"{b}_{field}"].values[inside[b]] for data in datasets for b in BODIES])
+            # Late states fill the scale: what early ones have beyond it the bar tells.
+            late = datasets[len(datasets) // 2 :]
+            values = np.concatenate([data[f"{b}_{field}"].values[inside[b]] for data in late for b in BODIES])
             # A corner's stress has no bound: the colours leave out the largest half per cent.
             low, high = float(values.min()), float(np.quantile(values, 0.995 if field == "von_mises" else 1.0))
             ranges[field] = (0.0 if 0 < low < high / 2 else low, high if high > low else low + 1.0)
@@ -260,5 +264,5 @@ def _loaded(path: Path) -> xarray.Dataset:
 
 
 if __name__ == "__main__":
-    for drawn in draw_here(Path(sys.argv[1])):
+    for drawn in draw_here(Path(sys.argv[1]), sys.argv[2:]):
         print(drawn)

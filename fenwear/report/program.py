@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import xarray
 
-from fenwear.report.style import panels
+from fenwear.report.style import STANDARD, Look, panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,21 +19,21 @@ ACTED = {
 }
 
 
-def program_figure(history: xarray.Dataset) -> Figure:
-    """Draw over the time what acted: the load, the speed and the ambient temperature, where they change."""
+def program_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw over the run what acted: the load, the speed and the ambient temperature, where they change."""
     shown = [name for name in ACTED if name in history and _changes(history[name])]
     if "load" in shown and "load_factor" in shown:  # the same twice
         shown.remove("load_factor")
-    figure, axes = panels(max(1, len(shown)), 2.4)
+    figure, axes = panels(max(1, len(shown)), 2.4, look=look)
     for ax, name in zip(axes, shown or ["load_factor"], strict=True):
         held = "steps-pre" if name in ("speed", "ambient") else "default"  # constant since the record before
-        ax.plot(history.time, history[name], color="0", marker=".", markersize=3, linewidth=1, drawstyle=held)
+        ax.plot(look.course(history), history[name], color="0", marker=".", markersize=3, linewidth=1, drawstyle=held)
         units = {"mm s-1": " (mm/s)", "rad s-1": " (rad/s)", "K": " (K)", "degC": " (°C)"}
         unit = units.get(str(history[name].attrs.get("units")), "") if name in ("speed", "ambient") else ""
         ax.set_ylabel(f"{ACTED[name]}{unit}")
         low, high = float(history[name].min()), float(history[name].max())
         ax.set_ylim(min(0.0, 1.1 * low), 1.1 * max(high, 1e-300))
-    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlabel(look.label)
     return figure
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COMPONENTS = {"xx": "σ xx", "zz": "σ zz", "xz": "σ xz"}
+SHOWN_WIDE = 2.0  # widths over height of both bodies that are shown whole
+LINE_OF_TEXT = 0.07  # of the height of a panel
 CLOSE_UP = 0.75  # of the contact's width: what a close view has of the bodies above and below
 PLATE: Any = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1}
 FILLS = {"punch": "#d6e4f0", "strip": "#f3e3d6"}
@@ -58,17 +60,20 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look 
     from matplotlib.lines import Line2D
 
     figure, axes = panels(2, 4.2, share_x=False, look=look)
+    names = {ax: _Names(ax) for ax in axes}
     x, z = fields.punch_contact_x.values, fields.punch_contact_z.values
     width = float(np.ptp(x))
     for ax in axes:
         for body in BODIES:
             _elements(ax, fields, body)
-            _ends(ax, fields, body, case, named=ax is axes[0])
+            _ends(ax, fields, body, case, names[ax] if ax is axes[0] else None)
         ax.plot(x, z, color=GREEN, linewidth=2.0)
         ax.set_aspect("equal", adjustable="box")
         ax.set_xlabel("x (mm)")
         ax.set_ylabel("z (mm)")
     low, high = float(z.min()) - CLOSE_UP * width, float(z.min()) + CLOSE_UP * width
+    _cut_off(axes[0], fields, case)
+    names[axes[0]].write()
     axes[1].set_xlim(x.min() - 0.5 * width, x.max() + 0.5 * width)
     axes[1].set_ylim(low, high)
     _sliding(axes[1], float(x.mean()), low, width)
@@ -77,8 +82,69 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look 
         "held": Line2D([], [], color=RED, linewidth=2.5),
         "loaded": Line2D([], [], color=BLUE, linewidth=2.5),
     }
-    axes[0].legend(named.values(), named.keys(), loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    figure.legend(named.values(), named.keys(), loc="outside upper right", frameon=False, ncols=3, fontsize="small")
+    figure.set_layout_engine("compressed")  # the axes keep their aspect
     return figure
+
+
+def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
+    """Leave out what of a strip lies far beside the punch, which would be small beside it, and say what is there."""
+    high = np.ptp(np.concatenate([fields[f"{body}_z"].values for body in BODIES]))
+    strip, punch = fields.strip_x.values, fields.punch_x.values
+    middle, half = (punch.max() + punch.min()) / 2, max(SHOWN_WIDE * high / 2, 0.75 * np.ptp(punch))
+    supports = case.get("strip", {}).get("supports", ())
+    bottom = float(fields.strip_z.values.min())
+    for sign, end in ((-1, float(strip.min())), (1, float(strip.max()))):
+        edge = middle + sign * half
+        if sign * (end - edge) <= 0.1 * half:
+            continue
+        ax.set_xlim(**{"left" if sign < 0 else "right": edge})
+        groups = [(support["fix"], _group(fields, "strip", support)) for support in supports]
+        held = [", ".join(f"u{a}" for a in fix) for fix, lines in groups if _all_beyond(lines, middle, half, sign)]
+        text = f"to x = {end:.4g} mm" + (f"\nheld there: {'; '.join(held)}" if held else "")
+        ax.annotate(text, (edge, bottom), (0, -6), textcoords="offset points", ha="left" if sign < 0 else "right",
+                    va="top", color=GREY, fontsize="small", zorder=6, bbox=PLATE)  # fmt: skip
+        ax.annotate("", (edge, (bottom + float(fields.strip_z.values.max())) / 2), (-18 * sign, 0),
+                    textcoords="offset points", arrowprops={"arrowstyle": "-|>", "color": GREY}, zorder=6)  # fmt: skip
+    if ax.get_xlim()[1] - ax.get_xlim()[0] <= 2.2 * half:
+        ax.set_ylim(bottom - 0.2 * high)
+
+
+def _all_beyond(lines: list[Array], middle: float, half: float, sign: int) -> bool:
+    """Return whether all of a group lies out of what is shown, some of it on this side."""
+    x = np.concatenate([line[:, 0] for line in lines] or [np.array([middle])])
+    return bool((np.abs(x - middle) > half).all() and (sign * (x - middle) > 0).any())
+
+
+class _Names:
+    """Names beside what is held, one below the other where they would meet."""
+
+    def __init__(self, ax: Axes) -> None:
+        self.ax = ax
+        self.found: list[tuple[float, float, str, str, bool]] = []
+
+    def add(self, points: Array, text: str, colour: str) -> None:
+        """Take a name of points that are held."""
+        right = points[points[:, 0] > points[:, 0].max() - 1e-6 * (1 + np.ptp(points[:, 0]))]
+        upright = bool(np.ptp(right[:, 1]) > 0 or len(points) == 1)
+        x, z = right.mean(axis=0) if upright else points.mean(axis=0)
+        self.found.append((float(x), float(z), text, colour, upright))
+
+    def write(self) -> None:
+        """Write all names that lie within the axes."""
+        (left, right), (low, high) = self.ax.get_xlim(), self.ax.get_ylim()
+        within = [one for one in self.found if left <= one[0] <= right and low <= one[1] <= high]
+        apart = LINE_OF_TEXT * (high - low)
+        taken: list[tuple[float, float]] = []
+        for x, z, text, colour, upright in sorted(within, key=lambda one: -one[1]):
+            level = z
+            while any(abs(x - other) < 0.4 * (right - left) and abs(level - at) < apart for other, at in taken):
+                level -= apart / 4
+            taken.append((x, level))
+            offset = (6, 0) if upright else (0, -6)
+            self.ax.annotate(text, (x, level), offset, textcoords="offset points", color=colour, fontsize="small",
+                             zorder=5, ha="left" if upright else "center", va="center" if upright else "top",
+                             bbox=PLATE)  # fmt: skip
 
 
 def _elements(ax: Axes, fields: xarray.Dataset, body: str) -> None:
@@ -109,15 +175,15 @@ def element_edges(cells: NDArray[np.int64], parts: int) -> NDArray[np.int64]:
     return np.unique(keyed[counts == 1, 1:], axis=0)
 
 
-def _ends(ax: Axes, fields: xarray.Dataset, body: str, case: Mapping[str, Any], *, named: bool) -> None:
-    """Draw what holds a body and what loads it."""
+def _ends(ax: Axes, fields: xarray.Dataset, body: str, case: Mapping[str, Any], names: _Names | None) -> None:
+    """Draw what holds a body, with its name, and what loads it."""
     size = 0.05 * float(np.hypot(*(np.ptp(fields[f"{body}_{a}"].values) for a in "xz")))
     for support in case.get(body, {}).get("supports", ()):
         lines = _group(fields, body, support)
         for line in lines:
             ax.plot(*line.T, color=RED, linewidth=2.5, marker="^" if len(line) == 1 else None, zorder=3)
-        if len(lines) and named:
-            _name(ax, np.concatenate(lines), "held: " + ", ".join(f"u{axis}" for axis in support["fix"]), RED)
+        if len(lines) and names is not None:
+            names.add(np.concatenate(lines), "held: " + ", ".join(f"u{axis}" for axis in support["fix"]), RED)
     for load in case.get(body, {}).get("loads", ()):
         lines = _group(fields, body, load)
         for line in lines:
@@ -133,17 +199,6 @@ def _ends(ax: Axes, fields: xarray.Dataset, body: str, case: Mapping[str, Any], 
 def _vector(load: Mapping[str, Any]) -> list[tuple[Any, str]]:
     key, unit = ("force", "N") if load.get("force") is not None else ("traction", "MPa")
     return [(part, unit) for part in load[key]]
-
-
-def _name(ax: Axes, points: Array, text: str, colour: str) -> None:
-    """Write a name beside what is held, clear of it."""
-    right = points[points[:, 0] > points[:, 0].max() - 1e-6 * (1 + np.ptp(points[:, 0]))]
-    upright = np.ptp(right[:, 1]) > 0 or len(points) == 1
-    x, z = right.mean(axis=0) if upright else points.mean(axis=0)
-    offset = (6, 0) if upright else (0, -6)
-    ax.annotate(text, (x, z), offset, textcoords="offset points", color=colour, fontsize="small", zorder=5,
-                ha="left" if upright else "center", va="center" if upright else "top", clip_on=True,
-                annotation_clip=True, bbox=PLATE)  # fmt: skip
 
 
 def _group(fields: xarray.Dataset, body: str, part: Mapping[str, Any]) -> list[Array]:

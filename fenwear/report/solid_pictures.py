@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 from fenwear.arrays import Array, Mask
 from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
-from fenwear.report.style import GREY
+from fenwear.report.style import GREY, further
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,21 +78,29 @@ class SolidView:
         return np.asarray(arm < self.length)
 
 
-def draw_solids(datasets: Sequence[xarray.Dataset], folder: Path, shown: dict[str, tuple[str, str, str]]) -> list[Path]:
+def draw_solids(
+    datasets: Sequence[xarray.Dataset],
+    folder: Path,
+    shown: dict[str, tuple[str, str, str]],
+    formats: Sequence[str] = (),
+) -> list[Path]:
     """Draw the bodies in space at each half-cycle with fields; return the files.
 
     Args:
         datasets: Fields, by half-cycle.
         folder: For the pictures.
         shown: Name, unit and colours of each field.
+        formats: In which the pictures are drawn beside PNG.
     """
     view = solid_view(datasets, shown)
     paths = []
     for field in view.ranges:
         for data in datasets:
             name = "solid" if data.attrs["model"] == "solid" else "turned"
-            paths.append(folder / f"{name}_{field}_{int(data.attrs['half_cycle']):06d}.png")
-            solid_figure(data, field, view, shown[field]).savefig(paths[-1], dpi=150)
+            png = folder / f"{name}_{field}_{int(data.attrs['half_cycle']):06d}.png"
+            figure = solid_figure(data, field, view, shown[field])
+            figure.savefig(png, dpi=150)
+            paths += [png, *further(figure, png, formats)]
     return paths
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from fenwear.report import stick_maps
 from fenwear.report.figures import FOLDER
 from fenwear.report.html_page import picture, render
 from fenwear.report.key_numbers import read_summary
-from fenwear.report.style import BLUE, GREY, RED, contact_axis, legend_beside, panels, reference_line, shades
+from fenwear.report.style import BLUE, GREY, RED, contact_axis, further, legend_beside, panels, reference_line, shades
 from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
@@ -234,7 +234,7 @@ IN_SOLIDS: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
 }
 
 
-def write_stick_report(directory: Path) -> list[Path]:
+def write_stick_report(directory: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
     """Draw the figures of a run with stick and write its report.html; return the files.
 
     Raises:
@@ -249,8 +249,9 @@ def write_stick_report(directory: Path) -> list[Path]:
         folder.mkdir(exist_ok=True)
         for name, (draw, caption, alt) in (IN_SOLIDS if model_of(history) == "solid" else FIGURES).items():
             path = folder / f"{name}.png"
-            draw(history).savefig(path, dpi=150)
-            paths.append(path)
+            figure = draw(history)
+            figure.savefig(path, dpi=150)
+            paths += [path, *further(figure, path, formats)]
             pictures.append(picture(path.read_bytes(), "png", caption, alt))
     report = directory / REPORT
     write_text(report, _page(directory, history, pictures))

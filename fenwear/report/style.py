@@ -154,6 +154,14 @@ def contact_axis(ax: Axes) -> None:
         shared.margins(x=0.01)
 
 
+def further(figure: Figure, png: Path, formats: Sequence[str]) -> list[Path]:
+    """Write a figure beside its PNG in further formats; return the files."""
+    found = [png.with_suffix(f".{ending}") for ending in dict.fromkeys(formats) if ending != "png"]
+    for path in found:
+        figure.savefig(path, dpi=300)
+    return found
+
+
 def save_gif(images: Sequence[Any], path: Path, milliseconds: int = 150) -> None:
     """Write pictures as an endless GIF that rests on the last one."""
     durations = [milliseconds] * (len(images) - 1) + [2000]

@@ -12,18 +12,28 @@ from fenwear.report.course import (
     by_direction,
     convergence_figure,
     directions_present,
-    half_cycle_axis,
     heat_balance_figure,
     is_conforming,
     mark_few,
     mean_pressure,
     nominal_width,
+    run_axis,
     temperature_unit,
 )
 from fenwear.report.figures import chosen_half_cycles, nearest_half_cycles, pressure_top
 from fenwear.report.maps import cuts_figure, map_figure, quantities
 from fenwear.report.program import program_figure
-from fenwear.report.style import direction_style, legend_beside, panels, reference_line, run_style, shades, strip_moves
+from fenwear.report.style import (
+    STANDARD,
+    Look,
+    direction_style,
+    legend_beside,
+    panels,
+    reference_line,
+    run_style,
+    shades,
+    strip_moves,
+)
 from fenwear.report.surface import model_of, radial
 
 if TYPE_CHECKING:
@@ -33,7 +43,7 @@ if TYPE_CHECKING:
 MAPS = 6  # at most
 
 
-def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict[str, Figure]:
+def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look = STANDARD) -> dict[str, Figure]:
     """Draw every figure that the history of a solid or of rings has data for, by its name."""
     chosen = chosen_half_cycles(history, wanted)
     if model_of(history) == "solid":
@@ -45,60 +55,60 @@ def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = ()) -> dict
         drawn = {"shape": ring_shape_figure(history, chosen), "pressure": ring_pressure_figure(history, chosen)}
         if "max_temperature" in history:
             drawn["temperature"] = ring_temperature_figure(history, chosen)
-    drawn["peaks"] = series_figure(history)
+    drawn["peaks"] = series_figure(history, look)
     if "load_factor" in history:
-        drawn["program"] = program_figure(history)
-    drawn["convergence"] = convergence_figure(history)
+        drawn["program"] = program_figure(history, look)
+    drawn["convergence"] = convergence_figure(history, look)
     if "max_temperature" in history:
-        drawn["heat_balance"] = heat_balance_figure(history)
+        drawn["heat_balance"] = heat_balance_figure(history, look)
     return drawn
 
 
-def series_figure(history: xarray.Dataset) -> Figure:
-    """Draw over the half-cycles: largest pressure, area in contact, depth and size of the scars, and temperature."""
+def series_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw over the run: largest pressure, area in contact, depth and size of the scars, and temperature."""
     sizes = [n for n in ("scar_length", "scar_width") if n in history or f"{n}_strip" in history]
     hot = "max_temperature" in history
-    figure, axes = panels(4 + hot, 2.3)
+    figure, axes = panels(4 + hot, 2.3, look=look)
     pressure, area, depth, size, *rest = axes
-    by_direction(pressure, history, "max_pressure")
+    by_direction(pressure, history, "max_pressure", look)
     pressure.set_title("Largest contact pressure", loc="left")
     pressure.set_ylabel("pressure (MPa)")
     if is_conforming(history):
         mean = mean_pressure(history)
         reference_line(pressure, mean, f"mean {mean:.2f}")
-    by_direction(area, history, "contact_area")
+    by_direction(area, history, "contact_area", look)
     area.set_title("Area in contact", loc="left")
     area.set_ylabel("area (mm²)")
     if is_conforming(history):
         nominal = nominal_width(history)
         reference_line(area, nominal, f"nominal area {nominal:.4g}")
         area.set_ylim(top=1.15 * nominal)
-    _of_bodies(depth, history, {"max_wear": "worn depth"}, 1e3)
+    _of_bodies(depth, history, {"max_wear": "worn depth"}, 1e3, look)
     depth.set_title("Largest worn depth", loc="left")
     depth.set_ylabel("depth (µm)")
-    _of_bodies(size, history, {name: name.removeprefix("scar_") for name in sizes}, 1.0)
+    _of_bodies(size, history, {name: name.removeprefix("scar_") for name in sizes}, 1.0, look)
     size.set_title("Size of the scars along and across the sliding" if len(sizes) > 1 else "Width of the scars",
                    loc="left")  # fmt: skip
     size.set_ylabel("size (mm)")
     for ax in rest:
-        by_direction(ax, history, "max_temperature")
+        by_direction(ax, history, "max_temperature", look)
         ax.set_title("Largest temperature of the contact surfaces, at the end of each half-cycle", loc="left")
         ax.set_ylabel(f"temperature ({temperature_unit(history)})")
     for ax in axes[:4]:
         ax.set_ylim(bottom=0)
     legend_beside(pressure, strip_moves(history))
-    half_cycle_axis(axes[-1], history)
+    run_axis(axes[-1], history, look)
     return figure
 
 
-def _of_bodies(ax: Axes, history: xarray.Dataset, names: dict[str, str], factor: float) -> None:
-    """Draw variables of both bodies over the half-cycles."""
+def _of_bodies(ax: Axes, history: xarray.Dataset, names: dict[str, str], factor: float, look: Look) -> None:
+    """Draw variables of both bodies over the run."""
     number = 0
     for name, text in names.items():
         for end, body in (("", "punch"), ("_strip", "strip")):
             if f"{name}{end}" in history:
                 style = {**run_style(number), **mark_few(history.half_cycle)}
-                ax.plot(history.half_cycle, factor * history[f"{name}{end}"], label=f"{body}: {text}", **style)
+                ax.plot(look.course(history), factor * history[f"{name}{end}"], label=f"{body}: {text}", **style)
                 number += 1
     legend_beside(ax, "")
 

@@ -31,6 +31,7 @@ from fenwear.results.checkpoint import (
 )
 from fenwear.results.disk import check_room, writing
 from fenwear.stick.cycle import Rig
+from fenwear.stick.interface import meshed
 from fenwear.stick.jump import Cycle
 
 ROOT = "cycle"
@@ -44,7 +45,7 @@ def save(directory: Path, case: Case, rig: Rig, cycle: Cycle) -> None:
     Raises:
         OutputError: it cannot be written; the old one stays.
     """
-    comm = rig.interface.bodies.comm
+    comm = meshed(rig.interface).bodies.comm
     try:
         on_root(comm, lambda: _begin(directory / NEW, case, cycle))
         if rig.heat is not None:
@@ -84,14 +85,14 @@ def load(directory: Path, case: Case, rig: Rig) -> Cycle:
     Raises:
         CaseError: there is no checkpoint, it is damaged, or it is of another case; names the differences.
     """
-    folder, cycle = on_root(rig.interface.bodies.comm, lambda: _load(directory, case, len(rig.weights)))
+    folder, cycle = on_root(meshed(rig.interface).bodies.comm, lambda: _load(directory, case, len(rig.weights)))
     end, warm = (_temperature(folder / name, rig) for name in ("end", "warm"))
     return replace(cycle, end=replace(cycle.end, temperature=end), warm=warm)
 
 
 def _temperature(folder: Path, rig: Rig) -> Array | None:
     """Return the temperatures (dim,) in a folder of a checkpoint; collective."""
-    bodies = rig.interface.bodies
+    bodies = meshed(rig.interface).bodies
     if rig.heat is None or bodies.heat is None or not on_root(bodies.comm, folder.is_dir):
         return None
     state = HeatState.nodal(bodies.heat, [read_temperature(folder, body) for body in bodies.heat])

@@ -53,7 +53,7 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
     found = final_shape(rig, stick_zone(rig))
     solid = case.model.kind == "solid"
     pair, weights = rig.interface.middle.pair, rig.weights
-    x = sliding_chart(rig.interface.sliding.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
+    x = sliding_chart(rig.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
     scar = x[found.depth > 0]
     names = ("stick_area_mm2", "worn_volume_mm3") if solid else ("stick_width_mm", "worn_area_mm2")
     places = {a: pair.punch.x[:, k].tolist() for k, a in enumerate("xyz")} if solid else {"x": pair.x.tolist()}

@@ -13,7 +13,7 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import Position, StickInterface
+from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
@@ -133,7 +133,7 @@ class Rig:
 
     def __init__(
         self,
-        interface: StickInterface,
+        interface: OppositeBodies,
         program: Program,
         wear: LocalWear,
         friction: Array,

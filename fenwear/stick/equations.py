@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cone import derivative, project
-from fenwear.stick.interface import Position, StickInterface
+from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.state import Imposed, StickState
 
 ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
@@ -61,7 +61,7 @@ class Step:
     """
 
     def __init__(
-        self, interface: StickInterface, position: Position, before: StickState, imposed: Imposed, friction: Array
+        self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
     ) -> None:
         self.interface, self.position, self.before, self.imposed = interface, position, before, imposed
         self.mu = friction

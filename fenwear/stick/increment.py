@@ -10,7 +10,7 @@ import scipy.optimize
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.stick.equations import Found, Guess, Step
-from fenwear.stick.interface import Position, StickInterface
+from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.state import Imposed, StickState
 
 MOST = 60  # Newton steps
@@ -19,7 +19,7 @@ HALVINGS = 6  # of a step that does not converge
 
 
 def advance(
-    interface: StickInterface,
+    interface: OppositeBodies,
     before: StickState,
     start: Imposed,
     end: Imposed,
@@ -50,7 +50,7 @@ def advance(
 
 
 def _check_force(
-    interface: StickInterface, position: Position, before: StickState, start: Imposed, end: Imposed, friction: Array
+    interface: OppositeBodies, position: Position, before: StickState, start: Imposed, end: Imposed, friction: Array
 ) -> None:
     """Raise where an imposed force is more than the contact in gross sliding carries.
 
@@ -75,7 +75,7 @@ def _check_force(
 
 
 def _advance(
-    interface: StickInterface,
+    interface: OppositeBodies,
     position: Position,
     before: StickState,
     start: Imposed,

@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Bodies, Sliding
 from fenwear.bodies.condensation import CondensedBody, condense, respond_to_load
 from fenwear.case import Case
@@ -96,8 +96,51 @@ class Position:
         return np.einsum("nac,an->nc", self.frame, components.reshape(self.frame.shape[2], -1))
 
 
-class StickInterface:
-    """Two bodies condensed along all axes, and the places of the strip under the punch.
+class OppositeBodies:
+    """Two bodies condensed along all axes that stay opposite each other under one load.
+
+    Args:
+        punch, strip: What they were condensed onto is the contact's nodes.
+        rigid: The rigid modes, their load, and the pair of surfaces.
+        field: What the rig moves the strip by.
+    """
+
+    moves = False
+
+    def __init__(
+        self, punch: CondensedBody, strip: CondensedBody, rigid: RigidEquilibrium, field: SlidingField
+    ) -> None:
+        self.punch, self.strip, self.field = punch, strip, field
+        self._load = Loaded(rigid.resultant, punch.by_load, strip.by_load)
+        self._positions = {0.0: position_of(rigid, punch, strip, _identity(len(rigid.pair.weights)), field)}
+
+    @property
+    def middle(self) -> Position:
+        """The middle position of the strip."""
+        return self._positions[0.0]
+
+    @property
+    def bulk(self) -> Array:
+        """Displacement of what the strip was condensed onto by a unit bulk strain (q, d), mm: none."""
+        return np.zeros_like(self.strip.by_load)
+
+    def held_nodes(self) -> Mask:
+        """Return which contact nodes a support of the punch holds along any axis (n,)."""
+        return np.zeros(len(self.middle.pair.weights), dtype=bool)
+
+    def position(self, offset: float) -> Position:
+        """Return the place of the strip moved by this amount of its motion: its one place."""
+        del offset
+        return self.middle
+
+    def loaded(self, fraction: float | None) -> Loaded:
+        """Return what the loads do at a fraction of the cycle: always the same."""
+        del fraction
+        return self._load
+
+
+class StickInterface(OppositeBodies):
+    """Two meshed bodies condensed along all axes, and the places of the strip under the punch.
 
     Args:
         bodies: Both, under the mean of their loads.
@@ -109,6 +152,7 @@ class StickInterface:
 
     def __init__(self, bodies: Bodies, sliding: Sliding, case: Case | None = None, *, moves: bool = False) -> None:
         self.bodies, self.sliding, self.case, self.moves = bodies, sliding, case, moves
+        self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface)
         if bodies.followed is None:
@@ -118,11 +162,6 @@ class StickInterface:
         self.strip = condense(bodies.strip, onto)
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float, Loaded] = {}
-
-    @property
-    def middle(self) -> Position:
-        """The middle position of the strip."""
-        return self._positions[0.0]
 
     @cached_property
     def bulk(self) -> Array:
@@ -140,12 +179,20 @@ class StickInterface:
             found[:, 1] = -x[:, 1] * (materials[names.pop()].poisson if len(names) == 1 else 0.0)
         return found
 
+    def held_nodes(self) -> Mask:
+        """Return which contact nodes a support of the punch holds along any axis (n,); collective."""
+        punch = self.bodies.punch
+        held = np.zeros(len(punch.load))
+        held[punch.supported] = 1.0
+        at_trace = punch.trace.pick(held[:, None])[:, :, 0].max(axis=1)
+        return np.asarray(at_trace[punch.surface.nodes] > 0)
+
     def position(self, offset: float) -> Position:
         """Return the place of the strip moved by this amount of its motion; collective where it is new."""
         offset = round(offset, 12) if self.moves else 0.0
         if offset not in self._positions:
-            middle, field = self.middle.pair, self.sliding.field
-            self._positions[offset] = self._position(pair(middle.punch, middle.strip, field.placement(offset)))
+            middle = self.middle.pair
+            self._positions[offset] = self._position(pair(middle.punch, middle.strip, self.field.placement(offset)))
         return self._positions[offset]
 
     def loaded(self, fraction: float | None) -> Loaded:
@@ -166,14 +213,40 @@ class StickInterface:
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
-        frame = contact_frame(pair)
         reading = pair.transfer if self.moves else _identity(len(pair.weights))
-        n, d = pair.normal.shape
-        response = self.punch.response + _read(self.strip, pair, reading)
-        turned = np.einsum("iac,icjb,jeb->aiej", frame, response, frame, optimize=True).reshape(d * n, d * n)
-        modes = np.einsum("iac,icm->aim", frame, rigid.motion).reshape(d * n, -1)
-        weights = np.tile(pair.weights, d)
-        return Position(rigid, frame, reading, turned * weights, modes, _drive(pair, frame, self.sliding.field))
+        return position_of(rigid, self.punch, self.strip, reading, self.field)
+
+
+def meshed(bodies: OppositeBodies) -> StickInterface:
+    """Return bodies that were made from meshes, as what follows needs them.
+
+    Raises:
+        ValueError: they were not.
+    """
+    if not isinstance(bodies, StickInterface):
+        raise ValueError("expected bodies with meshes")
+    return bodies
+
+
+def position_of(
+    rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, reading: csr_array, field: SlidingField
+) -> Position:
+    """Return both bodies opposite each other.
+
+    Args:
+        rigid: The rigid modes and the pair of surfaces.
+        punch, strip: The bodies.
+        reading: Takes what the strip was condensed onto to the contact nodes (n, q).
+        field: The motion of the strip.
+    """
+    pair, frame = rigid.pair, contact_frame(rigid.pair)
+    n, d = pair.normal.shape
+    response = punch.response + _read(strip, pair, reading)
+    turned = np.einsum("iac,icjb,jeb->aiej", frame, response, frame, optimize=True).reshape(d * n, d * n)
+    modes = np.einsum("iac,icm->aim", frame, rigid.motion).reshape(d * n, -1)
+    drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(pair.punch.x), d))
+    drive[0] = 0.0  # along e_n the place of the strip says it
+    return Position(rigid, frame, reading, turned * np.tile(pair.weights, d), modes, drive.ravel())
 
 
 def contact_frame(pair: ContactPair) -> Array:
@@ -187,12 +260,6 @@ def contact_frame(pair: ContactPair) -> Array:
     if d == 2:
         return np.stack([normal, first], axis=1)
     return np.stack([normal, first, np.cross(normal, first)], axis=1)
-
-
-def _drive(pair: ContactPair, frame: Array, field: SlidingField) -> Array:
-    moved = np.einsum("nac,nc->an", frame, in_model(field.velocity(pair.punch.x), frame.shape[2]))
-    moved[0] = 0.0  # along e_n the place of the strip says it
-    return moved.ravel()
 
 
 def _read(strip: CondensedBody, pair: ContactPair, reading: csr_array) -> Array:

@@ -156,7 +156,7 @@ def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
 
 def _turned(unit: str, name: str, rig: Rig) -> str:
     """Return the unit of a variable where the strip turns: by rad, against a torque."""
-    turns = any(rig.interface.sliding.field.turn)
+    turns = any(rig.interface.field.turn)
     return {"displacement": "rad", "tangential_force": "N mm"}.get(name, unit) if turns else unit
 
 
@@ -164,7 +164,7 @@ def _nodes(rig: Rig) -> dict[str, Any]:
     """Return where the nodes of both surfaces are."""
     pair = rig.interface.middle.pair
     if pair.normal.shape[1] == 3:
-        found: dict[str, Any] = dict(columns_of_pair(pair, rig.interface.sliding.field, with_strip=True))
+        found: dict[str, Any] = dict(columns_of_pair(pair, rig.interface.field, with_strip=True))
         area = {"units": "mm2", "long_name": "area that each contact node stands for"}
         ways = directions(rig.interface.middle)
         return {

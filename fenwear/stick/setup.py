@@ -15,7 +15,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.heat import stick_heat
-from fenwear.stick.interface import StickInterface
+from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.program import make_program
 from fenwear.stick.wear import local_wear
 
@@ -72,7 +72,7 @@ def heated(rig: Rig, case: Case) -> Rig:
     if case.heat is None:
         return rig
     steps = len(rig.program.steps) // rig.program.half_cycles
-    heat = stick_heat(rig.interface, case, steps)
+    heat = stick_heat(meshed(rig.interface), case, steps)
     return Rig(rig.interface, rig.program, rig.wear, rig.friction, rig.watch, heat)
 
 
@@ -110,12 +110,8 @@ def reaches_border(rig: Rig, pressure: Array) -> bool:
         rig: The bodies.
         pressure: Of some time steps (k, n), MPa.
     """
-    punch = rig.interface.bodies.punch
-    held = np.zeros(len(punch.load))
-    held[punch.supported] = 1.0
-    at_trace = punch.trace.pick(held[:, None])[:, :, 0].any(axis=1)
-    border = border_nodes(punch.surface)
-    free = border[~np.asarray(at_trace)[punch.surface.nodes[border]]]
+    border = border_nodes(rig.interface.middle.pair.punch)
+    free = border[~rig.interface.held_nodes()[border]]
     return bool((pressure[:, free] > 0).any())
 
 

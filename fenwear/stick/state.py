@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
-from fenwear.stick.interface import Loaded, StickInterface
+from fenwear.stick.interface import Loaded, OppositeBodies
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class StickState:
         return self.closed & ~self.slipping
 
 
-def untouched(interface: StickInterface) -> StickState:
+def untouched(interface: OppositeBodies) -> StickState:
     """Return the unloaded bodies before they touch."""
     n, d = interface.middle.pair.normal.shape
     none = np.zeros((n, d - 1))

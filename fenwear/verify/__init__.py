@@ -14,6 +14,7 @@ from fenwear.verify import (
     solid_heat,
     solid_wear,
     stick,
+    stick_solids,
     thermal,
     wear,
 )
@@ -40,6 +41,7 @@ __all__ = [
     "solid_heat",
     "solid_wear",
     "stick",
+    "stick_solids",
     "thermal",
     "wear",
 ]

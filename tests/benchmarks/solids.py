@@ -3,27 +3,32 @@
     docker/fenwear python3 tests/benchmarks/solids.py               8 elements over the contact, seconds
     docker/fenwear python3 tests/benchmarks/solids.py --elements 24 2,401 nodes, 151,000 and 165,000 unknowns
 
-Each line has the processor time of this process and the time on the clock, s, and the largest memory so far.
+    docker/fenwear mpirun -n 2 python3 tests/benchmarks/solids.py   the same on two ranks
+
+Each line has the processor time of the rank that took most, the time on the clock, and the largest memory of all ranks
+together so far. What --only leaves out is not done, so that one part can be looked at alone.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
 import resource
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from fenwear import Tribosystem
 from fenwear.assembly import elastic, place_case, with_exchange
 from fenwear.case import Case, make_case
 from fenwear.contact import FullContact
 from fenwear.cycle import jump, march, steady
+
+PARTS = ("warm", "jumps", "steady", "full", "heat")
+COMM = MPI.COMM_WORLD
 
 
 def describe(elements: int, *, heat: bool = False) -> Case:
@@ -54,12 +59,19 @@ def describe(elements: int, *, heat: bool = False) -> Case:
 
 @contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Print how long a block took."""
+    """Print how long a block took; collective."""
     cpu, clock = time.process_time(), time.perf_counter()
     yield
     cpu, clock = time.process_time() - cpu, time.perf_counter() - clock
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    print(f"{what:52} {cpu:9.3f} s  {clock:9.3f} s  {memory:6.2f} GiB", flush=True)
+    memory = COMM.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+    cpu = COMM.allreduce(cpu, MPI.MAX)
+    say(f"{what:52} {cpu:9.3f} s  {clock:9.3f} s  {memory:6.2f} GiB")
+
+
+def say(text: str) -> None:
+    """Print on the first rank."""
+    if COMM.rank == 0:
+        print(text, flush=True)
 
 
 def warm(system: Tribosystem, half_cycles: int = 20) -> float:
@@ -70,7 +82,7 @@ def warm(system: Tribosystem, half_cycles: int = 20) -> float:
     begin = time.process_time()
     count = sum(len(block) for block in blocks)
     each = (time.process_time() - begin) / count
-    print(f"{'a warm half-cycle':52} {each:9.4f} s")
+    say(f"{'a warm half-cycle':52} {each:9.4f} s")
     return each
 
 
@@ -84,8 +96,46 @@ def full_space(system: Tribosystem, each: float) -> None:
     pressure = full.solve(gap).pressure[0]
     spent = time.process_time() - begin
     apart = np.abs(pressure - condensed).max() / condensed.max()
-    print(f"{'one full-space contact':52} {spent:9.3f} s, {spent / each:.0f} warm half-cycles")
-    print(f"{'':52} pressures within {apart:.1e}")
+    say(f"{'one full-space contact':52} {spent:9.3f} s, {spent / each:.0f} warm half-cycles")
+    say(f"{'':52} pressures within {apart:.1e}")
+
+
+def without_heat(asked: argparse.Namespace) -> None:
+    """Set up, and take the parts that are asked for."""
+    with timed("meshes, stiffness, pairs"):
+        placed = place_case(describe(asked.elements))
+    sizes = [body.stiffness.size[0] for body in (placed.bodies.punch, placed.bodies.strip)]
+    say(f"{len(placed.pair.weights):,} contact nodes, {sizes[0]:,} and {sizes[1]:,} unknowns")
+    with timed("factors and condensation"):
+        system = elastic(placed, fresh=asked.fresh)
+    with timed("the first contact, from cold"):
+        contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
+    say(f"{'':52} {contact.iterations} Newton iterations, {(contact.pressure > 0).sum():,} nodes in contact")
+    each = warm(system)
+    if "jumps" in asked.only:
+        with timed(f"{asked.half_cycles:,} half-cycles by jumps"):
+            blocks = list(jump(system, asked.half_cycles, tolerance=3e-3, block=1))
+        say(f"{'':52} {len(blocks)} jumps")
+    if "steady" in asked.only:
+        with timed("cyclic steady state"):
+            state = steady(system)
+        say(f"{'':52} {state.iterations} Newton iterations")
+    if "full" in asked.only:
+        full_space(system, each)
+
+
+def with_heat(asked: argparse.Namespace) -> None:
+    """The same with heat, as one run would do it."""
+    with timed("with heat: bodies and condensation"):
+        hot = elastic(place_case(describe(asked.elements, heat=True)), fresh=asked.fresh)
+    with timed("with heat: steps on a reduced basis"):
+        hot = with_exchange(hot, reduced=True)
+    assert hot.exchange is not None
+    first, second = (len(basis) for basis in hot.exchange.bases)
+    say(f"{'':52} {first} and {second} temperatures")
+    with timed("with heat: 2,000 half-cycles by jumps"):
+        blocks = list(jump(hot, 2000, tolerance=3e-3, block=1))
+    say(f"{'':52} {len(blocks)} jumps")
 
 
 def main() -> None:
@@ -93,38 +143,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--elements", type=int, default=8, help="over the width of the contact")
     parser.add_argument("--half-cycles", type=int, default=20_000)
-    parser.add_argument("--no-heat", action="store_true")
-    parser.add_argument("--no-full", action="store_true")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS)
+    parser.add_argument("--fresh", action="store_true", help="set up anew, whatever is kept")
     asked = parser.parse_args()
-    sys.stdout = io.TextIOWrapper(sys.stdout.buffer, line_buffering=True)  # what a long run has found is seen at once
-    with timed("meshes, stiffness, pairs"):
-        placed = place_case(describe(asked.elements))
-    print(f"{len(placed.pair.weights):,} contact nodes, {placed.bodies.punch.stiffness.size[0]:,} and "
-          f"{placed.bodies.strip.stiffness.size[0]:,} unknowns")  # fmt: skip
-    with timed("factors and condensation"):
-        system = elastic(placed)
-    with timed("the first contact, from cold"):
-        contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
-    print(f"{'':52} {contact.iterations} Newton iterations, {(contact.pressure > 0).sum():,} nodes in contact")
-    each = warm(system)
-    with timed(f"{asked.half_cycles:,} half-cycles by jumps"):
-        blocks = list(jump(system, asked.half_cycles, tolerance=3e-3, block=1))
-    print(f"{'':52} {len(blocks)} jumps")
-    with timed("cyclic steady state"):
-        state = steady(system)
-    print(f"{'':52} {state.iterations} Newton iterations")
-    if not asked.no_full:
-        full_space(system, each)
-    if asked.no_heat:
-        return
-    del system, placed, contact, blocks
-    with timed("with heat: bodies and condensation"):
-        hot = elastic(place_case(describe(asked.elements, heat=True)))
-    with timed("with heat: steps on a reduced basis"):
-        hot = with_exchange(hot, reduced=True)
-    with timed("with heat: 2,000 half-cycles by jumps"):
-        blocks = list(jump(hot, 2000, tolerance=3e-3, block=1))
-    print(f"{'':52} {len(blocks)} jumps")
+    if set(asked.only) - {"heat"}:
+        without_heat(asked)
+    if "heat" in asked.only:
+        with_heat(asked)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,13 @@ from mpi4py import MPI
 
 from fenwear import ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady
 from fenwear.arrays import Array
-from fenwear.contact import ContactState
-from fenwear.cycle import Block, growth_rate, stationary_growth
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.cycle import Block, coupled, growth_rate, stationary_growth
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.stability import phase_tangent, repeating_temperatures
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import none_yet
+from fenwear.heat import exchange
 from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., Tribosystem]
@@ -131,6 +133,31 @@ def test_jump_equals_march(assembled: Assemble, settings: tuple[str, ...], half_
     assert errors[1][0] < 0.01
     assert errors[1][1] < 0.1
     assert errors[1][0] < errors[0][0] + floor
+
+
+@pytest.mark.parametrize("settings", [("heat.partition=0.1",), ("heat.conductance=perfect", "heat.partition=0.5")])
+def test_heat_may_be_lagged(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, settings: tuple[str, ...]) -> None:
+    """Contact of many nodes at known heat, again and again, and fluxes by factors: the same jumps as all at once."""
+    system = assembled("example1-heat", *COARSE, *settings)
+    at_once = list(jump(system, 400, tolerance=0.01, block=2))
+    monkeypatch.setattr(coupled, "MANY", 0)
+    monkeypatch.setattr(exchange, "FEW", 0)
+    solved: list[bool] = []
+    solve = CondensedContact.solve
+
+    def noted(self: CondensedContact, gap: Array, start: Any = None, layer: Any = None, coupling: Any = None) -> Any:
+        solved.append(coupling is not None)
+        return solve(self, gap, start, layer, coupling)
+
+    monkeypatch.setattr(CondensedContact, "solve", noted)
+    fresh = replace(system, exchange=system.exchange.varied(system.heat, system.exchange.friction))
+    lagged = list(jump(fresh, 400, tolerance=0.01, block=2))
+    assert len(solved) > 100
+    assert sum(solved) < 0.05 * len(solved)
+    assert [int(block.half_cycle[-1]) for block in lagged] == [int(block.half_cycle[-1]) for block in at_once]
+    for one, other in zip(lagged, at_once, strict=True):
+        np.testing.assert_allclose(one.pressure, other.pressure, rtol=0, atol=1e-6 * MEAN)
+        np.testing.assert_allclose(temperatures(one), temperatures(other), rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("coefficient", [4e-7, 4e-6])

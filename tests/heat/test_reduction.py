@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, march
+from fenwear import Case, Tribosystem, assemble, load_case, march
 from fenwear.arrays import Array
 from fenwear.cycle import Block
+from fenwear.heat import prepare
 
 # Faces that convect and no debris: all losses, and a strong feedback.
 COARSE = (
@@ -60,6 +61,25 @@ def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> N
     assert sizes == sorted(set(sizes))
     assert errors[0] > 5 * errors[1] > 25 * errors[2]
     assert errors[3] < 2e-3 < errors[2]
+
+
+@pytest.mark.mpi
+def test_of_many_nodes_only_what_lasts_is_kept(
+    assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is gone a step later is not in the basis, and yet in the temperatures of the contact; no heat is lost."""
+    expected = temperatures(run(assembled("example1-heat", *COARSE, *WARM, "heat.operator=full")))
+    monkeypatch.setattr(prepare, "MANY", 0)
+    errors, sizes = [], []
+    for tolerance in (1e-2, 1e-3, 1e-4, 3e-5):
+        system = assemble(load_case("example1-heat", [*COARSE, *WARM, f"heat.reduction_tolerance={tolerance}"]))
+        block = run(system)
+        assert block.heat.balance_error.max() < 1e-8
+        errors.append(np.abs(temperatures(block) - expected).max())
+        sizes.append(sum(len(basis) for basis in system.exchange.bases))
+    assert sizes == sorted(set(sizes))
+    assert errors[0] > 3 * errors[1] > 9 * errors[2]
+    assert errors[3] < 0.1
 
 
 def test_steady_state_is_in_the_basis(assembled: Callable[..., Tribosystem]) -> None:

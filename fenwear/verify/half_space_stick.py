@@ -1,0 +1,129 @@
+"""Two elastic half-spaces in contact with stick, by the closed forms of uniform tractions on squares: no mesh in it.
+
+Fields that are symmetric about both axes are folded onto one quadrant: a node stands for its four mirror images,
+and its force for all of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.condensation import CondensedBody
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.interface import ContactPair, RigidEquilibrium
+from fenwear.interface.placement import HERE
+from fenwear.sliding.field import ALONG_X
+from fenwear.stick.interface import OppositeBodies
+
+# Signs of (u_x, u_y, u_z) at the mirror images in x and in y: pulled along x, or pressed alone.
+MIRRORS = {"pulled": ((1, -1, 1), (1, -1, 1)), "pressed": ((-1, 1, 1), (1, -1, 1))}
+
+
+@dataclass(frozen=True)
+class Elastic:
+    """A half-space: its modulus of shear, MPa, and Poisson's ratio."""
+
+    shear: float
+    poisson: float
+
+
+def influence(x: Array, side: float, body: Elastic) -> Array:
+    """Return the displacement at places x (k, 2) from uniform unit tractions on a square about 0 (k, 3, 3), mm/MPa.
+
+    Components along x, y and into the body; sources last. The integrals over the square of Boussinesq's and
+    Cerruti's solutions (K. L. Johnson, Contact Mechanics, 1985, sections 3.2 and 3.6), with r² = x² + y²,
+
+        2 pi G u = ((1 - nu) / r + nu x x / r³) q,   (1 - nu) / r q_z,   -+ (1 - 2 nu) / 2 x / r² between both.
+    """
+    nu = body.poisson
+    square = np.zeros((6, len(x)))  # of 1/r, x²/r³, y²/r³, x y/r³, x/r², y/r²
+    for i in (1, -1):
+        for j in (1, -1):
+            X, Y = x[:, 0] + i * side / 2, x[:, 1] + j * side / 2
+            r = np.hypot(X, Y)
+            xx, yy = Y * np.log(X + r), X * np.log(Y + r)
+            half = np.log(r)
+            square += i * j * np.array([xx + yy, xx, yy, -r, Y * half + X * np.arctan(Y / X),
+                                        X * half + Y * np.arctan(X / Y)])  # fmt: skip
+    over_r, xx, yy, xy, fx, fy = square
+    found = np.zeros((len(x), 3, 3))
+    found[:, 0, 0], found[:, 1, 1] = (1 - nu) * over_r + nu * xx, (1 - nu) * over_r + nu * yy
+    found[:, 0, 1] = found[:, 1, 0] = nu * xy
+    found[:, 2, 2] = (1 - nu) * over_r
+    for k, f in enumerate((fx, fy)):
+        found[:, 2, k], found[:, k, 2] = (0.5 - nu) * f, -(0.5 - nu) * f
+    return np.asarray(found / (2 * np.pi * body.shear), dtype=np.float64)
+
+
+@cache
+def half_spaces(
+    upper: Elastic,
+    lower: Elastic,
+    spacing: float,
+    reach: float,
+    load: float,
+    radius: float,
+    symmetry: Literal["pulled", "pressed"] = "pulled",
+) -> OppositeBodies:
+    """Return a quadrant of two half-spaces with nodes in the middles of squares within a radius.
+
+    Args:
+        upper, lower: The bodies; the upper one is the punch.
+        spacing: Side of the squares, mm.
+        reach: Radius, mm.
+        load: That presses them together, N.
+        radius: Of the sphere, mm; infinite for a flat.
+        symmetry: Of the fields: pulled along x, or pressed alone. Pressure and pull have other symmetries: bodies that
+            are pulled must be like, so that one does not displace them along the other.
+    """
+    count = int(np.ceil(reach / spacing))
+    middles = (np.arange(count) + 0.5) * spacing
+    x = np.stack(np.meshgrid(middles, middles, indexing="ij"), axis=-1).reshape(-1, 2)
+    x = x[np.linalg.norm(x, axis=1) <= reach]
+    n = len(x)
+    into = {1: np.array([1.0, 1.0, 1.0]), -1: np.array([1.0, 1.0, -1.0])}  # the strip's inside lies below
+    bodies = []
+    for body, side in ((upper, 1), (lower, -1)):
+        response = np.zeros((n, 3, n, 3))
+        for i in (1, -1):
+            for j in (1, -1):
+                image = np.array([1.0, 1.0, 1.0])
+                for sign, mirror in zip((i, j), MIRRORS[symmetry], strict=True):
+                    image = image * (mirror if sign < 0 else (1, 1, 1))
+                apart = x[:, None] - x * [i, j]
+                local = influence(apart.reshape(-1, 2), spacing, body)
+                if symmetry == "pulled":
+                    local[:, 2, :2] = local[:, :2, 2] = 0.0
+                local = local.reshape(n, n, 3, 3).transpose(0, 2, 1, 3)
+                response += local * (into[side][:, None, None] * (into[side] * image)) / (4 * spacing**2)
+        bodies.append(CondensedBody(csr_array(eye_array(n)), np.tile(np.eye(3), (n, 1, 1)), response, np.zeros((n, 3))))
+    rigid = _pressed(x, spacing, load, np.sum(x**2, axis=1) / (2 * radius))
+    return OppositeBodies(bodies[0], bodies[1], rigid, ALONG_X)
+
+
+def _pressed(x: Array, spacing: float, load: float, gap: Array) -> RigidEquilibrium:
+    """Return the nodes of both flat surfaces; the punch can come down."""
+    n = len(x)
+    trace, up = np.column_stack([x, np.zeros(n)]), np.tile([0.0, 0.0, 1.0], (n, 1))
+    same, weights = csr_array(eye_array(n)), np.full(n, 4 * spacing**2)
+    punch, strip = (
+        ContactSurface(body, trace, _squares(x, spacing), "quadrilateral", 1, np.arange(n), weights, outward, same)
+        for body, outward in (("punch", -up), ("strip", up))
+    )
+    pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, gap)
+    return RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",))
+
+
+def _squares(x: Array, spacing: float) -> NDArray[np.int64]:
+    """Return the nodes at the corners of the squares between them (f, 4)."""
+    places = np.round(x / spacing - 0.5).astype(int)
+    number = {(i, j): k for k, (i, j) in enumerate(zip(*places.T.tolist(), strict=True))}
+    around = [[(i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)] for i, j in number]
+    return np.array([[number[c] for c in corners] for corners in around if all(c in number for c in corners)])

@@ -1,0 +1,48 @@
+"""The fluxes at the contact: as a matrix of all, and by a factor of what is left of the system."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fenwear.arrays import Array
+from fenwear.heat.fluxes import Exchanged, FluxFactor, FluxMap
+
+NODES = 12
+
+
+def step(conductance: Array, convection: float) -> Exchanged:
+    """Return a step of two bodies whose contact temperatures answer to fluxes anyhow, the second not symmetrically."""
+    random = np.random.default_rng(3)
+    first, second = random.random((2, NODES, NODES)) * 0.1 + np.eye(NODES)
+    return Exchanged((first + first.T, second), conductance, convection, 0.3, 0.2)
+
+
+@pytest.mark.parametrize("convection", [0.0, 0.7])
+@pytest.mark.parametrize("kind", ["perfect", "finite", "open here and there", "mixed", "open"])
+def test_both_obey_the_equations_of_the_contact(kind: str, convection: float) -> None:
+    """With theta_i = bare_i + T_i q_i, each node exchanges what its conductance says, and no heat is lost."""
+    conductance = np.full(NODES, np.inf if kind in ("perfect", "open here and there") else 2.5)
+    conductance[{"open here and there": slice(1, None, 3), "mixed": slice(2, 5), "open": slice(None)}.get(kind, [])] = (
+        np.nan
+    )
+    if kind == "mixed":
+        conductance[7:] = np.inf
+    one, random = step(conductance, convection), np.random.default_rng(4)
+    bare, heat, ambient = random.random((2 * NODES, 3)), random.random((NODES, 3)), 0.6
+    conducts, generated = ~np.isnan(conductance), (1 - one.debris) * heat
+    for fluxes in (FluxMap.made(one), FluxFactor(one)):
+        first, second = np.split(fluxes.of(bare, heat, ambient), 2)
+        hot, cold = bare[:NODES] + one.responses[0] @ first, bare[NODES:] + one.responses[1] @ second
+        np.testing.assert_allclose((first + second)[conducts], generated[conducts], atol=1e-12)
+        perfect, finite = np.isinf(conductance), np.isfinite(conductance)
+        np.testing.assert_allclose(hot[perfect], cold[perfect], atol=1e-12)
+        passed = one.partition * generated - first
+        np.testing.assert_allclose(passed[finite], 2.5 * (hot - cold)[finite], atol=1e-12)
+        for flux, surface in ((first, hot), (second, cold)):
+            np.testing.assert_allclose(flux[~conducts], -convection * (surface - ambient)[~conducts], atol=1e-12)
+        alone = fluxes.of(bare[:, 0], heat[:, 0], ambient)
+        np.testing.assert_allclose(alone, np.concatenate([first[:, 0], second[:, 0]]), atol=1e-12)
+        rows = random.random((4, 2 * NODES))
+        by_heat = rows @ (fluxes.of(bare, heat, 0.0) - fluxes.of(bare, None, 0.0))
+        np.testing.assert_allclose(fluxes.heat_of(rows) @ heat, by_heat, atol=1e-12)

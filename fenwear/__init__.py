@@ -24,6 +24,7 @@ __all__ = [
     "assemble",
     "critical_speed",
     "cycles_to_reach",
+    "evolve",
     "export",
     "growth_rate",
     "jump",
@@ -35,6 +36,7 @@ __all__ = [
     "run_case",
     "steady",
     "sweep",
+    "to_dataset",
     "vary",
 ]
 
@@ -53,6 +55,7 @@ _HOMES = {
     "Steady": "cycle",
     "critical_speed": "cycle",
     "cycles_to_reach": "cycle",
+    "evolve": "cycle",
     "growth_rate": "cycle",
     "jump": "cycle",
     "march": "cycle",
@@ -60,6 +63,7 @@ _HOMES = {
     "run_case": "run",
     "export": "results.export",
     "read_history": "report.figures",
+    "to_dataset": "results.dataset",
     "sweep": "sweeps",
 }
 

@@ -21,6 +21,7 @@ from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
+from fenwear.law import with_law
 from fenwear.parallel import on_root
 from fenwear.results import checkpoint
 from fenwear.results.degrees import degrees_of
@@ -81,6 +82,7 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
+    case = with_law(case, log, comm)
     if case.contact.law == "coulomb":
         return run_stick(case, name, output, log, resume=resume, progress=progress, comm=comm, last=last)
     begin = time.perf_counter()

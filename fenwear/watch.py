@@ -146,13 +146,17 @@ def elastic_way(system: Tribosystem) -> float:
     return ratio * max(pressed_in, 0.0)
 
 
+def elastic_and_amplitude(system: Tribosystem) -> tuple[float, float]:
+    """Return the elastic way, see `elastic_way`, and the mean amplitude of the sliding to and fro, mm."""
+    slid = float((system.slid.mean(axis=1) * system.motion.sliding()).sum())
+    return elastic_way(system), slid / (2 * system.motion.half_cycles)
+
+
 def stroke_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of a stroke to and fro that the bodies take up elastically."""
-    motion = system.motion
-    if len(set(motion.directions)) == 1:
+    if len(set(system.motion.directions)) == 1:
         return []
-    slid = float((system.slid.mean(axis=1) * motion.sliding()).sum())
-    amplitude, way = slid / (2 * motion.half_cycles), elastic_way(system)
+    way, amplitude = elastic_and_amplitude(system)
     if way <= TAKEN_UP * amplitude:
         return []
     return [

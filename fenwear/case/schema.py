@@ -159,7 +159,7 @@ class Case(Part):
         least = 1 if one_way else 2
         if self.run.integration == "jump" and self.run.half_cycles < least:
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
-        if self.wear.strip is not None and self.passes and self.contact.law == "gross-sliding":
+        if self.wear.strip is not None and self.passes and self.contact.law != "coulomb":
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
@@ -240,6 +240,8 @@ class Case(Part):
         """Return what does not go with contact with stick."""
         if self.contact.law == "gross-sliding":
             return [] if self.stick == Stick() else ["stick: expected with contact.law = 'coulomb' only"]
+        if self.contact.law == "auto" and self.stick == Stick():
+            return []
         wrong = {
             "contact.friction: expected a constant": isinstance(self.contact.friction, Dependence),
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,

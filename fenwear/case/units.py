@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pint
 
 _NUMBER_AND_UNIT = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
+EXPONENT = re.compile(r"([A-Za-zµμ])(-?\d)(?!\d)")  # of units as in history.nc: mm3, mm s-1
 _HARMLESS_UNIT = re.compile(r"[A-Za-zµμ°²³\d\s*/().^-]{1,64}")
 
 
@@ -54,7 +55,7 @@ def _convert_text(text: str, unit: str, expected: str) -> float:
     match = _NUMBER_AND_UNIT.fullmatch(text)
     if match is None:
         raise ValueError(f"{expected}, got {text!r}")
-    number, given = float(match[1]), match[2]
+    number, given = float(match[1]), EXPONENT.sub(r"\1^\2", match[2])
     if not given:
         return number
     if not _HARMLESS_UNIT.fullmatch(given) or re.search(r"\d{3}|\*\*|\^\s*\^", given):

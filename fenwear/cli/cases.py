@@ -65,10 +65,11 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     """Validate a case with its geometry and print it with all defaults."""
     from fenwear.assembly import elastic, needs_of, place_case
     from fenwear.cycle import stability_number
+    from fenwear.law import with_law
     from fenwear.run import position_warnings
     from fenwear.watch import initial_warnings
 
-    loaded = load(case, settings)
+    loaded = with_law(load(case, settings), log)
     if loaded.contact.law == "coulomb":
         from fenwear.stick.command import check_text
 

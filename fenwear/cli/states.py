@@ -25,10 +25,11 @@ def steady_command(
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
+    from fenwear.law import with_law
     from fenwear.watch import steady_warnings
 
     begin = time.perf_counter()
-    loaded = load(case, settings)
+    loaded = with_law(load(case, settings), log)
     if loaded.contact.law == "coulomb":
         _print_final(case, loaded, as_json=as_json)
         return

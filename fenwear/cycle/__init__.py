@@ -4,6 +4,7 @@
 """
 
 from fenwear.cycle.block import Block
+from fenwear.cycle.evolve import evolve
 from fenwear.cycle.follow import follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
@@ -19,6 +20,7 @@ __all__ = [
     "Steady",
     "critical_speed",
     "cycles_to_reach",
+    "evolve",
     "follow",
     "follow_program",
     "growth_rate",

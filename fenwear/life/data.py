@@ -111,8 +111,12 @@ class _Reader:
         body = self._body()
         columns = self._numbers(names, rows[1:])
         lines = tuple(line for line, _ in rows[1:])
-        if len(lines) < LEAST_ROWS:
-            raise self._fail("", f"expected at least {LEAST_ROWS} rows of numbers, got {len(lines)}")
+        # Without a standard deviation the scatter of the rows has to tell it.
+        least = 1 if "sigma" in {*names, *self.directives} else LEAST_ROWS
+        if len(lines) < least:
+            how = "" if least == 1 else ", or sigma, how sure they are"
+            raise self._fail("", f"expected at least {least} {'row' if least == 1 else 'rows'} of numbers{how}, "
+                             f"got {len(lines)}")  # fmt: skip
         measured = [name for name in names if name in MEASURED]
         case = changed_case(self.case, *self.settings) if self.settings else self.case
         after, counted = self._after(names, units, columns, lines)

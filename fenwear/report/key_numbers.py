@@ -114,7 +114,7 @@ def number_text(value: Any) -> str:
         return f"{value:,}"
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}"
-    return f"{value:.5g}".replace("-", "−")
+    return f"{value:,.5g}".replace("-", "−")
 
 
 def _words(name: str) -> str:

@@ -98,7 +98,8 @@ PROGRAM_VARIABLES = {
 AMBIENT = {"ambient": (("half_cycle",), "K", "temperature of the surroundings")}
 
 
-def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
+def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    """Return the variables of a history by their names: dimensions, units, long name."""
     case = system.case
     variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
     if case.program is not None:
@@ -112,7 +113,7 @@ def _variables(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, str
     return on_surfaces(variables)
 
 
-def _columns(system: Tribosystem) -> dict[str, Column]:
+def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
     pair = system.pair
     if system.case.model.kind != "plane":
@@ -130,7 +131,7 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
     return columns
 
 
-def _rows(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
+def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
     own = sheet.values(block)
     return {name: own[name] if name in own else _values(block, name) for name in names}
@@ -198,8 +199,8 @@ class HistoryWriter:
             OutputError: it cannot be written.
         """
         self.path, self._twin, self._spare = (directory / f"history{end}" for end in (".nc", ".part", ".old"))
-        self._variables = _variables(system)
-        self._columns = _columns(system)
+        self._variables = variables_of(system)
+        self._columns = columns_of(system)
         self._degrees = degrees_of(system.case)
         self._phases = system.motion.half_cycles
         # Cycle jumps have few records: all are kept.
@@ -270,7 +271,7 @@ class HistoryWriter:
         Raises:
             OutputError: history.nc cannot be written; it stays as it was at the last write.
         """
-        rows = _rows(block, self._variables)
+        rows = rows_of(block, self._variables)
         for name, (_, units, _) in self._variables.items():
             if units == KELVIN.unit:
                 rows[name] = self._degrees.of(rows[name])
@@ -405,7 +406,8 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
 def _places(system: Tribosystem) -> NDArray[np.float64]:
     """Return three places along a contact that is a line, mm."""
     x = system.pair.x
-    return (x[-1] + x[0]) / 2 + (x[-1] - x[0]) * np.array([-0.25, 0.0, 0.25])
+    places = (x[-1] + x[0]) / 2 + (x[-1] - x[0]) * np.array([-0.25, 0.0, 0.25])
+    return np.round(places, sheet.PLACES) + 0.0  # the middle is 0, not what rounding of a mesh leaves of it
 
 
 def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:

@@ -245,4 +245,6 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
 def _number(value: float | None) -> str:
     if value is None or not np.isfinite(value):
         return "-"
-    return f"{value:,}" if isinstance(value, int) else f"{value:.5g}"
+    if isinstance(value, int):
+        return f"{value:,}"
+    return f"{value:,.0f}" if 1e5 <= abs(value) < 1e12 else f"{value:,.5g}"

@@ -11,7 +11,8 @@ from fenwear.errors import CaseError, InputError
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape, stick_zone
-from fenwear.stick.run import check_touching
+from fenwear.stick.fineness import fine_enough
+from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
 
 
@@ -24,6 +25,7 @@ def check_text(case: Case) -> str:
     """
     rig = make_rig(case)
     check_touching(rig)
+    rig, fineness = fine_enough(rig, case)
     records = Records.joined(rig.cycle(rig.beginning())[1])
     thick, weights = case.model.thickness, rig.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
@@ -36,6 +38,7 @@ def check_text(case: Case) -> str:
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
+        + "".join(f"\nwarning: {text}" for text in (fineness.text(), unique_text(records)) if text)
     )
 
 

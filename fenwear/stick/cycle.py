@@ -148,6 +148,10 @@ class Rig:
         """Return the same, watched."""
         return Rig(self.interface, self.program, self.wear, self.friction, watch, self.heat)
 
+    def driven(self, program: Program) -> Rig:
+        """Return the same in other time steps, without heat."""
+        return Rig(self.interface, program, self.wear, self.friction, self.watch)
+
     @cached_property
     def reach(self) -> float:
         """Largest way of the strip's supports, or a fraction of the contact where a force is imposed, mm."""

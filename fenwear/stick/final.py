@@ -1,9 +1,10 @@
 """The shape to which partial slip wears in the end, directly.
 
-Wear goes on wherever there is slip and pressure. Under a fixed stroke, or force, a contact that sticks in its
-middle keeps this zone; around it wear goes on until the pressure has vanished there. So in the end the stick zone
-alone carries the load, and beside it the surfaces are worn by what they would otherwise overlap at any time of the
-cycle (M. Ciavarella and D. A. Hills, J. Strain Anal. 34, 1999): one cycle with contact in the stick zone only,
+Wear goes on wherever there is slip and pressure. Half-planes of one material that stick in the middle of their contact
+under a fixed load and tangential force keep this zone; around it wear goes on until the pressure has vanished there.
+So in the end the stick zone alone carries the load, and beside it the surfaces are worn by what they would otherwise
+overlap at any time of the cycle (M. Ciavarella and D. A. Hills, J. Strain Anal. 34, 1999): one cycle with contact in
+the stick zone only,
 
     p >= 0, gap >= 0, p gap = 0 in the stick zone;    p = 0, depth = max(0, -gap) outside of it.
 """
@@ -42,12 +43,16 @@ class FinalShape:
 
 
 def stick_zone(rig: Rig) -> Mask:
-    """Return the nodes that stick all through the first cycle (n,); collective.
+    """Return the nodes that stick all through the second cycle without wear (n,); collective.
+
+    What slips in the first cycle only, until it has settled, does not wear on. Finite bodies rock, and give way along
+    the surface otherwise than across it; in the course of the wear that takes about a node at the edge.
 
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    return np.asarray(Records.joined(rig.cycle(rig.beginning())[1]).sticking.all(axis=0))
+    settled, _ = rig.cycle(rig.beginning())
+    return np.asarray(Records.joined(rig.cycle(settled)[1]).sticking.all(axis=0))
 
 
 def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
@@ -55,7 +60,7 @@ def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
 
     Args:
         rig: The bodies and what is done to them.
-        stick: The zone that never slips (n,); by default that of the first cycle.
+        stick: The zone that never slips (n,); by default that of the second cycle, see `stick_zone`.
 
     Raises:
         ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.

@@ -21,10 +21,11 @@ from fenwear.report.stick import write_stick_report
 from fenwear.results.history import HISTORY, free_directory, make_directory, write_case, write_summary
 from fenwear.signals import Signals
 from fenwear.stick import checkpoint
-from fenwear.stick.cycle import Rig
+from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.fineness import Fineness, fine_enough
 from fenwear.stick.jump import Cycle, jump, march
 from fenwear.stick.results import dataset, row_of, summary_of
-from fenwear.stick.setup import Fineness, fine_enough, make_rig, reaches_border
+from fenwear.stick.setup import make_rig, reaches_border
 from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
 
@@ -265,20 +266,22 @@ def check_touching(rig: Rig) -> None:
         raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
 
+def unique_text(records: Records) -> str:
+    """Say that friction is so large that there are no or several answers, and which was taken; "" if it is not."""
+    if records.unique.all():
+        return ""
+    return (
+        f"friction is so large that the contact has no or several answers in {int((~records.unique).sum())} of "
+        f"{len(records)} time steps; those taken are the ones that Newton's method came to from the step before"
+    )
+
+
 def _warnings(rig: Rig, last: Cycle, fineness: Fineness | None) -> list[str]:
     """Return what the user should know of the run."""
-    found = []
-    if fineness is not None and not fineness.enough:
-        found.append(
-            f"the time steps are coarse: with {fineness.steps} in a half-cycle force or friction's work of the first "
-            f"cycle still change by {100 * fineness.change:.2g} %; expected more stick.steps"
-        )
+    found = [fineness.text()] if fineness is not None and not fineness.enough else []
     records = last.records
     if not records.unique.all():
-        found.append(
-            "friction is so large that the contact has no or several answers in some time steps; those taken are the "
-            "ones that Newton's method came to from the step before"
-        )
+        found.append(unique_text(records))
     slipping = (records.pressure > 0).any(axis=1) & ~records.sticking.any(axis=1)
     if slipping.any():
         share = float(np.mean(slipping))

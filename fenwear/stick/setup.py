@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from mpi4py import MPI
 
@@ -13,29 +11,13 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.results.surfaces import border_nodes
-from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.cycle import Rig
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.program import make_program
 from fenwear.stick.wear import local_wear
 
-DOUBLINGS = 4  # of the steps at most
 SPACINGS = 1.0  # contact nodes that the strip moves to each side before its place matters
-
-
-@dataclass(frozen=True)
-class Fineness:
-    """How fine the time steps are.
-
-    Attributes:
-        steps: Of a half-cycle.
-        change: Of the largest force and of friction's work in the first cycle by the last doubling.
-        enough: Whether that is within the case's tolerance.
-    """
-
-    steps: int
-    change: float
-    enough: bool
 
 
 def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None = None) -> Rig:
@@ -74,33 +56,6 @@ def heated(rig: Rig, case: Case) -> Rig:
     steps = len(rig.program.steps) // rig.program.half_cycles
     heat = stick_heat(meshed(rig.interface), case, steps)
     return Rig(rig.interface, rig.program, rig.wear, rig.friction, rig.watch, heat)
-
-
-def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
-    """Return the rig with the time steps doubled until the first cycle changes little; collective.
-
-    Raises:
-        ConvergenceError: a time step did not converge.
-    """
-    steps, limit = case.stick.steps, case.stick.step_tolerance
-    coarse = _measures(rig)
-    change = np.inf
-    for _ in range(DOUBLINGS):
-        finer = with_steps(rig, case, 2 * steps)
-        fine = _measures(finer)
-        change = float(np.max(np.abs(fine - coarse) / np.maximum(np.abs(fine), 1e-300), initial=0.0))
-        if change <= limit:
-            return rig, Fineness(steps, change, enough=True)
-        rig, coarse, steps = finer, fine, 2 * steps
-    return rig, Fineness(steps, change, enough=False)
-
-
-def _measures(rig: Rig) -> Array:
-    """Return the largest force and friction's work of the first cycle."""
-    records = Records.joined(rig.cycle(rig.beginning())[1])
-    measures = [float(np.abs(records.force).max()), records.energy(rig.weights)]
-    scale = measures[0] * float(np.ptp(records.displacement)) * 1e-6  # full stick: no work but rounding
-    return np.array([measures[0], max(measures[1], scale)])
 
 
 def reaches_border(rig: Rig, pressure: Array) -> bool:

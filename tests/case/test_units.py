@@ -64,3 +64,20 @@ def test_text_reads_back_to_the_last_bit(value: float) -> None:
     """What a resolved case shows is what it was."""
     assert convert(quantity_text(value, "MPa"), "MPa") == value
     assert convert(quantity_text(value, ""), "") == value
+
+
+@pytest.mark.parametrize(
+    ("written", "unit", "value"),
+    [
+        ("2 mm3/(N m)", "mm^3/(N*mm)", 2e-3),
+        ("2 mm3", "mm^3", 2.0),
+        ("2 mJ/mm2", "N/mm", 2.0),
+        ("2 mm s-1", "mm/s", 2.0),
+        ("2 rad s-1", "rad/s", 2.0),
+        ("2 mW/mm2", "N/(mm*s)", 2.0),
+        ("2 1/K", "1/K", 2.0),
+    ],
+)
+def test_units_as_results_have_them(written: str, unit: str, value: float) -> None:
+    """The units that history.nc and exports write are read as they stand."""
+    assert convert(written, unit) == pytest.approx(value, rel=1e-12)

@@ -11,9 +11,10 @@ import pytest
 from fenwear import CaseError, assemble, load_case
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.fineness import HALVINGS, fine_enough
 from fenwear.stick.jump import Cycle, jump, march
 from fenwear.stick.program import make_program
-from fenwear.stick.setup import fine_enough, make_rig, with_steps
+from fenwear.stick.setup import make_rig, with_steps
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
 SMALL = (*COARSE, "motion.amplitude='3 um'")
@@ -133,21 +134,42 @@ def test_large_strokes_slide_as_a_whole() -> None:
     assert energy / (0.9 * 18.5 * 0.1) == pytest.approx(0.97, abs=0.01)
 
 
-def test_steps_are_doubled_until_they_are_fine_enough() -> None:
-    """The stated change is that of the next doubling."""
-    load = (
-        "punch.loads=[{on='punch_top', force=['0 N', '-120 N'], over_cycle=[[0, 1], [0.3, 1.4], [0.7, 0.7], [1, 1]]}]"
-    )
-    case = load_case("fretting-partial-slip", [*SMALL, load, "stick.steps=2", "stick.step_tolerance=0.02"])
-    start = make_rig(case)
-    found, fineness = fine_enough(start, case)
-    assert fineness.enough
-    assert fineness.steps == len(found.program.steps) // 2 > 2
-    work = [
-        first_cycle(with_steps(start, case, steps)).energy(start.weights)
-        for steps in (fineness.steps, 2 * fineness.steps)
-    ]
-    assert abs(work[1] / work[0] - 1) <= 0.02
+COURSE = "[[0, 1], [0.3, 1], [0.35, 0.7], [0.4, 1], [1, 1]]"
+LOAD = f"punch.loads=[{{on='punch_top', force=['0 N', '-120 N'], over_cycle={COURSE}}}]"
+
+
+def test_steps_are_halved_where_it_counts() -> None:
+    """The work of friction of the cycle tends to that of many equal steps as the tolerance falls, in fewer steps."""
+    start = rig(LOAD, "stick.steps=8")
+    case = load_case("fretting-partial-slip", [*SMALL, LOAD, "stick.steps=8"])
+    exact = first_cycle(with_steps(start, case, 160)).energy(start.weights)
+    errors, counts = [], []
+    for tolerance in (0.1, 0.01):
+        within = load_case(
+            "fretting-partial-slip", [*SMALL, LOAD, "stick.steps=8", f"stick.step_tolerance={tolerance}"]
+        )
+        found, fineness = fine_enough(start, within)
+        assert fineness.enough
+        assert fineness.change <= tolerance
+        errors.append(abs(first_cycle(found).energy(start.weights) / exact - 1))
+        steps = found.program.steps
+        assert sum(step.duration for step in steps) == pytest.approx(found.program.period)
+        assert [step.half_cycle for step in steps] == sorted(step.half_cycle for step in steps)
+        durations = [step.duration for step in steps]
+        counts.append((len(steps), round(found.program.period / min(durations))))
+    assert errors[1] < 0.2 * errors[0]
+    assert errors[1] < 0.01
+    assert 2 * counts[1][0] < counts[1][1], "equal steps as short as the shortest would be more"
+
+
+def test_steps_that_stay_too_coarse_are_told() -> None:
+    """Where the finest do not reach the tolerance."""
+    case = load_case("fretting-partial-slip", [*SMALL, LOAD, "stick.steps=2", "stick.step_tolerance=1e-7"])
+    found, fineness = fine_enough(rig(LOAD, "stick.steps=2"), case)
+    assert not fineness.enough
+    assert 1e-7 < fineness.change < 0.1
+    assert len(found.program.steps) <= 2 * 2 * 2**HALVINGS
+    assert "expected more stick.steps" in fineness.text()
 
 
 def test_the_program_follows_the_motion() -> None:

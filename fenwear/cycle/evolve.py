@@ -1,0 +1,58 @@
+"""A run from Python as on the command line: its program, meshes that follow the wear, properties of the temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from fenwear.assembly import Tribosystem, with_reduced_heat
+from fenwear.cycle.block import Block
+from fenwear.cycle.jump import jump
+from fenwear.cycle.march import march
+from fenwear.cycle.program import Span, follow_program
+from fenwear.cycle.state import RunState
+
+
+def evolve(
+    system: Tribosystem,
+    half_cycles: int | None = None,
+    *,
+    integration: str | None = None,
+    tolerance: float | None = None,
+    start: RunState | None = None,
+) -> Iterator[Block]:
+    """Yield the blocks of a run as `fenwear run` computes them, without its folder; collective.
+
+    Meshes follow large wear, properties the temperature, and loads, motion and surroundings the program of the case.
+
+    Args:
+        system: Of a case.
+        half_cycles: The last one at most; by default that of the case.
+        integration: "explicit", "implicit" or "jump"; by default that of the case.
+        tolerance: Of jumps; by default that of the case.
+        start: Where to go on from, such as the end of a block; by default the beginning.
+
+    Raises:
+        ConvergenceError: a half-cycle did not converge; all before it are yielded.
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    run = system.case.run
+    last, how = half_cycles or run.half_cycles, integration or run.integration
+
+    def integrate(
+        own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span
+    ) -> Iterator[Block]:
+        if how == "jump":
+            bound = tolerance or run.jump_tolerance
+            return jump(own, span.until, tolerance=bound, start=state, leave=leave, loading=span.loading,
+                        periodic_within=run.periodic_within)  # fmt: skip
+        return march(own, span.until, implicit=how == "implicit", start=state, leave=leave, loading=span.loading,
+                     periodic_within=run.periodic_within)  # fmt: skip
+
+    if how == "jump":
+        system = with_reduced_heat(system)
+        strokes = system.motion.half_cycles
+        last = last // strokes * strokes
+    for block in follow_program(system, integrate, last, start):
+        yield block
+        if block.end.half_cycle >= last:
+            return

@@ -1,0 +1,134 @@
+"""Time steps of a cycle as fine as they need to be, and where they need to be.
+
+The first cycle is computed with its steps and with each of them in halves. Where force and work of friction differ by
+more than the tolerance, the steps that make most of the difference are halved (Doerfler's marking), until they do not.
+Heat wants equal steps: there all are halved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.case import Case
+from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.program import Program, make_program
+from fenwear.stick.setup import with_steps
+
+HALVINGS = 4  # of a step at most
+SHARE = 0.9  # of the difference that the halved steps make
+Ends = NDArray[np.int64]  # of steps, as numbers of the finest ones
+
+
+@dataclass(frozen=True)
+class Fineness:
+    """How fine the time steps are.
+
+    Attributes:
+        steps: Of a half-cycle, on average.
+        change: By halving every step, of the largest force and, in all steps together, of friction's work; shares of
+            the first cycle's.
+        enough: Whether that is within the case's tolerance.
+    """
+
+    steps: int
+    change: float
+    enough: bool
+
+    def text(self) -> str:
+        """Return what is to be said of steps that are too coarse; "" of others."""
+        if self.enough:
+            return ""
+        return (
+            f"the time steps are too coarse: with {self.steps} in a half-cycle force or friction's work of the first "
+            f"cycle still change by {100 * self.change:.2g} %; expected more stick.steps"
+        )
+
+
+def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
+    """Return the rig with steps that are halved until the first cycle changes little; collective.
+
+    Args:
+        rig: With the case's steps.
+        case: Gives their number and the tolerance.
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+    whole = 2 ** (HALVINGS + 1)  # of the finest steps: the halves of the last ones are compared with, too
+    finest = make_program(case, case.stick.steps * whole)
+    ends = np.arange(whole - 1, len(finest.steps), whole)
+    while True:
+        halves, of = _halved(ends)
+        fine = _driven(rig, case, finest, halves)
+        local, change = _compare(_first_cycle(rig), _first_cycle(fine), of, rig.weights)
+        enough = change <= case.stick.step_tolerance
+        splits = np.diff(ends, prepend=-1) > 2
+        marked = _marked(local, splits)
+        if enough or local[~splits].sum() > case.stick.step_tolerance:  # the finest steps alone are too coarse
+            return rig, Fineness(round(len(ends) / finest.half_cycles), change, enough=enough)
+        if case.heat is not None:
+            marked[:] = True
+        ends = halves[marked[of] | _last(of)]
+        rig = _driven(rig, case, finest, ends)
+
+
+def merged(finest: Program, ends: Ends) -> Program:
+    """Return a program whose steps end where these of another one do."""
+    found, begin, place = [], 0, finest.steps[-1].displacement
+    for end in ends:
+        last = finest.steps[end]
+        duration = sum(step.duration for step in finest.steps[begin : end + 1])
+        middle = last.offset
+        if place is not None and last.displacement is not None:
+            middle = (place + last.displacement) / 2
+        found.append(replace(last, duration=duration, offset=middle))
+        begin, place = end + 1, last.displacement
+    return replace(finest, steps=tuple(found))
+
+
+def _driven(rig: Rig, case: Case, finest: Program, ends: Ends) -> Rig:
+    """Return the rig with the steps that end there; the way to the beginning stays."""
+    if case.heat is not None:
+        return with_steps(rig, case, len(ends) // finest.half_cycles)
+    return rig.driven(replace(merged(finest, ends), lead_in=rig.program.lead_in))
+
+
+def _halved(ends: Ends) -> tuple[Ends, Ends]:
+    """Return the ends of the halves of all steps, and the step that each is of."""
+    begins = np.append(-1, ends[:-1])
+    return np.stack([(begins + ends) // 2, ends], axis=1).ravel(), np.repeat(np.arange(len(ends)), 2)
+
+
+def _last(of: Ends) -> NDArray[np.bool_]:
+    """Return which halves are the last of their steps."""
+    return np.append(of[1:] != of[:-1], True)
+
+
+def _first_cycle(rig: Rig) -> Records:
+    return Records.joined(rig.cycle(rig.beginning())[1])
+
+
+def _compare(coarse: Records, fine: Records, of: Ends, weights: Array) -> tuple[Array, float]:
+    """Return what the halves change in each step, and what they change in the cycle, as shares."""
+    force = max(float(np.abs(fine.force).max()), 1e-300)
+    full_stick = 1e-6 * force * float(np.ptp(fine.displacement))  # no work but rounding
+    work = max(fine.energy(weights), full_stick, 1e-300)
+    by_step = coarse.dissipated @ weights - np.bincount(of, fine.dissipated @ weights)
+    pulled = np.diff(coarse.force - fine.force[_last(of)], prepend=0.0)
+    # Differences of either sign do not make up for each other: that would be by chance.
+    change = max(abs(float(np.abs(coarse.force).max()) - force) / force, float(np.abs(by_step).sum()) / work)
+    return np.abs(by_step) / work + np.abs(pulled) / force, change
+
+
+def _marked(local: Array, splits: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the steps that make most of the difference, of those that can be halved."""
+    able = np.where(splits, local, 0.0)
+    order = np.argsort(-able)
+    count = int(np.searchsorted(np.cumsum(able[order]), SHARE * able.sum())) + 1
+    marked = np.zeros(len(local), dtype=bool)
+    marked[order[:count]] = True
+    return marked & splits

@@ -1,0 +1,82 @@
+"""The end of partial-slip wear in the plane: the exact scar, and the way there by jumps where theory is exact."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenwear import load_case
+from fenwear.arrays import Array
+from fenwear.bodies.condensation import CondensedBody
+from fenwear.interface import ContactPair
+from fenwear.stick.cycle import Rig
+from fenwear.stick.final import final_shape, stick_zone
+from fenwear.stick.jump import jump
+from fenwear.stick.setup import make_rig
+
+LOAD, RADIUS, E_STAR = 120.0, 6.0, 2e5 / (2 * (1 - 0.3**2))
+C = 0.0609  # half-width that stays
+
+
+def rig(elements: int, *settings: str) -> Rig:
+    mesh = f"geometry.parameters.elements_along_contact={elements}"
+    return make_rig(load_case("fretting-partial-slip", [mesh, "geometry.follow_wear='never'", *settings]))
+
+
+def exact_area(c: float) -> float:
+    """A parabola pressed into a half-plane over abs(x) < c only: what it would overlap beside it, mm².
+
+    Hertz's gap (c²/2R) (xi sqrt(xi² - 1) - arcosh xi), xi = x/c, less 2 (P - P_c) / (pi E*) arcosh xi of a flat
+    punch under the rest of the load, P_c = pi E* c² / (4 R).
+    """
+    rest = LOAD - np.pi * E_STAR * c**2 / (4 * RADIUS)
+    xi = np.linspace(1, 5, 100_001)
+    gap = c**2 / (2 * RADIUS) * (xi * np.sqrt(xi**2 - 1) - np.arccosh(xi))
+    return float(2 * c * np.trapezoid(np.maximum(2 * rest / (np.pi * E_STAR) * np.arccosh(xi) - gap, 0), xi))
+
+
+def test_the_scar_tends_to_the_exact_one() -> None:
+    """Of first order in the distance of nodes, as the edge of a zone of nodes is; hardly any tangential force."""
+    errors = []
+    for elements in (20, 40):
+        pressed = rig(elements, "stick.steps=2", "stick.force='1e-6 N'")
+        x, weights = pressed.interface.middle.pair.x, pressed.weights
+        zone = np.abs(x) < C
+        area = float(weights @ final_shape(pressed, zone).depth)
+        # The edge lies between the last node and the end of what it stands for.
+        assert exact_area(float(weights @ zone) / 2) < area < exact_area(float(x[zone].max()))
+        errors.append(area / exact_area(float(weights @ zone) / 2) - 1)
+    assert errors[1] < 0.55 * errors[0] < 0.08
+
+
+def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bodies that give way along the surface as across it, each by itself: under a force the stick zone is kept.
+
+    That is Ciavarella's and Jaeger's contact, node by node. Finite bodies rock under the tangential force.
+    """
+
+    def upright(pair: ContactPair) -> Array:
+        return np.broadcast_to(np.array([[0.0, 1.0], [1.0, 0.0]]), (len(pair.normal), 2, 2)).copy()
+
+    def alike(body: CondensedBody) -> CondensedBody:
+        response = body.response.copy()
+        response[:, 0, :, 1] = response[:, 1, :, 0] = 0.0
+        response[:, 0, :, 0] = response[:, 1, :, 1]
+        return replace(body, response=response)
+
+    monkeypatch.setattr("fenwear.stick.interface.contact_frame", upright)
+    coarse = rig(14, "stick.force='60 N'", "stick.steps=4")
+    interface = coarse.interface
+    interface.punch, interface.strip = alike(interface.punch), alike(interface.strip)
+    interface._positions = {0.0: interface._position(interface.middle.pair)}
+    driven = Rig(interface, coarse.program, coarse.wear, coarse.friction)
+    zone = stick_zone(driven)
+    end = final_shape(driven, zone)
+    last = list(jump(driven, 2_000_000, 0.02))[-1]
+    depth = last.worn.punch + interface.middle.pair.material @ last.worn.strip
+    pressure = last.records.pressure[-1]
+    assert driven.weights @ np.where(zone, pressure, 0) == pytest.approx(LOAD, rel=1e-5)
+    assert np.abs(pressure - end.pressure)[zone].max() < 2e-3 * pressure.max()
+    assert driven.weights @ depth == pytest.approx(driven.weights @ end.depth, rel=2e-3)

@@ -30,6 +30,7 @@ settings.register_profile("search", settings.get_profile("same"), derandomize=Fa
 settings.register_profile("few", settings.get_profile("same"), max_examples=3)
 settings.load_profile("same")
 
+TESTS = Path(__file__).parent
 Edit = Callable[[dict[str, Any]], object]
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
 
@@ -95,10 +96,14 @@ def fenwear(run_python: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what starts a process with the fixtures above: an interpreter and its imports take seconds."""
+    """Mark what starts a process with the fixtures above, whose imports take seconds, and what long.txt names."""
+    long = set((TESTS / "long.txt").read_text("utf-8").split())
     for item in items:
         if "run_python" in getattr(item, "fixturenames", ()):
             item.add_marker("process")
+        path, name = item.path.relative_to(TESTS).as_posix(), item.name.partition("[")[0]
+        if long & {path, f"{path}::{name}"}:
+            item.add_marker("long")
     items[:] = _long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import basix.ufl
 import numpy as np
-import scipy.linalg
 import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
@@ -410,8 +409,13 @@ def _column_echelon(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], l
 
 
 def _best_rows(matrix: NDArray[np.float64], count: int) -> list[int]:
-    """Return the rows that span best, by QR with pivoting."""
-    if not len(matrix):
-        return []
-    pivots = scipy.linalg.qr(matrix.T, mode="r", pivoting=True)[1]
-    return [int(i) for i in pivots[:count]]
+    """Return the rows that span best: each time the largest of what those before have left (QR with pivoting)."""
+    rest, chosen = np.array(matrix), []
+    for _ in range(min(count, len(rest))):
+        best = int(np.argmax(np.einsum("ij,ij->i", rest, rest)))
+        chosen.append(best)
+        length = float(np.linalg.norm(rest[best]))
+        if length > 0:
+            unit = rest[best] / length
+            rest -= np.outer(rest @ unit, unit)
+    return chosen

@@ -42,6 +42,8 @@ def element_problems(gmsh: Any, groups: list[dict[str, int]], *, axisymmetric: b
             f"it reaches to x = {x[:, 0].min():g} mm, but x is the radius of an axisymmetric model: expected x >= 0"
         ]
     order = np.argsort(tags)
+    facets = {name: _elements(gmsh, whole - 1, tag)[0] for name, tag in groups[whole - 1].items()}
+    on_facets = np.unique(np.concatenate([corners.ravel() for corners in facets.values()]))
     problems, cells, sides = [], [], set()
     for name, tag in groups[whole].items():
         corners, nodes = _elements(gmsh, whole, tag)
@@ -52,11 +54,12 @@ def element_problems(gmsh: Any, groups: list[dict[str, int]], *, axisymmetric: b
         if bad > 0:
             problems.append(f"{name} has {bad} elements that are degenerate or twisted")
         cells.append(np.sort(corners, axis=1))
-        sides.update(_rows(corners[:, _sides(corners.shape[1], flat=flat)]))
+        of_cells = np.concatenate([corners[:, side] for side in _sides(corners.shape[1], flat=flat)])
+        sides.update(_rows(of_cells[np.isin(of_cells, on_facets).all(axis=1)]))  # others cannot be any facet's
     if len({c.shape[1] for c in cells}) == 1 and len(np.unique(every := np.concatenate(cells), axis=0)) < len(every):
         problems.append("some of its elements are there twice")
-    for name, tag in groups[whole - 1].items():
-        if not sides.issuperset(_rows(_elements(gmsh, whole - 1, tag)[0])):
+    for name, corners in facets.items():
+        if not sides.issuperset(_rows(corners)):
             kind = "surfaces" if whole == 2 else "volumes"
             problems.append(f"{name} has elements that are no sides of the {kind}' elements")
     return problems

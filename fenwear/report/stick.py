@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,6 +51,13 @@ LABELS = {
     "steps_per_half_cycle": ("time steps of a half-cycle", ""),
     "contact_nodes": ("contact nodes", ""),
 }
+
+
+def key_numbers_text(summary: Mapping[str, Any]) -> str:
+    """Return the key numbers of a run with stick as lines for people."""
+    rows = [(f"{label} ({unit})" if unit else label, summary[k]) for k, (label, unit) in LABELS.items() if k in summary]
+    wide = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{wide}}  {value:>12,.5g}" for label, value in rows)
 
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
@@ -193,6 +200,31 @@ def sliding_map(history: xarray.Dataset) -> Figure:
     return figure
 
 
+def temperatures(history: xarray.Dataset) -> Figure:
+    """Draw the temperatures of both surfaces at the end of chosen cycles, and the largest over the cycles."""
+    figure, (along, course) = panels(2, 2.2, share_x=False)
+    for colour, place in shades(chosen(history)):
+        cycle = history.isel(cycle=place)
+        along.plot(history.x, cycle.temperature_punch.isel(step=-1), color=colour, label=f"{int(cycle.cycle):,}")
+        along.plot(history.x, cycle.temperature_strip.isel(step=-1), color=colour, linestyle=":")
+    along.set_ylabel("temperature at the end\nof the cycle (K):\npunch, dotted strip")
+    contact_axis(along)
+    legend_beside(along, "cycle")
+    course.plot(history.cycle, history.max_temperature, color=RED, marker=".", markersize=3)
+    course.set_ylabel("largest temperature\nin a cycle (K)")
+    course.set_xlabel("cycles")
+    return figure
+
+
+def figures_of(history: xarray.Dataset) -> dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]]:
+    """Return the drawings of a run, with captions and what they show."""
+    found = IN_SOLIDS if model_of(history) == "solid" else FIGURES
+    if "temperature_punch" not in history:
+        return found
+    alt = "Of both surfaces along x, a line a cycle, and the largest one over the cycles."
+    return {**found, "temperatures": (temperatures, "Temperatures of the contact", alt)}
+
+
 def _to_contact(ax: Any, history: xarray.Dataset) -> None:
     x = history.x.values
     touched = x[(history.pressure.values > 0).any(axis=(0, 1))]
@@ -247,7 +279,7 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",)) -> li
     paths, pictures = [], []
     with writing(directory):
         folder.mkdir(exist_ok=True)
-        for name, (draw, caption, alt) in (IN_SOLIDS if model_of(history) == "solid" else FIGURES).items():
+        for name, (draw, caption, alt) in figures_of(history).items():
             path = folder / f"{name}.png"
             figure = draw(history)
             figure.savefig(path, dpi=150)

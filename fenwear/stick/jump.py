@@ -142,6 +142,8 @@ def _rate(rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None 
     if heat is None or before is None or before.warm is None or before.end.temperature is None:
         return _recorded(rig, at, worn, number)
     cycles, rate = number - before.number, before.end.temperature - before.warm
+    if cycles == 1:  # nothing is jumped over: the temperatures are those after the cycle before
+        return _recorded(rig, replace(at, temperature=before.end.temperature), worn, number)
     over = heat.through(_course(before, len(program.steps)))
     warm = over.after(before.warm, cycles)
     for _ in range(MOST_HEATINGS):

@@ -121,13 +121,13 @@ def published_ring() -> Result:
     slow=True,
 )
 def jumps_of_laws() -> Result:
-    """400 half-cycles at two tolerances: the errors fall, to below what the two marches differ by."""
+    """200 half-cycles at two tolerances: the errors fall, to below what the two marches differ by."""
     rows: list[Row] = []
     for law, (case, settings) in LAWS.items():
         system = assemble(load_case(case, settings))
-        explicit, implicit = (_end(march(system, 400, implicit=way)) for way in (False, True))
+        explicit, implicit = (_end(march(system, 200, implicit=way)) for way in (False, True))
         for tolerance, bound in ((3e-2, 1e-2), (3e-4, 5e-4)):
-            found = _end(jump(system, 400, tolerance=tolerance))
+            found = _end(jump(system, 200, tolerance=tolerance))
             for name, one, other, value in zip(("depth", "temperature"), explicit, implicit, found, strict=False):
                 error = _apart(system.pair.weights, (one + other) / 2, value)
                 what = f"{law}: {name}, tolerance {tolerance:g} (error over its mean)"

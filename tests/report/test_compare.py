@@ -24,7 +24,7 @@ RUNS = {"plain": ("example1",), "rough": ("example1", "contact.friction=0.3"), "
 def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     base = tmp_path_factory.mktemp("compare")
     for name, (case, *settings) in RUNS.items():
-        loaded = load_case(case, [*SMALL, *settings, "output.fields_at=[]"])
+        loaded = load_case(case, [*SMALL, *settings, "output.fields_at=[]", "output.report=false"])
         run_case(loaded, name, base / name, lambda message: None)
     return [base / name for name in RUNS]
 

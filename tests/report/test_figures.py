@@ -30,16 +30,9 @@ from fenwear.report.sections import element_edges
 from fenwear.report.shapes import profile_figure, wear_map_figure
 from fenwear.report.style import COLOURS, Look, shades
 from fenwear.results.reading import open_history
-from fenwear.run import run_case
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
 SHOWN = {"shape", "profiles", "wear_map", "pressure", "peaks", "volume", "scar", "friction", "convergence"}
-
-
-@pytest.fixture(scope="module", params=["example1", "example1-heat", "monotonic-lz20"])
-def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    case = load_case(request.param, [*SMALL, "run.half_cycles=20"])
-    return run_case(case, "run", tmp_path_factory.mktemp("figures") / "run", lambda message: None)[1]
 
 
 @pytest.fixture

@@ -117,6 +117,14 @@ def test_import_is_light(run_python: Run) -> None:
     assert run_python("-c", code).stdout.strip() == "[]"
 
 
+def test_start_is_quick(run_python: Run) -> None:
+    """The steady state needs no tables, statistics or plots: a third of its start."""
+    late = "{'xarray', 'pandas', 'scipy.stats', 'matplotlib', 'pyvista', 'gmsh'}"
+    modules = "fenwear.cli.states, fenwear.cycle, fenwear.results.degrees"
+    code = f"import sys, {modules}; print(sorted({late} & set(sys.modules)))"
+    assert run_python("-c", code).stdout.strip() == "[]"
+
+
 def test_public_names() -> None:
     """Everything that the package offers by name is there, with a docstring; nothing else is."""
     for name in fenwear.__all__:

@@ -39,6 +39,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.report.stick import key_numbers_text
     from fenwear.results.sheet import sheet_text
     from fenwear.run import Progress, run_case
 
@@ -56,7 +57,7 @@ def run(
         print_json(summary)
     else:
         if not quiet:
-            print(sheet_text(summary))
+            print(key_numbers_text(summary) if "energy_ratio" in summary else sheet_text(summary))
         say(f"results in {directory}")
 
 

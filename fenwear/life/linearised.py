@@ -29,6 +29,9 @@ from fenwear.life.model import Snapshot, steady_snapshot
 def differentiable(system: Tribosystem) -> bool:
     """Return whether the equations above are all there is: constant coefficients and conductances."""
     heat = system.heat
+    laws = [law for law in system.sliding.wear if law is not None]
+    if any(law.pressure_threshold > 0 or law.pressure_cap is not None for law in laws):
+        return False
     return system.constant_coefficients and (heat is None or heat.conductance_per_pressure is None)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,6 +51,13 @@ LABELS = {
     "steps_per_half_cycle": ("time steps of a half-cycle", ""),
     "contact_nodes": ("contact nodes", ""),
 }
+
+
+def key_numbers_text(summary: Mapping[str, Any]) -> str:
+    """Return the key numbers of a run with stick as lines for people."""
+    rows = [(f"{label} ({unit})" if unit else label, summary[k]) for k, (label, unit) in LABELS.items() if k in summary]
+    wide = max(len(label) for label, _ in rows)
+    return "\n".join(f"{label:{wide}}  {value:>12,.5g}" for label, value in rows)
 
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:

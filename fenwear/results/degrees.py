@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import xarray
+from typing import TYPE_CHECKING
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+
+if TYPE_CHECKING:
+    import xarray  # with pandas, half a second that commands without tables spare themselves
 
 ICE = 273.15  # K, at 0 degrees Celsius
 

@@ -75,8 +75,10 @@ class Step:
         old += position.modes @ before.rigid - position.drive * before.displacement
         self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
         self.approached = now[: self.n] - old[: self.n] - self.free[: self.n]
-        # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area.
+        # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area. One c for both
+        # tangents: t = P(t - c s) turns slip against the traction only where c is a number, not a matrix.
         self.scale = np.abs(np.diag(position.compliance)).reshape(self.d, self.n)
+        self.scale[1:] = self.scale[1:].mean(axis=0)
         self.length = float(np.median(self.scale[0]))
         self.units = self.length / np.maximum(np.abs(position.modes).max(axis=0, initial=0.0), 1e-300)
         self.area = float(position.pair.weights.sum())

@@ -171,9 +171,7 @@ def _from(step: Step, guess: Guess) -> StickState:
 def _iterate(step: Step, guess: Guess) -> tuple[Found, int, bool]:
     wrong = np.inf
     for iteration in range(1, MOST + 1):
-        if step.imposed.force is not None and not (guess.closed & ~guess.slipping).any():
-            guess = _one_stuck(guess)
-        found = step.solve(guess)
+        found = _solve(step, guess)
         guess, wrong = step.look(found)
         if wrong < CLOSE:
             return found, iteration, found.sign > 0
@@ -183,6 +181,24 @@ def _iterate(step: Step, guess: Guess) -> tuple[Found, int, bool]:
         f"the contact with stick did not converge in {MOST} Newton steps, residual {wrong:.3g} of the largest "
         "pressure: take more steps, or less friction"
     )
+
+
+def _solve(step: Step, guess: Guess) -> Found:
+    """Return the solution of a piece; with a node stuck where an imposed force is held by nothing else.
+
+    In two directions nodes that all slip hold a force: their slips turn with it, where bodies spread unlike each other.
+
+    Raises:
+        ConvergenceError: the piece is singular.
+    """
+    if step.imposed.force is None or (guess.closed & ~guess.slipping).any():
+        return step.solve(guess)
+    if step.m == 1:
+        return step.solve(_one_stuck(guess))
+    try:
+        return step.solve(guess)
+    except ConvergenceError:
+        return step.solve(_one_stuck(guess))
 
 
 def _one_stuck(guess: Guess) -> Guess:

@@ -95,6 +95,9 @@ def _begin(
     if folder is None:
         return case, plan, known
     if not resume:
+        if (folder / VARIANTS).is_dir():
+            how = "a new or an empty folder, or --resume to go on with it"
+            raise CaseError(InputError("-o", f"{folder} holds a sweep already; expected {how}"))
         make_directory(folder)
     elif not (folder / VARIANTS).is_dir():
         raise CaseError(InputError("--resume", f"{folder} holds no sweep to go on with"))

@@ -217,7 +217,38 @@ def bulk_stress() -> Result:
             Line(f"exact, {name}", x[shown], exact[shown], reference=True),
             Line(f"fenwear, {name}", x[shown], q[shown]),
         ]
+    counts = (10, 20, 40, 80)
+    for name, error in (("bulk stress", bulk_error), ("force taken back to zero", reversal_error)):
+        errors = [error(count) for count in counts]
+        slope = float(np.polyfit(np.log(1 / np.array(counts)), np.log(errors), 1)[0])
+        rows.append(number(f"{name}: order of the L2 error over four meshes, mean of forces", 1.0, slope, 0.25))
     return Result(rows, [Plot("Bulk stress: traction", "x (mm)", "traction (MPa)", lines)])
+
+
+def bulk_error(elements: int) -> float:
+    """Return the L2 error of the traction with bulk stress over its norm, the mean of shifts of the stick zone."""
+    interface, errors = half_planes(elements), []
+    x, weights = interface.middle.pair.x, interface.middle.pair.weights
+    shares = np.linspace(0.1, 1, 10)
+    for shift in np.linspace(0.04, 0.12, 9):
+        state, start = pressed(interface, parabola(x))
+        found, _ = follow(interface, state, start, 0.5 * shares, shift * 2 * FRICTION * PEAK / MODULUS * shares)
+        exact = traction_of(x, 0.5, -shift * HALF_WIDTH)
+        errors.append(np.sqrt(weights @ (found.traction[:, 0] - exact) ** 2 / (weights @ exact**2)))
+    return float(np.mean(errors))
+
+
+def reversal_error(elements: int) -> float:
+    """Return the L2 error of the traction after a force went back to zero over its norm, the mean of forces."""
+    interface, errors = half_planes(elements), []
+    x, weights = interface.middle.pair.x, interface.middle.pair.weights
+    for most in np.linspace(0.2, 0.8, 9):
+        state, start = pressed(interface, parabola(x))
+        ways = np.concatenate([np.linspace(0, most, 6)[1:], np.linspace(most, 0, 6)[1:]])
+        found, _ = follow(interface, state, start, ways, 0 * ways)
+        exact = back_from(x, float(most), 0.0)
+        errors.append(np.sqrt(weights @ (found.traction[:, 0] - exact) ** 2 / (weights @ exact**2)))
+    return float(np.mean(errors))
 
 
 @verification(

@@ -1,11 +1,14 @@
 """How set-up time and memory grow with the mesh, on 1 and on 2 ranks.
 
 python3 tests/benchmarks/growth.py                  the whole table
+python3 tests/benchmarks/growth.py --steady         what the cyclic steady state costs, and how it grows
 mpirun -n 2 python3 tests/benchmarks/growth.py 124 0.05     one row
 """
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import resource
 import subprocess
@@ -13,6 +16,7 @@ import sys
 import time
 
 # elements along the contact (of degree 4), growth of the element size: 10 thousand to a million unknowns
+STEADY = (64, 124, 250, 600)
 SIZES = ((16, 1.0), (16, 0.5), (32, 0.2), (64, 0.1), (124, 0.05), (250, 0.2))
 
 
@@ -42,6 +46,38 @@ def row(elements: str, growth: str) -> None:
         )
 
 
+def steady_row(elements: str, growth: str, positions: str) -> None:
+    """Print nodes, phases, processor time and iterations of a steady state, and the largest memory, as JSON."""
+    from fenwear import assemble, load_case, steady
+
+    parameters = [f"geometry.parameters.elements_along_contact={elements}", f"geometry.parameters.growth={growth}"]
+    if positions != "1":
+        parameters += [f"motion.positions={positions}", "geometry.parameters.overlap=3"]
+    system = assemble(load_case("example1", parameters))
+    begin = time.process_time()
+    state = steady(system)
+    spent = time.process_time() - begin
+    error = float(abs(state.pressure.max() / system.rigid.mean_pressure - 2))  # twice the mean
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+    print(json.dumps([len(system.pair.x), len(system.motion.phases), spent, state.iterations, error, memory]))
+
+
+def steady_table() -> None:
+    """Print what steady states of more and more nodes cost, and the exponent of nodes between two rows."""
+    print("| contact nodes | phases | CPU s | grows like n to the | Newton | largest pressure off 2 p_m | GiB |")
+    print("| ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    for positions in ("1", "5"):
+        before: tuple[float, float] | None = None
+        for elements in STEADY if positions == "1" else STEADY[:3]:
+            command = [sys.executable, __file__, str(elements), "0.5", positions]
+            done = subprocess.run(command, check=True, capture_output=True, text=True)
+            n, m, spent, iterations, off, memory = json.loads(done.stdout.splitlines()[-1])
+            error = f"{off:.0e}" if m == 2 else ""  # where the strip moves, edges differ
+            exponent = "" if before is None else f"{math.log(spent / before[1]) / math.log(n / before[0]):.1f}"
+            print(f"| {n:,} | {m} | {spent:.2f} | {exponent} | {iterations} | {error:.0e} | {memory:.2f} |", flush=True)
+            before = n, spent
+
+
 def table() -> None:
     """Print all rows, each measured in a process of its own."""
     print("| unknowns | contact nodes | ranks | mesh, assembly | factor, condense | set-up | peak memory | steady |")
@@ -53,4 +89,9 @@ def table() -> None:
 
 
 if __name__ == "__main__":
-    row(*sys.argv[1:]) if len(sys.argv) > 1 else table()
+    if sys.argv[1:] == ["--steady"]:
+        steady_table()
+    elif len(sys.argv) == 4:
+        steady_row(*sys.argv[1:])
+    else:
+        row(*sys.argv[1:]) if len(sys.argv) > 1 else table()

@@ -3,19 +3,28 @@
 python3 tests/benchmarks/large_contact.py [--beside] [--steps N] [--loads F F ...]
 
 Square grids of 2,025, 4,900 and 10,000 nodes, constant pressure on each square (Love 1929), friction
-none, the load given. Each implicit wear step is one inequality in p and the approach; products go
-by fast Fourier transform, the factor is that of the nodes in contact and follows them; a large set that comes at once
-is iterated. --beside gives the same steps with factors alone, and with the matrix of all nodes. --loads changes
-the load from step to step, so that hundreds of nodes come and go. Times are of the process, memory the most it had.
+none, the load given. Each implicit wear step is one inequality in p and the approach.
+
+"run" is the contact of every run, whose compliance is a matrix: it makes the columns of nodes that touch, and its
+factor follows them. "fft" has this half-space's own products by fast Fourier transform; a large set that comes at once
+is iterated. --beside gives the same steps with factors alone and with the matrix of all nodes. --loads changes
+the load from step to step, so that hundreds of nodes come and go. Times are of the process; memory is the most that it
+had, each row in a process of its own.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import resource
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import cast
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -23,8 +32,10 @@ import numpy as np
 import scipy.fft
 
 from fenwear.arrays import Array
+from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Dense, Indices, Solve, Updating
+from fenwear.interface import Interface
 
 WEAR, LOAD, RADIUS = 5e-4, 6.6e-4, 8.0  # gap worn by unit pressure in a step; mean pressure over all; of the sphere
 
@@ -69,6 +80,72 @@ class HalfSpace:
         return self.updating.factor(kept)
 
 
+@dataclass(frozen=True)
+class Rigid:
+    """A punch that can only come down, as `fenwear.interface.RigidEquilibrium` has it."""
+
+    weights: Array
+    mean_pressure: float = LOAD
+    mode_names: tuple[str, ...] = ("lambda_F",)
+
+    @property
+    def pair(self) -> Rigid:
+        """Where the weights are."""
+        return self
+
+    @property
+    def resultant(self) -> Array:
+        """The load."""
+        return np.array([-LOAD * self.weights.sum()])
+
+    @property
+    def rigid_normal(self) -> Array:
+        """The gap opened by its motion up."""
+        return np.ones((len(self.weights), 1))
+
+    def equilibrium(self, _ratio: Array) -> Array:
+        """The force of unit pressures."""
+        return self.weights[None]
+
+
+class Grid:
+    """The interface of sphere and half-space, as `fenwear.interface.Interface` has it: columns by Love's formula."""
+
+    def __init__(self, side: int) -> None:
+        far = 2 / side * np.arange(side)
+        self.table = love(far[:, None], far[None, :], 1 / side)
+        self.at = np.divmod(np.arange(side * side), side)
+        self.rigid = Rigid(np.full(side * side, 1.0 / (side * side)))
+        self.load_gap = np.zeros(side * side)
+        self.elastic_length = float(self.table.sum())
+
+    def compliance_of(self, _ratio: Array, nodes: Indices) -> Array:
+        """Return columns."""
+        i, j = (np.abs(place[:, None] - place[nodes][None, :]) for place in self.at)
+        return np.asarray(self.table[i, j])
+
+    def own_compliance(self, _ratio: Array) -> Array:
+        """Return the diagonal."""
+        return np.full(len(self.load_gap), self.table[0, 0])
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """What a step wears, as `fenwear.sliding.wear.WornLayer` has it."""
+
+    def opening(self, pressure: Array) -> Array:
+        """Return the depth."""
+        return WEAR * pressure
+
+    def local(self, pressure: Array) -> Array:
+        """Return its derivative at each node."""
+        return np.full_like(pressure, WEAR)
+
+    def border(self, pressure: Array) -> tuple[Array, Array]:
+        """Not asked for of many nodes."""
+        raise NotImplementedError
+
+
 def love(x: Array, y: Array, half: float) -> Array:
     """Return the displacement at (x, y) by unit pressure on a square of half-width `half`, E* = 1 / pi."""
     a, b, c, d = x + half, x - half, y + half, y - half
@@ -80,14 +157,14 @@ def love(x: Array, y: Array, half: float) -> Array:
     )
 
 
-def wear(side: int, steps: int, way: str, loads: Sequence[float]) -> tuple[list[float], list[int], list[int], Array]:
+def wear(side: int, steps: int, loads: Sequence[float], way: str) -> tuple[list[float], list[int], list[int], Array]:
     """Return time, Newton iterations and nodes in contact of each step, and the last pressures.
 
     Args:
         side: Nodes along a side of the square.
         steps: How many.
-        way: "iterated", "factors" or "dense".
         loads: Of one step after the other, over and over.
+        way: "iterated", "factors" or "dense".
     """
     n = side * side
     space = HalfSpace(side, iterated=way == "iterated")
@@ -116,6 +193,25 @@ def wear(side: int, steps: int, way: str, loads: Sequence[float]) -> tuple[list[
     return times, iterations, touching, x[:-1]
 
 
+def run(side: int, steps: int, loads: Sequence[float]) -> tuple[list[float], list[int], list[int], Array]:
+    """Return the same by the contact of every run."""
+    grid, x = Grid(side), 2 * (np.arange(side) + 0.5) / side - 1
+    gap = ((x**2)[:, None] + x**2).ravel() / (2 * RADIUS)
+    contact = CondensedContact([SlidingContact(cast(Interface, grid), np.zeros((len(gap), 3)))])
+    start = np.where(gap < 0.1 * gap.max(), LOAD, 0.0)[None]
+    state = ContactState(start, np.zeros_like(start), np.zeros((1, 1)), 0)
+    times, iterations, touching = [], [], []
+    for step in range(steps):
+        begin = time.process_time()
+        contact.press(loads[step % len(loads)])
+        state = contact.solve(gap, state, Wearing())
+        gap = gap + WEAR * state.pressure[0]
+        times.append(time.process_time() - begin)
+        iterations.append(state.iterations)
+        touching.append(int((state.pressure > 0).sum()))
+    return times, iterations, touching, state.pressure[0]
+
+
 def report(name: str, side: int, run: Callable[[], tuple[list[float], list[int], list[int], Array]]) -> Array:
     """Print the row of one run."""
     times, iterations, touching, pressure = run()
@@ -137,15 +233,31 @@ def main() -> None:
     parser.add_argument("--loads", type=float, nargs="*", default=[1.0])
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--sides", type=int, nargs="*", default=[45, 70, 100])
-    arguments = parser.parse_args()
+    parser.add_argument("--way", default=None)
+    asked = parser.parse_args()
+    if asked.way:
+        way, side = asked.way, asked.sides[0]
+        found = run if way == "run" else partial(wear, way=way)
+        pressure = report(way, side, lambda: found(side, asked.steps, loads=asked.loads))
+        print(json.dumps(pressure.tolist()))
+        return
     print("| nodes | way | in contact | first step | median ms | mean ms | longest s | Newton | all steps | MiB |")
     print("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
-    for side in arguments.sides:
-        few = min(arguments.steps, 50)
-        ways = [("iterated", arguments.steps), *([("factors", few), ("dense", few)] if arguments.beside else [])]
-        last = [report(way, side, lambda: wear(side, steps, way, arguments.loads)) for way, steps in ways]  # noqa: B023
-        if arguments.beside and few == arguments.steps:
-            print(f"largest difference of pressure: {max(np.abs(p - last[0]).max() for p in last) / last[0].max():.0e}")
+    for side in asked.sides:
+        few = min(asked.steps, 50)
+        ways = [("run", asked.steps), ("iterated", asked.steps)]
+        ways += [("factors", few), ("dense", few)] if asked.beside else []
+        last = {}
+        for way, steps in ways:
+            words = ["--way", way, "--sides", side, "--steps", steps, "--loads", *asked.loads]
+            done = subprocess.run(
+                [sys.executable, __file__, *map(str, words)], check=True, capture_output=True, text=True
+            )
+            row, pressures = done.stdout.splitlines()
+            print(row.replace("iterated", "fft     "), flush=True)
+            last[way] = np.array(json.loads(pressures))
+        same = [last[way] for way, steps in ways if steps == asked.steps]
+        print(f"largest difference of pressure: {max(np.abs(p - same[0]).max() for p in same) / same[0].max():.0e}")
 
 
 if __name__ == "__main__":

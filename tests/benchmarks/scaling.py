@@ -33,7 +33,7 @@ def measure(elements: str, growth: str) -> None:
     assemble(load_case("example1"))
     comm.Barrier()
     begin, cpu = time.perf_counter(), time.process_time()
-    system = assemble(load_case("example1", parameters))
+    system = assemble(load_case("example1", parameters), fresh=True)
     spent = comm.allgather(time.process_time() - cpu)
     seconds = time.perf_counter() - begin
     memory = comm.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

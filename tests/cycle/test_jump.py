@@ -12,6 +12,7 @@ from fenwear import Case, Tribosystem, assemble, jump, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block
+from fenwear.cycle.jump import _force_difference
 from fenwear.sliding.wear import WornLayer
 
 MEAN = 1e4 / 600
@@ -135,3 +136,17 @@ def test_stops_when_periodic(assembled: Callable[..., Tribosystem]) -> None:
     *_, last = jump(assembled("example1"), 10_000_000, tolerance=3e-3, periodic_within=1e-6)
     assert last.half_cycle[-1] < 1_000_000
     assert last.periodicity[-2:].max() < 1e-6
+
+
+def test_distance_of_forces(assembled: Callable[..., Tribosystem]) -> None:
+    """The distance by which force is moved is scipy's, over the width; and what one is larger by."""
+    from scipy.stats import wasserstein_distance
+
+    system = assembled("example1", "geometry.degree=2")
+    x, weights = system.pair.x, system.pair.weights
+    random = np.random.default_rng(1)
+    one, other = (np.where(np.abs(x) < 20, random.uniform(0, 1, len(x)), 0.0) for _ in range(2))
+    forces = weights @ one, weights @ other
+    expected = wasserstein_distance(x, x, weights * one, weights * other) / np.ptp(x[(one > 0) | (other > 0)])
+    expected += abs(forces[0] - forces[1]) / max(forces)
+    assert _force_difference(system, one, other) == pytest.approx(expected, rel=1e-12)

@@ -17,6 +17,7 @@ import xarray
 from fenwear import CaseError, load_case
 from fenwear.errors import InterruptedRunError
 from fenwear.report.page import write_report
+from fenwear.report.stick import key_numbers_text
 from fenwear.run import run_case
 from fenwear.stick.results import Row, row_of
 
@@ -54,7 +55,10 @@ def test_history_holds_loops_zones_energy_and_stress(ran: tuple[dict, Path]) -> 
 
 def test_report_is_drawn_and_drawn_again(ran: tuple[dict, Path]) -> None:
     """Seven figures and a page; `plot` makes the same."""
-    _, folder = ran
+    summary, folder = ran
+    lines = key_numbers_text(summary).splitlines()
+    assert any(line.startswith("largest tangential force (N)") for line in lines)
+    assert len({len(line) for line in lines}) == 1
     names = {path.name for path in write_report(folder)}
     assert {"loops.png", "zones.png", "tractions.png", "surface_stress.png", "report.html"} <= names
     page = (folder / "report.html").read_text("utf-8")

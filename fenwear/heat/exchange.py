@@ -28,6 +28,7 @@ from fenwear.heat.field import Basis, Field, Functional, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
 
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
+LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 # What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
 OVERSHOOT, DRIFT = 0.1, 1e-3
@@ -412,7 +413,7 @@ class HeatExchange:
         """Return the map to the fluxes; kept for conductances met before."""
         key = (*kinds, conductance.tobytes())
         if key not in self._flux_maps:
-            if len(self._flux_maps) > max(20, MEMORY // (48 * len(conductance) ** 2)):
+            if len(self._flux_maps) > max(LEAST, MEMORY // (48 * len(conductance) ** 2)):
                 self._flux_maps.clear()
             self._flux_maps[key] = self._make_flux_map(kinds, conductance)
         return self._flux_maps[key]

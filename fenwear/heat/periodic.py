@@ -18,7 +18,7 @@ import scipy.linalg
 from fenwear.arrays import Array
 from fenwear.heat.exchange import HeatExchange, StepMap
 
-KEPT = 8  # cycles of different conducting nodes
+KEPT, MEMORY = 8, 5 * 10**8  # cycles of different conducting nodes that are kept, and bytes that they may take
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,9 @@ class CycleHeat:
         """Return the map of each phase, and what is there after each one of a cycle."""
         key = conductances.tobytes()
         if key not in self._maps:
-            if len(self._maps) > KEPT:
+            m, n = conductances.shape
+            each = 8 * m * (2 * self.gap_rows.shape[1] ** 2 + self.gap_rows.shape[1] * (m + 1) * n)
+            if len(self._maps) > min(KEPT, MEMORY // each):
                 self._maps.clear()
             maps = [self._phase_map(phase, conductances[phase]) for phase in range(len(conductances))]
             self._maps[key] = maps, self._passed(maps)

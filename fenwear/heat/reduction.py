@@ -3,14 +3,16 @@
 Only n fluxes go into a body, so its temperatures stay near the responses to these fluxes over all
 time scales, from a step to the steady state: a rational Krylov space with the time steps as poles.
 Its parts that matter are picked by the singular values in the norm of the heat capacity, scale by
-scale, the slowest first: of each, what lies beside the basis so far. In the end they are picked again, of all together.
+scale, the slowest first: of each, what lies beside the basis so far. Of few fluxes they are picked again
+in the end, of all scales together.
 
 Where there are many fluxes, most of them differ over a short wave length l, and warm a layer as thin as
 that for a time of l²/(4 pi² a) with the diffusivity a. What a step leaves of such fields no later one
 sees: there the singular values are those of the fields one step later, so that the basis stays as small
 on any mesh, and `ReducedField` adds what it leaves out to the contact temperature of the step itself.
 The fluxes whose fields last are found by subspace iteration from random ones, in place of all n of them
-(Halko, Martinsson and Tropp, SIAM Review 53, 2011).
+(Halko, Martinsson and Tropp, SIAM Review 53, 2011). Each scale takes them a block after the other, until one brings
+nothing new.
 """
 
 from __future__ import annotations
@@ -67,6 +69,7 @@ def reduced_basis(
         tolerance *= SHARPER
         fluxes = _lasting_fluxes(body, even, duration, tolerance, surroundings)
         later = body.step(0.0, duration, surroundings)
+    block = SOME // 4 if lasting else max(fluxes.shape[1], 1)
     scales = [duration * RATIO**k for k in range(SCALES)]
     scales += [np.inf] if body.loses_heat(mean, surroundings) else [scales[-1] * 100]
     # What is new on both sides does not average out: material that leaves is cooled on either way.
@@ -76,14 +79,17 @@ def reduced_basis(
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
         for velocity in [mean, *(moving if k < unlike else [])]:
             step = body.step(velocity, scale, surroundings)
-            basis.add(step.respond(fluxes), tolerance)
+            for begin in range(0, fluxes.shape[1], block):
+                if not basis.add(step.respond(fluxes[:, begin : begin + block]), tolerance):
+                    break  # the next ones matter less
             if np.isinf(scale):
                 lift = step.advance(np.zeros(body.owned))
             else:
                 relaxed.append(step.advance(body.initial() - lift, sources=False)[:, None])
             step.free()
-    basis.compress(tolerance)
-    if later is not None:
+    if later is None:
+        basis.compress(tolerance)
+    else:
         later.free()
     basis.start_from(body.initial() - lift, np.hstack(relaxed), tolerance)
     return ReducedBasis(body, lift, basis.columns)
@@ -110,27 +116,31 @@ class _Growing:
         self._uniform = self.columns
         self._added: list[Array] = []  # in coordinates of the basis as it was then
 
-    def add(self, fields: Array, tolerance: float) -> None:
-        """Add the principal parts of fields (owned, k) beside the basis, down to a share of the largest ever."""
+    def add(self, fields: Array, tolerance: float) -> bool:
+        """Add the principal parts of fields (owned, k) beside the basis, down to a share of the largest ever.
+
+        Returns:
+            Whether there were any.
+        """
         rest = self._beside(fields)
         felt = rest if self._later is None else self._later.advance(rest, sources=False)
         parts, values, largest = _principal(self.body, felt, tolerance, self._largest)
         self._largest = max(self._largest, largest)
         self._append(rest @ (parts / values))
-        self._added.append(total(self.body.body.mesh.comm, self.columns.T @ self.body.store(fields)))
+        if self._later is None:
+            self._added.append(total(self.body.body.mesh.comm, self.columns.T @ self.body.store(fields)))
+        return len(values) > 0
 
     def compress(self, tolerance: float) -> None:
-        """Keep the principal parts of all that was added together, and the uniform temperature."""
+        """Keep the principal parts of all that was added, and the uniform temperature; of fields as they are."""
         dim, first = self.columns.shape[1], self._uniform.shape[1]
         if dim == first:
             return
         added = np.hstack([np.pad(one, ((0, dim - len(one)), (0, 0))) for one in self._added])[first:]
         columns = self.columns[:, first:]
-        felt = columns if self._later is None else self._later.advance(columns, sources=False)
-        factor = np.linalg.cholesky(_gram(self.body, felt)).T  # the norm of x is that of factor @ x
-        parts, values, _ = np.linalg.svd(factor @ added, full_matrices=False)
+        parts, values, _ = np.linalg.svd(added, full_matrices=False)
         self.columns = self._uniform
-        self._append(columns @ np.linalg.solve(factor, parts[:, values > max(tolerance, ROUNDING) * values[0]]))
+        self._append(columns @ parts[:, values > max(tolerance, ROUNDING) * values[0]])
 
     def start_from(self, field: Array, relaxed: Array, tolerance: float) -> None:
         """Add a field (owned,) exactly, and how it dies out, fields (owned, k), to a tolerance of its own."""
@@ -165,7 +175,7 @@ class _Growing:
 def _lasting_fluxes(
     body: HeatBody, even: csc_array, duration: float, tolerance: float, surroundings: Surroundings
 ) -> Array:
-    """Return loads (owned, k) of the fluxes whose fields are felt a step later; collective.
+    """Return loads (owned, k) of the fluxes whose fields are felt a step later, the most felt first; collective.
 
     The principal ones of fields in material at rest, where they last longest. The first is nearly the mean, which
     the basis has: the second sets the scale.
@@ -197,7 +207,7 @@ def _lasting_fluxes(
             break
         tried = min(2 * tried, size)
     step.free()
-    return np.asarray(even @ (space @ vectors[:, values > least]))
+    return np.asarray(even @ (space @ vectors[:, values > least][:, ::-1]))
 
 
 def _gram(body: HeatBody, fields: Array) -> Array:

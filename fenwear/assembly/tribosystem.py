@@ -198,13 +198,17 @@ def _close(first: Array, second: Array) -> bool:
     return bool(np.abs(first - second).max() < ROUNDING)
 
 
-def with_exchange(system: Tribosystem, *, reduced: bool | None = None) -> Tribosystem:
+def with_exchange(
+    system: Tribosystem, *, reduced: bool | None = None, keep: bool = False, fresh: bool = False
+) -> Tribosystem:
     """Return the system with the heat of its motion prepared; collective.
 
     Args:
         system: With condensed bodies.
         reduced: Whether temperatures are reduced to a small basis, as whole cycles need; by default as
             the settings say.
+        keep: Whether what is reduced is kept on disk, and taken from there where it is.
+        fresh: Reduce whatever is kept.
 
     Raises:
         CaseError: with heat, half-cycles of unequal duration.
@@ -222,15 +226,17 @@ def with_exchange(system: Tribosystem, *, reduced: bool | None = None) -> Tribos
         heating_friction(system),
         system.bodies.punch.thickness,
         reduced=reduced,
+        keep=keep,
+        fresh=fresh,
     )
     return replace(system, exchange=exchange)
 
 
-def with_reduced_heat(system: Tribosystem) -> Tribosystem:
-    """Return the system with its heat on a small basis, whatever the settings say; collective."""
+def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = False) -> Tribosystem:
+    """Return the system with its heat on a small basis, whatever the settings say; see `with_exchange`; collective."""
     if system.heat is None or (system.exchange is not None and system.exchange.reduced):
         return system
-    return with_exchange(system, reduced=True)
+    return with_exchange(system, reduced=True, keep=keep, fresh=fresh)
 
 
 def preparation(system: Tribosystem) -> Preparation:

@@ -44,7 +44,7 @@ def assemble(
         followed: Worn depths that the meshes follow; by default they are as they were made.
         heat: How the heat of the motion is prepared, which takes longest: as the case sets it, reduced to a
             small basis as whole cycles need it, or not at all.
-        fresh: Condense the bodies again, even where they are kept on disk.
+        fresh: Condense the bodies and reduce their heat again, even where they are kept on disk.
         warmed: Temperatures of this rank's own nodes that the materials' properties are taken at; by default the
             initial one.
 
@@ -58,7 +58,8 @@ def assemble(
     system = elastic(place_case(case, comm, followed, warmed), fresh=fresh)
     if heat == "none":
         return system
-    return with_reduced_heat(system) if heat == "reduced" else with_exchange(system)
+    prepare = with_reduced_heat if heat == "reduced" else with_exchange
+    return prepare(system, keep=True, fresh=fresh)
 
 
 def place_case(

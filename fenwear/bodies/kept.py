@@ -106,7 +106,8 @@ def surroundings() -> str:
     from fenwear.versions import versions
 
     sources = hashlib.blake2b(digest_size=20)
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    package = Path(__file__).parents[1]
+    for path in sorted(path for room in ("bodies", "heat") for path in (package / room).glob("*.py")):
         sources.update(path.read_bytes())
     threads = (os.environ.get("OMP_NUM_THREADS"), len(os.sched_getaffinity(0)))
     return f"{sorted(versions().items())} {sources.hexdigest()} {threads}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, hstack
@@ -13,6 +14,7 @@ from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
 from fenwear.heat.field import FullField, ReducedField, contact_responses
+from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
@@ -36,6 +38,8 @@ def prepare_exchange(
     *,
     reduced: bool,
     at_rest: bool = False,
+    keep: bool = False,
+    fresh: bool = False,
 ) -> HeatExchange:
     """Return the exchange over the half-cycles of the motion; collective.
 
@@ -50,6 +54,8 @@ def prepare_exchange(
         thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
         at_rest: Whether the strip's material stays where it is, whatever the motion.
+        keep: Whether bases are kept on disk, and taken from there where they are.
+        fresh: Make them whatever is kept.
 
     Raises:
         CaseError: the half-cycles of the motion last unequally long.
@@ -79,7 +85,8 @@ def prepare_exchange(
             field = _on_track(heat, heat.track, body, steps, inflow, own, duration, around, cycle, thickness)
         elif reduced:
             lasting = contact_rows(body, pair) if len(pair.weights) > MANY else None
-            field = _reduced(body, steps, inflow, moving, duration, heat.reduction_tolerance, around, cycle, lasting)
+            tolerance, way = heat.reduction_tolerance, partial(kept_basis, fresh=fresh) if keep else made
+            field = _reduced(body, steps, inflow, moving, duration, tolerance, around, cycle, lasting, way)
         else:
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
@@ -124,18 +131,21 @@ def _reduced(
     surroundings: Surroundings,
     cycle: Sequence[int],
     lasting: csr_array | None = None,
+    way: Way = made,
 ) -> ReducedField:
     """Return the field on a basis whose cycle of steps lets every temperature die out; collective.
 
     Args:
         lasting: Temperature at the contact nodes, for a basis of what is felt a step later; None for all.
+        way: How a basis is come by: made, or taken from what is kept.
 
     Raises:
         HeatError: none does.
     """
     exact = None if lasting is None else contact_responses(steps, inflow, lasting)
     while True:
-        basis = reduced_basis(body, inflow, speeds, duration, tolerance, surroundings, lasting=lasting is not None)
+        settings = (inflow, speeds, duration, tolerance, surroundings)
+        basis = way(partial(reduced_basis, body, *settings, lasting=lasting is not None), steps)
         field = ReducedField(steps, inflow, basis, exact)
         growth = field.spectral_radius(cycle)
         if growth <= 1 + NEUTRAL:

@@ -12,6 +12,8 @@ from mpi4py import MPI
 
 from fenwear import CaseError, Tribosystem, assemble, load_case
 from fenwear.bodies import factor, kept, substructure
+from fenwear.heat import prepare
+from fenwear.heat.field import ReducedBasis
 
 SMALL = ("geometry.parameters.elements_along_contact=4", "geometry.degree=2")
 Setup = Callable[..., tuple[Tribosystem, int]]
@@ -142,3 +144,30 @@ def test_a_limit_that_is_no_number_is_named(setup: Setup, monkeypatch: pytest.Mo
     monkeypatch.setenv(kept.LIMIT, text)
     with pytest.raises(CaseError, match="FENWEAR_KEPT_GIB: expected a number of GiB, 0 to keep nothing"):
         setup()
+
+
+@pytest.mark.parametrize("change", ["", "heat.convection=90", "heat.steps=6", "motion.amplitude=1"])
+@pytest.mark.mpi
+def test_reduced_heat_is_kept_too(setup: Setup, monkeypatch: pytest.MonkeyPatch, change: str) -> None:
+    """With the same bits, and reduced again by --fresh or where conduction or motion is another."""
+    made: list[object] = []
+    reduce = prepare.reduced_basis
+    monkeypatch.setattr(
+        prepare, "reduced_basis", lambda *given, **named: (made.append(given), reduce(*given, **named))[1]
+    )
+
+    def bases(*changes: str, fresh: bool = False) -> tuple[list[bytes], int]:
+        made.clear()
+        system = assemble(load_case("example1-heat", [*SMALL, *changes]), heat="reduced", fresh=fresh)
+        assert system.exchange is not None
+        pair = [basis for basis in system.exchange.bases if isinstance(basis, ReducedBasis)]
+        return [part.tobytes() for basis in pair for part in (basis.lift, basis.columns)], len(made)
+
+    first, _ = bases()
+    changed, count = bases(*([change] if change else []))
+    assert (count == 0) == (not change)
+    monkeypatch.setenv(kept.LIMIT, "0")
+    again, _ = bases(*([change] if change else []))
+    assert changed == again
+    monkeypatch.setenv(kept.LIMIT, "1")
+    assert bases(fresh=True) == (first, 2)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
+from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case
 from fenwear.case.program import read_program, stages_of
 from fenwear.cycle import Block, Span, follow_program
 from fenwear.errors import CaseError
@@ -144,6 +144,19 @@ def test_goes_on_from_any_half_cycle(edited: Edited) -> None:
     assert part.half_cycle[-1] == 7
     rest = list(follow_program(system, marched, 20, part.end))[-1]
     np.testing.assert_allclose(rest.wear[-1], whole.wear[-1], rtol=1e-12)
+
+
+def test_a_run_goes_on_within_a_ramp(edited: Edited, tmp_path: Path) -> None:
+    """Resumed from its checkpoint within a ramp, a run has the history of the one that was not ended."""
+    steps = [{"cycles": 3, "load": ["5 kN", "10 kN"]}, {"cycles": 2, "amplitude": "2 mm"}]
+    whole = edited("example1", steps_of(steps), *SMALL, "output.report=false", "output.fields_at=[]")
+    part = whole.model_copy(update={"run": whole.run.model_copy(update={"half_cycles": 3})})
+    for name, case, resume in (("whole", whole, False), ("part", part, False), ("part", whole, True)):
+        run_case(case, name, tmp_path / name, lambda message: None, resume=resume, progress="none")
+    one, other = (read_history(tmp_path / name) for name in ("whole", "part"))
+    assert other.sizes == one.sizes
+    for name in ("wear", "pressure", "load", "time", "sliding_distance", "total_volume", "friction_work"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-10, err_msg=name)
 
 
 @pytest.mark.parametrize(

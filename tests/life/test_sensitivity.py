@@ -123,3 +123,33 @@ def test_what_makes_no_sense_is_refused(small: Callable[..., Case], quantity: st
     case = small("example2") if "depth" not in quantity else small("example2", "wear.punch.coefficient=0.0")
     with pytest.raises(CaseError, match=expected):
         sensitivity(case, [quantity], [key], spread=0)
+
+
+@pytest.mark.parametrize(
+    ("law", "keys", "method"),
+    [
+        ("coefficient={expression='2e-8 * (1 + x / 100)', unit='1/MPa'}", ("contact.friction",), "implicit"),
+        (
+            "coefficient={regions={punch_lower=2e-8, punch_upper=1e-8}, unit='1/MPa'}",
+            ("wear.punch.coefficient.regions.punch_lower", "contact.friction"),
+            "implicit",
+        ),
+        ("pressure_cap='60 MPa'", ("contact.friction", "wear.punch.pressure_cap"), "differences"),
+    ],
+)
+def test_laws_that_vary(small: Callable[..., Case], law: str, keys: tuple[str, ...], method: str) -> None:
+    """Place, region and cap: within 1e-3 of central differences, implicitly only where the equations hold."""
+    case = small("example1", f"wear.punch.{law}")
+    found = sensitivity(case, ["steady pressure at 12 mm"], keys, spread=0, comm=MPI.COMM_SELF)[0]
+    for row in found.derivatives:
+        assert row.method == method
+        expected = central(case, "steady pressure at 12 mm", row.key, row.key_value)
+        assert row.derivative == pytest.approx(expected, rel=1e-3, abs=1e-5 * abs(found.value / row.key_value))
+
+
+@pytest.mark.parametrize("of", ["depth", "s"])
+def test_laws_that_pass_are_refused(small: Callable[..., Case], of: str) -> None:
+    """What changes with depth or distance is not followed here, and says so."""
+    law = f"wear.punch.coefficient={{table=[[0, 1e-8], [1, 2e-8]], of='{of}', unit='1/MPa'}}"
+    with pytest.raises(CaseError, match=r"wear.punch.coefficient: depends on the worn depth or the distance slid"):
+        sensitivity(small("example1", law), ["steady lambda_F"], ["contact.friction"], spread=0, comm=MPI.COMM_SELF)

@@ -8,7 +8,7 @@ the equilibrium of force and moment (7), (18) by Newton's method. For a tilting 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import RigidEquilibrium
 
+MOVES = {"lambda_F": "move along z", "lambda_M": "tilt", "lambda_Mx": "tilt about x", "lambda_My": "tilt about y"}
 TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
 
 
@@ -52,23 +53,39 @@ def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) 
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
 
     Raises:
-        CaseError: the loads would lift the punch or tip it over.
+        CaseError: the loads would lift the punch or tip it over, or push a strip away that is not held.
     """
     rows = rigid.equilibrium(friction_ratio)
     scale = np.abs(rows).max(axis=1, initial=1e-300)
     target = -rigid.resultant / scale
     size = np.abs(target).max(initial=0.0)
-    # Not scipy 1.15's nnls: it stops before the solution of such a wide system.
-    if len(target) and (
-        size == 0 or linprog(np.zeros(rows.shape[1]), A_eq=rows / scale[:, None], b_eq=target / size).status
-    ):
-        raise CaseError(
-            InputError(
-                "punch.loads",
-                f"no pressure on the contact balances the loads in {way} sliding: the punch lifts off or tips over; "
-                "expected a load that presses on it between the contact's edges, friction included",
-            )
+
+    def balanced(modes: Sequence[int]) -> bool:
+        # Not scipy 1.15's nnls: it stops before the solution of such a wide system.
+        a, b = rows[modes] / scale[modes, None], target[modes] / size
+        return linprog(np.zeros(rows.shape[1]), A_eq=a, b_eq=b).status == 0
+
+    every, punch = list(range(len(target))), list(range(rigid.of_punch))
+    if not every or (size > 0 and balanced(every)):
+        return
+    beginning = f"no pressure on the contact balances the loads in {way} sliding: "
+    if size > 0 and balanced(punch):
+        loose = [k for k in every[rigid.of_punch :] if not balanced([*punch, k])] or every[rigid.of_punch :]
+        freely = " and to ".join(MOVES[rigid.mode_names[k]] for k in loose)
+        message = f"{beginning}the strip is free to {freely}, and the punch pushes it away; hold it against that"
+        raise CaseError(InputError("strip.supports", message))
+    tips = []
+    if size > 0 and balanced(punch[:1]):
+        tips = [k for k in punch[1:] if not balanced([*punch[:1], k])] or punch[1:]
+    how = " and to ".join(MOVES[rigid.mode_names[k]] for k in tips)
+    what = f"the punch tips over, free to {how}" if tips else "the punch lifts off"
+    raise CaseError(
+        InputError(
+            "punch.loads",
+            f"{beginning}{what}; expected a load that presses on it between the contact's edges, friction included"
+            + (", or supports against tilting" if tips else ""),
         )
+    )
 
 
 def optimum(

@@ -18,7 +18,9 @@ DefineConstant[
   pad_layers = 2,         // elements over the height
   plate_layers = 1,
   disc_layers = 2,
-  growth = 1              // of an element's height over that of its neighbour towards the contact
+  growth = 1,             // of an element's height over that of its neighbour towards the contact
+  edge_grading = 1,       // of an element's width in the pad's middle over that at its sides
+  margin_growth = 1       // of an element's width over that of its neighbour towards the pad, in the disc's margins
 ];
 
 If(inner_radius <= 0 || outer_radius <= inner_radius || pad_height <= 0 || disc_height <= 0)
@@ -33,8 +35,11 @@ EndIf
 If(margin < 0 || margin >= inner_radius)
   Error("margin must lie between 0 and inner_radius");
 EndIf
-If(across < 1 || along < 1 || margin_elements < 1 || pad_layers < 1 || disc_layers < 1 || growth <= 0)
-  Error("across, along, margin_elements, pad_layers and disc_layers must be at least 1, growth positive");
+If(across < 1 || along < 1 || margin_elements < 1 || pad_layers < 1 || disc_layers < 1)
+  Error("across, along, margin_elements, pad_layers and disc_layers must be at least 1");
+EndIf
+If(growth <= 0 || edge_grading <= 0 || margin_growth <= 0)
+  Error("growth, edge_grading and margin_growth must be positive");
 EndIf
 
 For body In {0 : 1}
@@ -77,7 +82,13 @@ For body In {0 : 1}
     For j In {0 : my - 1}
       For i In {0 : mx - 2}
         l = newl; Line(l) = {p[i + mx * (j + my * k)], p[i + 1 + mx * (j + my * k)]};
-        Transfinite Curve{l} = nx[i] + 1;
+        If(x[i] == inner_radius && edge_grading != 1)
+          Transfinite Curve{l} = nx[i] + 1 Using Bump 1 / edge_grading;
+        ElseIf(x[i] == inner_radius)
+          Transfinite Curve{l} = nx[i] + 1;
+        Else
+          Transfinite Curve{l} = nx[i] + 1 Using Progression (x[i] < inner_radius) ? 1 / margin_growth : margin_growth;
+        EndIf
         lx[] += l;
       EndFor
     EndFor

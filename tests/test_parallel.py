@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable
 
 import numpy as np
@@ -61,3 +62,25 @@ def test_on_root() -> None:
 
     with pytest.raises(CaseError, match="key: on rank 0"):
         on_root(COMM, fail)
+
+
+FEW = """
+from mpi4py import MPI
+from fenwear import assemble, load_case
+
+changes = ("elements_along_contact=2", "growth=8")
+case = load_case("example1", ["geometry.degree=2", *(f"geometry.parameters.{change}" for change in changes)])
+together, alone = assemble(case), assemble(case, MPI.COMM_SELF)
+cells = together.bodies.punch.body.mesh.topology.index_map(2)
+assert cells.size_global < together.comm.size
+assert 0 in together.comm.allgather(cells.size_local)
+found, expected = (s.contact((1,)).solve(s.pair.initial_gap).pressure for s in (together, alone))
+assert abs(found - expected).max() <= 1e-9 * expected.max()
+"""
+
+
+@pytest.mark.slow
+def test_more_ranks_than_cells(run_python: Callable[..., subprocess.CompletedProcess[str]]) -> None:
+    """Some have none, and all have the same pressures as one alone."""
+    done = run_python("-m", "mpi4py", "-c", FEW, ranks=5)
+    assert done.returncode == 0, done.stderr

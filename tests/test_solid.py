@@ -62,6 +62,23 @@ def test_too_few_supports(settings: list[str], message: str) -> None:
         place_case(load_case("pin-on-disc", [*COARSE, "geometry.parameters.around=2", *settings]))
 
 
+@pytest.mark.parametrize(("name", "settings", "message"), [
+    ("pin-on-disc", "strip.supports=[{on='strip_sides', fix=['x', 'y']}]",
+     r"strip\.supports: .* counterclockwise sliding: the strip is free to move along z, and the punch pushes it away"),
+    ("pin-on-disc", "strip.supports=[{on='strip_bottom', fix=['x', 'y']}]",
+     "the strip is free to move along z and to tilt about x and to tilt about y, and"),
+    ("ring-on-ring", "strip.supports=[]", r"strip\.supports: .* the strip is free to move along z, and"),
+    ("pin-on-disc", "contact.friction=0.5", r"punch\.loads: .* the punch tips over, free to tilt about x; expected"),
+    ("pin-on-disc", "punch.loads=[{on='punch_top', force=[0, 0, 100]}]", r"punch\.loads: .* the punch lifts off; exp"),
+    ("ball-on-flat", "motion.along=[0, 0, 1]", r"motion\.along: .* out of the contact: .* any way at right angles"),
+    ("ball-on-flat", "motion.along=[1, 0, 1]", r"motion\.along: .* out of the contact: along it is \(0\.707, 0, 0\)"),
+])  # fmt: skip
+def test_what_nothing_balances(name: str, settings: str, message: str) -> None:
+    """The body at fault is named, the modes in which it would go, and the key."""
+    with pytest.raises(CaseError, match=message):
+        place_case(load_case(name, [*COARSE, settings]))
+
+
 def test_friction_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> None:
     """The traction on the pin is mu across the arm from the disc's axis, the other way if it turns back."""
     system = assembled("pin-on-disc", *COARSE)

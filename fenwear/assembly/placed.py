@@ -189,6 +189,11 @@ class Placed:
         return tuple(rigid.pair for rigid in self.rigids)
 
     @property
+    def direction_words(self) -> dict[int, str]:
+        """The words for the two directions d of the sliding, 1 first."""
+        return self.sliding.field.words(self.pair.punch.dim)
+
+    @property
     def strip_wears(self) -> bool:
         """Whether the strip has a wear law."""
         return self.sliding.wear[1] is not None
@@ -449,12 +454,20 @@ def place(
         rigid=rigid,
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        check_equilibrium(one, sliding.field.words[phase.direction], ratio)
+        check_equilibrium(one, placed.direction_words[phase.direction], ratio)
     return placed
 
 
 def _check_axis(middle: ContactPair, sliding: Sliding) -> None:
-    """Raise where a strip that turns in place is no body of revolution about the axis."""
+    """Raise where a strip that turns in place is none of revolution about the axis, or a moving one leaves contact."""
+    along = np.array(sliding.field.shift)
+    if middle.punch.dim == 3 and along.any():
+        normal = middle.weights @ middle.normal
+        out = abs(along @ normal) / np.linalg.norm(normal)
+        if out > OUT_OF_SURFACE:
+            way = ", ".join(f"{part:.3g}" for part in along - (along @ normal) / (normal @ normal) * normal + 0.0)
+            hint = f"along it is ({way})" if out < 1 - OUT_OF_SURFACE else "along it is any way at right angles to that"
+            raise CaseError(InputError("motion.along", f"the strip would move out of the contact: {hint}"))
     if not any(sliding.field.turn) or sliding.motion.reach > 0:
         return
     velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)

@@ -97,7 +97,7 @@ class Trace:
         """
         components = self._block_size
         picked = np.zeros((len(self.blocks), components, fields.shape[1]))
-        picked[self.own] = fields.reshape(self._size, components, -1)[self.local]
+        picked[self.own] = fields.reshape(self._size, components, fields.shape[1])[self.local]
         self._comm.Allreduce(MPI.IN_PLACE, picked, op=MPI.SUM)  # each node has one owner: exact
         return picked
 
@@ -105,7 +105,7 @@ class Trace:
         """Return loads at the trace nodes (N, components, k) on the owned degrees of freedom (owned, k)."""
         placed = np.zeros((self._size, *loads.shape[1:]))
         placed[self.local] = loads[self.own]
-        return placed.reshape(self._size * self._block_size, -1)
+        return placed.reshape(self._size * self._block_size, loads.shape[2])
 
     @cached_property
     def rows(self) -> csr_array:

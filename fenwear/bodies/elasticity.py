@@ -280,7 +280,7 @@ class ElasticBody:
         else:
             turns = np.stack([np.cross(axis, arm) for axis in np.eye(3)], axis=2)
         shifts = np.broadcast_to(np.eye(dim), (owned, dim, dim))
-        return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, -1)
+        return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, dim + turns.shape[2])
 
     def _free_modes(self, supports: list[fem.DirichletBC]) -> tuple[list[NDArray[np.float64]], list[str]]:
         """Return the rigid modes that the supports leave, and their names.

@@ -100,9 +100,9 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
 
     print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
-    words = system.sliding.field.words
+    words, moves = system.direction_words, "turns" if any(system.sliding.field.turn) else "moves"
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
-        print(f"  strip moves {words[d]:9} largest pressure {p.max():8.3f} MPa, "
+        print(f"  strip {moves} {words[d]:9} largest pressure {p.max():8.3f} MPa, "
               f"contact {part.format(width)}")  # fmt: skip
     if conforming(system.pair):
         print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
@@ -145,7 +145,7 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
     from fenwear.assembly import place_case
 
     system = place_case(load(case, settings))
-    found = {name: system.optimum(d) for d, name in reversed(system.sliding.field.words.items())}
+    found = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
     if as_json:
         x = system.pair.x.tolist()
         print_json(

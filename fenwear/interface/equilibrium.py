@@ -24,12 +24,14 @@ class RigidEquilibrium:
         motion: m (n, d, modes), the motion of the punch's surface against the strip's by each rigid mode.
         resultant: F = R^T f of the loads (modes,), N/mm and N; in a solid N and N mm.
         mode_names: Names of the rigid modes, lambda_F and lambda_M for a tilting punch.
+        of_punch: How many of them are the punch's; they come first.
     """
 
     pair: ContactPair
     motion: Array
     resultant: Array
     mode_names: tuple[str, ...]
+    of_punch: int
 
     @cached_property
     def rigid_normal(self) -> Array:
@@ -70,4 +72,5 @@ def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody)
         np.concatenate([of_punch, -of_strip], axis=2),
         np.concatenate([punch.rigid_resultant, strip.rigid_resultant]),
         (*punch.mode_names, *strip.mode_names),
+        len(punch.mode_names),
     )

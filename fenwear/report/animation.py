@@ -12,7 +12,16 @@ import xarray
 from fenwear.report.course import directions_present, is_conforming, mean_pressure
 from fenwear.report.figures import FOLDER, read_history
 from fenwear.report.shapes import surfaces_of, worn_range
-from fenwear.report.style import BODY_COLOURS, DIRECTIONS, contact_axis, legend_beside, level_line, panels, save_gif
+from fenwear.report.style import (
+    BODY_COLOURS,
+    contact_axis,
+    direction_style,
+    legend_beside,
+    level_line,
+    panels,
+    save_gif,
+    strip_moves,
+)
 from fenwear.report.surface import model_of
 from fenwear.report.surface_animation import SurfaceFrames
 
@@ -42,14 +51,14 @@ class HistoryFrames:
         self.figure, (self._above, *below) = panels(1 + len(self._surfaces), 2.4)
         self._pressure = {}
         for d in directions_present(history):
-            name, dashes, colour = DIRECTIONS[d]
+            name, dashes, colour = direction_style(history, d)
             (self._pressure[d],) = self._above.plot([], [], dashes, color=colour, label=name)
         self._above.set_ylabel("contact pressure (MPa)")
         # Late states fill the axis; it grows for the peaks of the first ones.
         self._late = float(history.pressure.sel(half_cycle=list(half_cycles[len(half_cycles) // 2 :])).max())
         if is_conforming(history):
             level_line(self._above, mean_pressure(history), "mean")
-        legend_beside(self._above, "strip moves")
+        legend_beside(self._above, strip_moves(history))
         self._depths = {}
         for ax, (body, (_, depth, _)) in zip(below, self._surfaces.items(), strict=True):
             (self._depths[body],) = ax.plot([], [], color=BODY_COLOURS[body])

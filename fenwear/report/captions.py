@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray
 
-from fenwear.report.style import Look
+from fenwear.report.style import Look, direction_words, strip_moves
 from fenwear.report.surface import model_of
 from fenwear.results.sheet import BODIES
 
@@ -16,7 +16,7 @@ TEXTS = {
     "shape": "Worn depth of {bodies} along the contact at {chosen}.",
     "wear_map": "Worn depth of {bodies} over the position along the contact and the {axis}.",
     "pressure": "Contact pressure along the contact at {chosen}: {panels}. First "
-    "states far beyond all later ones have the last panel, dashed where the strip moves leftward.",
+    "states far beyond all later ones have the last panel, dashed where the strip {back}.",
     "mean_pressure": "Mean of the pressures in the two directions of a cycle along the contact.",
     "peaks": "Largest contact pressure and width in contact{hot}, for each sliding direction, over the {axis}.",
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
@@ -66,7 +66,9 @@ def caption(name: str, history: xarray.Dataset, look: Look) -> str:
     if name not in TEXTS or model_of(history) != "plane":
         return OF_SURFACES.get(name, name.replace("_", " "))
     bodies = [body for body, end in BODIES.items() if f"wear{end}" in history]
-    ways = {1: "the strip moving rightward", -1: "the strip moving leftward"}
+    words, moves = direction_words(history), strip_moves(history)
+    moving = "turning" if "turns" in moves else "moving"
+    ways = {d: f"the strip {moving} {word}" for d, word in words.items()}
     present = [text for d, text in ways.items() if bool((history.direction == d).any())]
     panels = ", ".join(f"({letter}) {text}" for letter, text in zip("ab", present, strict=False))
     if len(present) == 1:
@@ -79,5 +81,6 @@ def caption(name: str, history: xarray.Dataset, look: Look) -> str:
         panels=panels,
         axis=axis,
         hot=" and largest temperature of the contact surfaces" if "max_temperature" in history else "",
+        back=f"{moves.removeprefix('strip ')} {words[-1]}",
         last=f"{int(history.half_cycle[-1]):,}",
     )

@@ -17,7 +17,15 @@ from fenwear.report.course import directions_present, mark_few
 from fenwear.report.figures import read_history
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.shapes import worn_range
-from fenwear.report.style import DIRECTIONS, contact_axis, legend_beside, panels, run_style
+from fenwear.report.style import (
+    DIRECTIONS,
+    contact_axis,
+    direction_words,
+    legend_beside,
+    panels,
+    run_style,
+    strip_moves,
+)
 from fenwear.report.surface import model_of
 from fenwear.results.degrees import in_kelvin
 from fenwear.results.disk import writing
@@ -186,7 +194,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
         strip.set_ylim(bottom=0)
         strip.set_xlabel("position along the strip x (mm)")
     for ax, d in zip(pressures, present, strict=True):
-        ax.set_title(f"Pressure at the end, strip moves {DIRECTIONS[d][0]}", loc="left")
+        ax.set_title(f"Pressure at the end, {strip_moves(runs[0][1])} {direction_words(runs[0][1])[d]}", loc="left")
         ax.set_ylabel("pressure p (MPa)")
     for ax in (shape, *pressures):
         ax.set_ylim(bottom=0)

@@ -18,6 +18,7 @@ from fenwear.report.style import (
     level_line,
     panels,
     run_style,
+    strip_moves,
 )
 from fenwear.results.history import HEAT_TERMS
 from fenwear.results.sheet import BODIES
@@ -47,9 +48,9 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         level_line(axes[1], nominal_width(history), f"nominal {nominal_width(history):.4g}")
     for ax in axes[:2]:
         ax.set_ylim(bottom=0)
-        legend_beside(ax, "strip moves")
+        legend_beside(ax, strip_moves(history))
     if hot:
-        legend_beside(axes[2], "strip moves")
+        legend_beside(axes[2], strip_moves(history))
     run_axis(axes[-1], history, look)
     return figure
 
@@ -61,7 +62,7 @@ def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure
     for ax, (name, label) in zip(axes, over.items(), strict=True):
         by_direction(ax, history, name, look)
         ax.set_ylabel(label)
-        legend_beside(ax, "strip moves")
+        legend_beside(ax, strip_moves(history))
     axes[0].set_yscale("log")
     axes[1].set_ylim(bottom=0)
     run_axis(axes[-1], history, look)

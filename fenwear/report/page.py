@@ -202,10 +202,11 @@ def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
     sheet = {p: v for p, v in numbers.items() if p.partition(".")[0] in ("sliding", *BODIES) and "[" not in p}
     tables = [_sheet_table(name, sheet) for name in ("sliding", *BODIES) if name in summary]
     tables.append(_table("The run", single))
-    for d in ("rightward", "leftward", "forward", "backward"):
+    for d in ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise"):
         if d in summary:
             inside = {p: v for p, v in numbers.items() if p.startswith(f"{d}.") and "[" not in p}
-            tables.append(_table(f"Last half-cycle with the strip moving {d}", inside, cut=len(d) + 1))
+            moving = "turning" if "clockwise" in d else "moving"
+            tables.append(_table(f"Last half-cycle with the strip {moving} {d}", inside, cut=len(d) + 1))
     return tables
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
 from fenwear.report.solid_pictures import draw_solids
-from fenwear.report.style import FORWARD, further, save_gif
+from fenwear.report.style import direction_words, further, save_gif, strip_moves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -226,9 +226,11 @@ def bodies_figure(data: xarray.Dataset, field: str, view: View, image: NDArray[n
     ax.set_title(
         f"{name[:1].upper()}{name[1:]}, half-cycle {half_cycle:,}: displacement and wear × {view.factor:,g}", loc="left"
     )
-    moves = "strip moves rightward →" if direction > 0 else "← strip moves leftward"
-    if rings:
-        moves = f"strip turns {FORWARD[direction]}"
+    moves = f"{strip_moves(data)} {direction_words(data)[direction]}"
+    if "turns" in moves:  # its axis points away from who looks at a plane
+        moves += "" if rings else " (seen against its axis)"
+    else:
+        moves = f"{moves} →" if direction > 0 else f"← {moves}"
     middle = (view.box[0] + view.box[1]) / 2
     plate = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8}
     ax.text(middle, view.box[2] + 0.06 * (view.box[3] - view.box[2]), moves, ha="center", bbox=plate)

@@ -23,10 +23,9 @@ BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 # After Okabe and Ito, without what fades on white paper; the dashes tell them apart in black and white.
 COLOURS = (BLUE, RED, GREEN, "#AA4499", "#000000", "#8C6D00", "#117A8B")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
-DIRECTIONS = {1: ("rightward", "-", BLUE), -1: ("leftward", "--", RED)}
+DIRECTIONS = {1: ("rightward", "-", BLUE), -1: ("leftward", "--", RED)}  # of plane models whose strip does not turn
 BODY_COLOURS = {"punch": BLUE, "strip": RED}
 LIGHTEST = 0.72  # of viridis: what is lighter fades on white
-FORWARD = {1: "forward", -1: "backward"}  # of solids and rings: along or around
 ALONG_CONTACT = "position along the contact x (mm)"
 AXES = {"cycles": ("cycles", "cycle"), "distance": ("sliding distance (m)", "sliding distance (m)"),
         "time": ("time (s)", "time (s)")}  # fmt: skip
@@ -76,8 +75,20 @@ STANDARD = Look()
 
 def direction_style(history: xarray.Dataset, direction: int) -> tuple[str, str, str]:
     """Return name, dashes and colour of a sliding direction in a run."""
-    name, dashes, colour = DIRECTIONS[direction]
-    return (name if history.attrs.get("model", "plane") == "plane" else FORWARD[direction]), dashes, colour
+    _, dashes, colour = DIRECTIONS[direction]
+    return direction_words(history)[direction], dashes, colour
+
+
+def direction_words(data: xarray.Dataset) -> dict[int, str]:
+    """Return the words for the two directions of the sliding, of a history or of fields."""
+    usual = "rightward leftward" if data.attrs.get("model", "plane") == "plane" else "forward backward"
+    first, second = str(data.attrs.get("directions", usual)).split()
+    return {1: first, -1: second}
+
+
+def strip_moves(data: xarray.Dataset) -> str:
+    """Return what the strip does, of a history or of fields: it moves, or it turns."""
+    return "strip turns" if "clockwise" in direction_words(data).values() else "strip moves"
 
 
 def panels(

@@ -32,6 +32,7 @@ from fenwear.report.style import (
     reference_line,
     run_style,
     shades,
+    strip_moves,
 )
 from fenwear.report.surface import model_of, radial
 
@@ -95,7 +96,7 @@ def series_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         ax.set_ylabel(f"temperature ({temperature_unit(history)})")
     for ax in axes[:4]:
         ax.set_ylim(bottom=0)
-    legend_beside(pressure, "strip moves")
+    legend_beside(pressure, strip_moves(history))
     run_axis(axes[-1], history, look)
     return figure
 
@@ -122,7 +123,7 @@ def ring_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) ->
         for colour, n in shades(nearest_half_cycles(one_way, half_cycles)):
             ax.plot(x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
         name, *_ = direction_style(history, d)
-        ax.set_title(f"Contact pressure while the strip turns {name}", loc="left")
+        ax.set_title(f"Contact pressure while the {strip_moves(history)} {name}", loc="left")
         ax.set_ylabel("contact pressure p (MPa)")
         ax.set_ylim(0, pressure_top(history, half_cycles))
         if is_conforming(history):  # named in the legend: lines that wear evenly run along it

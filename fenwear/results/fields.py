@@ -251,6 +251,7 @@ def write_fields(
         data.update(_groups(elastic))
     time = float(system.time(np.array(half_cycle)))
     attributes = {"half_cycle": half_cycle, "direction": direction, "time": time, **_frame(system)}
+    attributes["directions"] = " ".join(system.direction_words.values())
     data.update(_contact_surfaces(system, worn, pressure))
     _in_degrees(data, system)
     import xarray  # with pandas, half a second that runs without fields spare themselves

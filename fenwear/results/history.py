@@ -37,7 +37,11 @@ INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, g
 VARIABLES = {
     "half_cycle": (("half_cycle",), "1", "number of the half-cycle"),
     "time": (("half_cycle",), "s", "time at the end of the half-cycle"),
-    "direction": (("half_cycle",), "1", "sliding direction of the strip: 1 rightward, -1 leftward"),
+    "direction": (
+        ("half_cycle",),
+        "1",
+        "sliding direction of the strip: 1 rightward or counterclockwise, -1 leftward or clockwise",
+    ),
     "pressure": (("half_cycle", "x"), "MPa", "contact pressure during the half-cycle"),
     "gap": (("half_cycle", "x"), "mm", "gap between punch and strip during the half-cycle"),
     "wear": (("half_cycle", "x"), "mm", "worn depth of the punch at the end of the half-cycle"),
@@ -221,6 +225,7 @@ class HistoryWriter:
             file.attrs["title"] = system.case.title or "fenwear run"
             file.attrs["Conventions"] = "CF-1.11"
             file.attrs["case"] = system.case.to_toml()
+            file.attrs["directions"] = " ".join(system.direction_words.values())  # of d = 1 and d = -1
             file.attrs["conforming"] = int(conforming(system.pair))
             file.attrs["versions"] = json.dumps(versions())
             sizes = self._sizes()
@@ -412,7 +417,7 @@ def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
         "x_mm": places.tolist(),
         "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
         **{
-            {1: "rightward", -1: "leftward"}[int(d)]: {
+            system.direction_words[int(d)]: {
                 "half_cycle": int(last.half_cycle[-phases:][i]),
                 "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
                 "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
@@ -438,7 +443,7 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     return {
         **mean,
         **{
-            {1: "forward", -1: "backward"}[int(d)]: {
+            system.direction_words[int(d)]: {
                 "half_cycle": int(number),
                 "max_pressure_MPa": float(pressure.max()),
                 "mean_pressure_MPa": float(pair.weights @ pressure / max(area, 1e-300)),

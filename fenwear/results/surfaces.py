@@ -42,7 +42,11 @@ RENAMED = {
     "worn_area_strip": ("worn_volume_strip", "mm3", "volume worn off the strip in the half-cycle"),
     "weight": ("weight", "mm2", "area that each contact node stands for, on the mesh of the half-cycle"),
     "weight_strip": ("weight_strip", "mm2", "area that each node stands for, on the mesh of the half-cycle"),
-    "direction": ("direction", "1", "sliding direction of the strip: 1 forward, along or around; -1 backward"),
+    "direction": (
+        "direction",
+        "1",
+        "sliding direction of the strip: 1 forward or counterclockwise, -1 backward or clockwise",
+    ),
 }
 DIMENSIONS = {"x": "node", "x_strip": "node_strip"}
 

@@ -53,10 +53,14 @@ class SlidingField:
         still = size <= 1e-12 * size.max(initial=1e-300)
         return np.where(still, 0.0, tangential / np.where(still, 1.0, size))
 
-    @property
-    def words(self) -> dict[int, str]:
-        """The words for the two directions d of the sliding, 1 first; turns are seen against their axis."""
-        return {1: "rightward", -1: "leftward"} if self.turn == ZERO else {1: "counterclockwise", -1: "clockwise"}
+    def words(self, dim: int) -> dict[int, str]:
+        """Return the words for the two directions d of the sliding in d dimensions, 1 first.
+
+        Turns are seen against their axis; forward in a solid is along the direction of the motion.
+        """
+        if self.turn != ZERO:
+            return {1: "counterclockwise", -1: "clockwise"}
+        return {1: "rightward", -1: "leftward"} if dim == 2 else {1: "forward", -1: "backward"}
 
     def placement(self, amount: float) -> Placement:
         """Return where the counter-body is after this amount of the motion, mm or rad."""

@@ -41,7 +41,11 @@ MEANINGS = {
     "x": Meaning(("node",), "mm", "position along the contact"),
     "y": Meaning(("node",), "mm", "position across the contact"),
     "weight": Meaning(("node",), SIZE, "part of the contact that a node stands for"),
-    "direction": Meaning(("half_cycle",), "", "sliding direction of the strip, 1 rightward and -1 leftward"),
+    "direction": Meaning(
+        ("half_cycle",),
+        "",
+        "sliding direction of the strip, 1 rightward or counterclockwise and -1 leftward or clockwise",
+    ),
     "pressure": Meaning(("half_cycle", "node"), "MPa", "contact pressure in the middle of the half-cycle"),
     "largest_pressure": Meaning(("half_cycle",), "MPa", "largest contact pressure"),
     "mean_pressure": Meaning((), "MPa", "load over the whole contact"),

@@ -118,7 +118,7 @@ def _pressed(x: Array, spacing: float, load: float, gap: Array) -> RigidEquilibr
         for body, outward in (("punch", -up), ("strip", up))
     )
     pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, gap)
-    return RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",))
+    return RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",), of_punch=1)
 
 
 def _squares(x: Array, spacing: float) -> NDArray[np.int64]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenwear import assemble, jump, make_case, steady
+from fenwear import assemble, jump, load_case, make_case, steady
 from fenwear.case.templates import fill_in, find_template, template_names, write_case_of
 from fenwear.errors import CaseError
 
@@ -58,6 +58,13 @@ def test_usual_values() -> None:
     pin = case_of("pin-on-disc")
     distance = pin.run.half_cycles * pin.motion.duration * pin.motion.angular_speed * 16.0
     assert distance == pytest.approx(1e6, rel=1e-4)
+
+
+def test_the_pad_is_the_built_in_case() -> None:
+    """One truth of a brake pad: its usual dimensions make the built-in case."""
+    made, built_in = case_of("brake-pad").resolved(), load_case("brake-pad").resolved()
+    assert made.pop("title") != built_in.pop("title")
+    assert made == built_in
 
 
 def test_what_is_wrong(tmp_path: Path) -> None:

@@ -274,4 +274,4 @@ def test_compared(folders: dict[str, Path], tmp_path: Path, names: list[str], li
     assert len(figure.axes) == lines + 2
     assert all(len(ax.get_lines()) == 2 for ax in figure.axes)
     assert draw_comparison(found, tmp_path / "both.png").stat().st_size > 10_000
-    assert "forward.max_pressure_MPa" in found.numbers
+    assert "counterclockwise.max_pressure_MPa" in found.numbers

@@ -25,6 +25,8 @@ SETTINGS = {
     "ring-on-ring": (*NO_PICTURES, "geometry.degree=2", "geometry.parameters.across=4"),
 }
 NAMES = sorted(SETTINGS)
+SIZES = {"across": 2, "along": 3, "pad_layers": 1, "disc_layers": 2}
+SETTINGS["brake-pad"] = (*COARSE, *(f"geometry.parameters.{name}={value}" for name, value in SIZES.items()))
 
 
 def run(folder: Path, name: str, *settings: str, resume: bool = False) -> tuple[xarray.Dataset, dict[str, Any]]:
@@ -78,8 +80,9 @@ def test_history(tmp_path: Path, name: str) -> None:
     across = data.r if "r" in data else data.across
     reach = np.ptp(across.values[worn.values])
     assert reach <= data.scar_width[-1] <= reach + 2 * np.diff(np.unique(across.values.round(6))).max()
-    assert {"forward"} <= set(summary)
-    assert summary["forward"]["mean_pressure_MPa"] * summary["forward"]["contact_area_mm2"] == pytest.approx(load)
+    last = summary["forward" if name == "ball-on-flat" else "counterclockwise"]
+    assert last["mean_pressure_MPa"] * last["contact_area_mm2"] == pytest.approx(load)
+    assert data.attrs["directions"] == ("forward backward" if name == "ball-on-flat" else "counterclockwise clockwise")
     assert ("mean_pressure_MPa" in summary) == (name != "ball-on-flat")
 
 
@@ -96,7 +99,13 @@ def test_worn_strip(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "integration"),
-    [("pin-on-disc", "explicit"), ("pin-on-disc", "jump"), ("ball-on-flat", "jump"), ("ring-on-ring", "implicit")],
+    [
+        ("pin-on-disc", "explicit"),
+        ("pin-on-disc", "jump"),
+        ("ball-on-flat", "jump"),
+        ("ring-on-ring", "implicit"),
+        ("brake-pad", "jump"),
+    ],
 )
 def test_resumed_equals_whole(tmp_path: Path, name: str, integration: str) -> None:
     """A run that goes on from its checkpoint comes to the same numbers; jumps are cut where they end anyway."""
@@ -105,7 +114,10 @@ def test_resumed_equals_whole(tmp_path: Path, name: str, integration: str) -> No
     run(tmp_path / "halves", name, *how, "run.half_cycles=8")
     halves, _ = run(tmp_path / "halves", name, *how, "run.half_cycles=20", resume=True)
     whole, _ = run(tmp_path / "whole", name, *how, "run.half_cycles=20")
-    xarray.testing.assert_allclose(halves, whole, rtol=1e-10, atol=1e-13)
+    assert ("temperature_strip" in whole) == (name == "brake-pad")
+    if "balance_error" in whole:  # rounding
+        halves, whole = halves.drop_vars("balance_error"), whole.drop_vars("balance_error")
+    xarray.testing.assert_allclose(halves, whole, rtol=1e-9 if name == "brake-pad" else 1e-10, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -154,16 +166,18 @@ def test_retried_half_cycles(tmp_path: Path, name: str, monkeypatch: pytest.Monk
     np.testing.assert_allclose(data.worn_volume, usual.worn_volume, rtol=1e-12 if name == "ball-on-flat" else 1e-2)
 
 
-def test_two_ranks(fenwear: Callable[..., Any], tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["pin-on-disc", "brake-pad"])
+def test_two_ranks(fenwear: Callable[..., Any], tmp_path: Path, name: str) -> None:
     """Two ranks write the same history as one, to 1e-9 of the largest value of each variable."""
-    settings = (*SETTINGS["pin-on-disc"], "run.half_cycles=6")
+    settings = (*SETTINGS[name], "run.half_cycles=6")
     options = [word for setting in settings for word in ("--set", setting)]
     for ranks in (1, 2):
-        done = fenwear("run", "pin-on-disc", "-q", "-o", tmp_path / str(ranks), *options, ranks=ranks)
+        done = fenwear("run", name, "-q", "-o", tmp_path / str(ranks), *options, ranks=ranks)
         assert done.returncode == 0, done.stderr
     one, two = (history(tmp_path / str(ranks)) for ranks in (1, 2))
     assert one.sizes == two.sizes
     np.testing.assert_array_equal(one.facets, two.facets)
-    for name in ("x", "y", "along", "across", "pressure", "wear", "weight", "worn_volume", "scar_length", "scar_width"):
-        scale = float(np.abs(one[name]).max())
-        np.testing.assert_allclose(two[name], one[name], rtol=0, atol=1e-9 * scale, err_msg=name)
+    values = ["x", "y", "along", "across", "pressure", "wear", "weight", "worn_volume", "scar_length", "scar_width"]
+    for value in values + (["temperature_punch", "temperature_strip"] if name == "brake-pad" else []):
+        scale = float(np.abs(one[value]).max())
+        np.testing.assert_allclose(two[value], one[value], rtol=0, atol=1e-9 * scale, err_msg=value)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from tqdm import tqdm
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
@@ -23,6 +20,7 @@ from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.law import with_law
 from fenwear.parallel import on_root
+from fenwear.progress import How, Progress
 from fenwear.results import checkpoint
 from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
@@ -31,10 +29,10 @@ from fenwear.results.history import (
     HistoryWriter,
     free_directory,
     make_directory,
-    summarise,
     write_case,
     write_summary,
 )
+from fenwear.results.summary import summarise
 from fenwear.signals import Signals
 from fenwear.stick.run import run_stick
 from fenwear.watch import Watch, stroke_warnings
@@ -42,9 +40,7 @@ from fenwear.watch import Watch, stroke_warnings
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
 BLOCK_SECONDS = 2.0  # after which a block ends
-LINE_SECONDS = 10.0  # after which a long step tells that it goes on
 Log = Callable[[str], None]
-Progress = Literal["bar", "lines", "none"]
 
 
 def run_case(
@@ -54,7 +50,7 @@ def run_case(
     log: Log,
     *,
     resume: bool = False,
-    progress: Progress = "bar",
+    progress: How = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
     last: bool = False,
     fresh: bool = False,
@@ -99,7 +95,7 @@ def run_case(
 
 
 def _run(
-    system: Tribosystem, directory: Path, log: Log, progress: Progress, setup: float, noted: Signals, *, resume: bool
+    system: Tribosystem, directory: Path, log: Log, progress: How, setup: float, noted: Signals, *, resume: bool
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
@@ -180,7 +176,7 @@ class _Run:
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
         self._signals: Signals | None = None
-        self._progress: _Progress | None = None
+        self._progress: Progress | None = None
         self._block_begun = self._looked = time.monotonic()
         self._block_over = False
 
@@ -194,7 +190,7 @@ class _Run:
         writer = self.writer
         on_root(self.comm, lambda: None if writer is None else act(writer))
 
-    def march(self, progress: Progress, signals: Signals) -> None:
+    def march(self, progress: How, signals: Signals) -> None:
         """Compute all half-cycles; collective.
 
         Raises:
@@ -202,11 +198,11 @@ class _Run:
             InterruptedRunError: a signal has come; the checkpoint is written.
             OutputError: a file cannot be written.
         """
-        with _Progress(self.case.run.half_cycles, self.state, self.comm, progress) as told:
+        with Progress("half-cycle", self.case.run.half_cycles, self.state.half_cycle, self.comm, progress) as told:
             self._signals, self._progress = signals, told
             for block in self._blocks():
                 self._take(block)
-                told.block(block)
+                told.reached(int(block.half_cycle[-1]), _in_short(block))
                 self._block_begun = time.monotonic()
                 if self._look():
                     self._save()
@@ -240,7 +236,7 @@ class _Run:
         if save and self.state.half_cycle > 0:
             self._save()
         if self._progress is not None:
-            self._progress.working(self.state.half_cycle)
+            self._progress.working()
         if interrupted and signals is not None:
             signals.ending = True
         return bool(interrupted)
@@ -392,47 +388,8 @@ def _warnings(number: float) -> list[str]:
     ]
 
 
-class _Progress:
-    """Tells how far a run is: on rank 0, by a bar on a terminal or by lines."""
-
-    def __init__(self, half_cycles: int, start: RunState, comm: MPI.Comm, progress: Progress) -> None:
-        self.half_cycles, self.done = half_cycles, start.half_cycle
-        self.lines = progress == "lines" and comm.rank == 0
-        hidden = progress != "bar" or comm.rank != 0 or not sys.stderr.isatty()
-        self.bar = tqdm(total=half_cycles, initial=self.done, unit=" half-cycles", disable=hidden)
-        self.begin = self.told = time.perf_counter()
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        self.bar.close()
-
-    def block(self, block: Block) -> None:
-        """Tell of a block."""
-        number = int(block.half_cycle[-1])
-        degrees = degrees_of(block.system.case)
-        hot = "" if block.heat is None else f", {block.heat.max_temperature[-1] - degrees.zero:.1f} {degrees.shown}"
-        state = f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"
-        self.bar.update(number - self.bar.n)
-        self.bar.set_postfix_str(state)
-        if self.lines:
-            self.told = time.perf_counter()
-            rate = (number - self.done) / (self.told - self.begin)
-            left = (self.half_cycles - number) / rate
-            self._line(
-                f"half-cycle {number:,} of {self.half_cycles:,}, {rate:,.0f} a second, {left:,.0f} s left, {state}"
-            )
-
-    def working(self, half_cycle: int) -> None:
-        """Tell, now and then, that a long step is being made."""
-        now = time.perf_counter()
-        self.bar.refresh()
-        if self.lines and now - self.told > LINE_SECONDS:
-            self.told = now
-            self._line(
-                f"half-cycle {half_cycle:,} of {self.half_cycles:,}, in the step after it, {now - self.begin:,.0f} s"
-            )
-
-    def _line(self, text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
+def _in_short(block: Block) -> str:
+    """Return the state at the end of a block, in a line."""
+    degrees = degrees_of(block.system.case)
+    hot = "" if block.heat is None else f", {block.heat.max_temperature[-1] - degrees.zero:.1f} {degrees.shown}"
+    return f"p max {block.max_pressure[-1]:.2f} MPa{hot}, change {block.periodicity[-1]:.1e}"

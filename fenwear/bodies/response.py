@@ -133,7 +133,8 @@ class _Answer:
             self._temperatures = np.append(0, np.cumsum(self.comm.allgather(coupling.getLocalSize()[1])))
             self._coupling = _rows(coupling) if self.factor.is_spread else _rows(moved(coupling, self.factor.owner))
         self._response: list[Array] = []
-        self._by_temperature: list[Array] = []
+        self._by_temperature: Array | None = None  # (q, owned): as large as a factor, so there once
+        self._filled = 0
 
     def solve(self, columns: Columns) -> tuple[Array, Array | None] | None:
         """Return the response to some columns and G^T times their solutions, where they are solved.
@@ -175,13 +176,21 @@ class _Answer:
         if self.factor.is_spread:
             assert warm is not None
             first, last = self._temperatures[self.comm.rank : self.comm.rank + 2]
-            self._by_temperature.append(np.ascontiguousarray(total(self.comm, warm)[first:last].T))
+            self._fill(total(self.comm, warm)[first:last])
             return
         columns = self.comm.bcast(None if warm is None else warm.shape[1], root=self.factor.owner)
         own = np.empty((counts[self.comm.rank], columns))
         sent = None if warm is None else (np.ascontiguousarray(warm), (counts * columns).tolist())
         self.comm.Scatterv(sent, own, root=self.factor.owner)
-        self._by_temperature.append(np.ascontiguousarray(own.T))
+        self._fill(own)
+
+    def _fill(self, warm: Array) -> None:
+        """Keep this rank's part of the response to temperature for a block (owned, k)."""
+        if self._by_temperature is None:
+            self._by_temperature = np.empty((self.request.count, len(warm)))
+        after = self._filled + warm.shape[1]
+        self._by_temperature[self._filled : after] = warm.T
+        self._filled = after
 
     def gathered(self) -> tuple[Array, Array | None]:
         """Return the whole response, on every rank, and this rank's part of that to temperature; collective."""
@@ -189,7 +198,7 @@ class _Answer:
         response = np.concatenate(self._response, axis=2) if self._response else np.empty((q, d, self.request.count))
         if self.comm.size > 1:  # where it is spread, equal to the last bit on all ranks
             self.comm.Bcast(response, root=self.factor.owner)
-        return response, np.concatenate(self._by_temperature) if self._by_temperature else None
+        return response, self._by_temperature
 
 
 def _rows(matrix: PETSc.Mat | None) -> csr_array | None:

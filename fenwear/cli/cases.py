@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from mpi4py import MPI
@@ -13,6 +13,9 @@ from fenwear.case import doubts
 from fenwear.cli.base import DEFAULT_CASE, CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
+
+if TYPE_CHECKING:
+    from fenwear.progress import How
 
 
 @app.callback(invoke_without_command=True)
@@ -41,7 +44,7 @@ def run(
     """Run a case: pressure, wear and shape over the half-cycles."""
     from fenwear.report.stick import key_numbers_text
     from fenwear.results.sheet import sheet_text
-    from fenwear.run import Progress, run_case
+    from fenwear.run import run_case
 
     loaded = load(case, settings)
     if resume and output is None:
@@ -49,7 +52,7 @@ def run(
     if quiet and verbose:
         raise CaseError(InputError("--quiet", "given together with --verbose; expected one of them"))
     say = (lambda _message: None) if quiet else log
-    progress: Progress = "none" if quiet else "lines" if verbose else "bar"
+    progress: How = "none" if quiet else "lines" if verbose else "bar"
     summary, directory = run_case(
         loaded, Path(case).stem, output, say, resume=resume, progress=progress, last=True, fresh=fresh
     )

@@ -150,13 +150,16 @@ class HeatBody:
             self._flows[sliding] = _Flow(self, sliding)
         return self._flows[sliding]
 
-    def step(self, speed: float, duration: float, surroundings: Surroundings = ALONE) -> HeatStep:
+    def step(
+        self, speed: float, duration: float, surroundings: Surroundings = ALONE, *, at_once: bool = False
+    ) -> HeatStep:
         """Assemble and factor one implicit Euler step, or for an infinite duration the steady state; collective.
 
         Args:
             speed: Of the material, mm/s, or rad/s where it turns.
             duration: Of the step, s.
             surroundings: What lies beyond the mesh.
+            at_once: Whether it advances many fields at once, rather than one field thousands of times.
 
         Raises:
             CaseError: a steady state of a body that loses heat nowhere.
@@ -181,7 +184,7 @@ class HeatBody:
             loss.destroy()
         carried = speed * flow.carried + entering
         brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.sum()))
-        return HeatStep(self, a, b, f, duration, carried, brought, entering)
+        return HeatStep(self, a, b, f, carried, brought, entering, repeated=duration < np.inf and not at_once)
 
     def loses_heat(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> bool:
         """Return whether a heat sink exists: convection, a held temperature or new material; collective."""
@@ -391,10 +394,11 @@ class HeatStep:
         a: PETSc.Mat,
         b: PETSc.Mat,
         f: Array,
-        duration: float,
         carried: Array,
         brought: float,
         entering: Array,
+        *,
+        repeated: bool,
     ) -> None:
         self.body, self.carried, self.brought, self.entering = body, carried, brought, entering
         start = body.space.dofmap.index_map.local_range[0]
@@ -410,8 +414,8 @@ class HeatStep:
         self.a, self.b = a, b
         self._is_held = np.zeros(body.owned, dtype=bool)
         self._is_held[body.held] = True
-        self._repeated = duration < np.inf
-        self._pivoted, self._solved = duration == np.inf, 0
+        self._repeated = repeated
+        self._pivoted, self._solved = not repeated, 0
 
     @cached_property
     def _factor(self) -> Factor:

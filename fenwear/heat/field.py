@@ -263,10 +263,11 @@ class ReducedField:
         self.responses: list[Array] = []
         lift, columns = basis.lift, basis.columns
         for step in steps:
-            a_basis, b_basis = step.apply(columns)
             a_lift, b_lift = step.apply(lift[:, None])
-            a = self._sum(columns.T @ a_basis)
-            self._propagators.append(scipy.linalg.solve(a, self._sum(columns.T @ b_basis)))
+            blocks = [columns[:, begin : begin + CHUNK] for begin in range(0, max(len(basis), 1), CHUNK)]
+            projected = [[columns.T @ fields for fields in step.apply(block)] for block in blocks]
+            a, b = (self._sum(np.hstack(parts)) for parts in zip(*projected, strict=True))
+            self._propagators.append(scipy.linalg.solve(a, b))
             source = columns.T @ (step.source + (b_lift - a_lift)[:, 0])
             self._sources.append(scipy.linalg.solve(a, self._sum(source)))
             self.responses.append(scipy.linalg.solve(a, self._sum((inflow.T @ columns).T)))

@@ -78,7 +78,7 @@ def prepare_exchange(
         bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), cycles, strict=True
     ):
         around = _surroundings(body, pair, sliding, renewed=renewed)
-        steps = [body.step(velocity, duration, around) for velocity in own]
+        steps = [body.step(velocity, duration, around, at_once=reduced) for velocity in own]
         field: FullField | ReducedField | TrackField
         moving = [own[step] for step in cycle]
         if heat.track is not None and body.body.name == "strip":

@@ -10,9 +10,9 @@ Where there are many fluxes, most of them differ over a short wave length l, and
 that for a time of l²/(4 pi² a) with the diffusivity a. What a step leaves of such fields no later one
 sees: there the singular values are those of the fields one step later, so that the basis stays as small
 on any mesh, and `ReducedField` adds what it leaves out to the contact temperature of the step itself.
-The fluxes whose fields last are found by subspace iteration from random ones, in place of all n of them
-(Halko, Martinsson and Tropp, SIAM Review 53, 2011). Each scale takes them a block after the other, until one brings
-nothing new.
+The fluxes whose fields last are found from random ones, in place of all n of them, a block beside the other until
+the last one brings what does not count (Halko, Martinsson and Tropp, SIAM Review 53, 2011). Each scale takes them a
+block after the other, until one brings nothing new.
 """
 
 from __future__ import annotations
@@ -33,9 +33,8 @@ RATIO = 4.0  # of one time scale to the next
 SCALES = 9  # of them, from a step on; then come the last ones, to the steady state
 ROUNDING = 1e-7  # of the largest singular value: what is left of a dependent field, squared in the Gram matrix
 FAST = 4  # scales over which a motion to and fro does not average out
-SOME = 200  # fluxes that are tried first, where there are many
+SOME = 200  # fluxes that are tried at once, where there are many
 SHARPER = 0.3  # of the tolerance, for what is felt a step later: at a corner of the contact many such fields add up
-SWEEPS = 2  # of the subspace iteration: the singular values fall fast, and enter by their fourth power
 
 
 def reduced_basis(
@@ -64,21 +63,23 @@ def reduced_basis(
     lift = body.initial()
     # Fluxes of the same power: the singular values then weigh temperatures as friction makes them.
     even = csc_array(inflow @ diags_array(1 / np.sqrt(total(body.body.mesh.comm, abs(inflow).sum(axis=0)))))
-    fluxes, later = even.toarray() if not lasting else np.zeros((0, 0)), None
-    if lasting:
-        tolerance *= SHARPER
-        fluxes = _lasting_fluxes(body, even, duration, tolerance, surroundings)
-        later = body.step(0.0, duration, surroundings)
-    block = SOME // 4 if lasting else max(fluxes.shape[1], 1)
     scales = [duration * RATIO**k for k in range(SCALES)]
     scales += [np.inf] if body.loses_heat(mean, surroundings) else [scales[-1] * 100]
-    # What is new on both sides does not average out: material that leaves is cooled on either way.
-    unlike = len(scales) if surroundings.renewed and min(speeds) * max(speeds) < 0 else FAST
+    later = body.step(0.0, duration, surroundings, at_once=True) if lasting else None
     basis = _Growing(body, later)
+    if later is None:
+        fluxes = even.toarray()
+    else:
+        tolerance *= SHARPER
+        slowest = body.step(mean, scales[-1], surroundings, at_once=True)
+        fluxes = _lasting_fluxes(body, even, later, slowest, basis, tolerance)
+        slowest.free()
+    block = SOME // 4 if lasting else max(fluxes.shape[1], 1)
+    unlike = len(scales) if surroundings.renewed and min(speeds) * max(speeds) < 0 else FAST
     relaxed: list[Array] = []
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
         for velocity in [mean, *(moving if k < unlike else [])]:
-            step = body.step(velocity, scale, surroundings)
+            step = body.step(velocity, scale, surroundings, at_once=True)
             for begin in range(0, fluxes.shape[1], block):
                 if not basis.add(step.respond(fluxes[:, begin : begin + block]), tolerance):
                     break  # the next ones matter less
@@ -92,7 +93,7 @@ def reduced_basis(
     else:
         later.free()
     basis.start_from(body.initial() - lift, np.hstack(relaxed), tolerance)
-    return ReducedBasis(body, lift, basis.columns)
+    return ReducedBasis(body, lift, np.array(basis.columns))
 
 
 class _Growing:
@@ -109,12 +110,17 @@ class _Growing:
     def __init__(self, body: HeatBody, later: HeatStep | None) -> None:
         self.body, self._later = body, later
         self._largest = 0.0
-        self.columns = np.ones((body.owned, 1))
-        self.columns[body.held] = 0.0
-        stored = _gram(body, self.columns)[0, 0]
-        self.columns = self.columns / np.sqrt(stored) if stored > 0 else self.columns[:, :0]
-        self._uniform = self.columns
+        uniform: Array = np.ones((body.owned, 1))
+        uniform[body.held] = 0.0
+        stored = _gram(body, uniform)[0, 0]
+        self._uniform: Array = uniform / np.sqrt(stored) if stored > 0 else uniform[:, :0]
+        self._room, self._filled = np.array(self._uniform, order="F"), self._uniform.shape[1]
         self._added: list[Array] = []  # in coordinates of the basis as it was then
+
+    @property
+    def columns(self) -> Array:
+        """The basis (owned, dim)."""
+        return self._room[:, : self._filled]
 
     def add(self, fields: Array, tolerance: float) -> bool:
         """Add the principal parts of fields (owned, k) beside the basis, down to a share of the largest ever.
@@ -123,13 +129,16 @@ class _Growing:
             Whether there were any.
         """
         rest = self._beside(fields)
-        felt = rest if self._later is None else self._later.advance(rest, sources=False)
-        parts, values, largest = _principal(self.body, felt, tolerance, self._largest)
+        parts, values, largest = _principal(self.body, self._felt(rest), tolerance, self._largest)
         self._largest = max(self._largest, largest)
         self._append(rest @ (parts / values))
         if self._later is None:
             self._added.append(total(self.body.body.mesh.comm, self.columns.T @ self.body.store(fields)))
         return len(values) > 0
+
+    def largest(self, fields: Array) -> float:
+        """Return the largest singular value of fields (owned, k) beside the basis, as `add` would find it."""
+        return _principal(self.body, self._felt(self._beside(fields)), 0.0, 0.0)[2]
 
     def compress(self, tolerance: float) -> None:
         """Keep the principal parts of all that was added, and the uniform temperature; of fields as they are."""
@@ -137,9 +146,9 @@ class _Growing:
         if dim == first:
             return
         added = np.hstack([np.pad(one, ((0, dim - len(one)), (0, 0))) for one in self._added])[first:]
-        columns = self.columns[:, first:]
+        columns = self.columns[:, first:].copy()
         parts, values, _ = np.linalg.svd(added, full_matrices=False)
-        self.columns = self._uniform
+        self._filled = first
         self._append(columns @ parts[:, values > max(tolerance, ROUNDING) * values[0]])
 
     def start_from(self, field: Array, relaxed: Array, tolerance: float) -> None:
@@ -155,11 +164,15 @@ class _Growing:
             parts, values, _ = _principal(self.body, rest, share, largest)
             self._append(rest @ (parts / values))
 
+    def _felt(self, fields: Array) -> Array:
+        """Return what fields are weighed by."""
+        return fields if self._later is None else self._later.advance(fields, sources=False)
+
     def _beside(self, fields: Array) -> Array:
-        """Return fields without what the basis has of them."""
+        """Return fields without what the basis has of them; first without the uniform one, which may be far larger."""
         comm = self.body.body.mesh.comm
-        for _ in range(2):  # once more: rounding
-            fields = fields - self.columns @ total(comm, self.columns.T @ self.body.store(fields))
+        for columns in (self._uniform, self.columns):
+            fields = fields - columns @ total(comm, columns.T @ self.body.store(fields))
         return fields
 
     def _append(self, fields: Array) -> None:
@@ -169,44 +182,50 @@ class _Growing:
         for _ in range(2):  # once more: rounding
             fields = fields @ np.linalg.inv(np.linalg.cholesky(_gram(self.body, fields))).T
             fields = self._beside(fields)
-        self.columns = np.hstack([self.columns, fields])
+        before, self._filled = self._filled, self._filled + fields.shape[1]
+        if self._filled > self._room.shape[1]:
+            room: Array = np.empty((len(fields), self._filled + before // 2), order="F")
+            room[:, :before] = self._room[:, :before]
+            self._room = room
+        self._room[:, before : self._filled] = fields
 
 
 def _lasting_fluxes(
-    body: HeatBody, even: csc_array, duration: float, tolerance: float, surroundings: Surroundings
+    body: HeatBody, even: csc_array, step: HeatStep, slowest: HeatStep, basis: _Growing, tolerance: float
 ) -> Array:
     """Return loads (owned, k) of the fluxes whose fields are felt a step later, the most felt first; collective.
 
-    The principal ones of fields in material at rest, where they last longest. The first is nearly the mean, which
-    the basis has: the second sets the scale.
+    The principal ones of fields in material at rest, where they last longest. Those that hardly last leave the same
+    on any time scale: they count against the largest field of the slowest one, which the most felt fluxes make.
 
     Args:
         even: Loads of single fluxes of the same power (owned, n).
-        duration: Of the step, s.
-        tolerance: Share of the largest down to which they count.
-        surroundings: What lies beyond the mesh.
+        step: The shortest one, at rest.
+        slowest: The longest one.
+        basis: Empty but for the uniform temperature.
+        tolerance: Share of the largest field down to which they count.
     """
-    step, comm = body.step(0.0, duration, surroundings), body.body.mesh.comm
+    comm = body.body.mesh.comm
 
     def felt(fluxes: Array) -> Array:
         """Return S^T M S times fluxes (n, k), S = (A^-1 B) A^-1 C their fields a step later: A, B are symmetric."""
         fields = step.advance(step.respond(even @ fluxes), sources=False)
         return total(comm, even.T @ step.advance(step.respond(body.store(fields)), sources=False))
 
-    size, tried = even.shape[1], min(SOME, even.shape[1])
-    random = np.random.default_rng(0)  # the same on every rank and in every run
-    space: Array = np.zeros((size, 0))
+    size, random = even.shape[1], np.random.default_rng(0)  # the same on every rank and in every run
+    space, images, least = np.zeros((size, 0)), np.zeros((size, 0)), 0.0
     while True:
-        space = np.hstack([space, random.standard_normal((size, tried - space.shape[1]))])
-        for _ in range(SWEEPS):
-            space = np.linalg.qr(felt(np.linalg.qr(space)[0]))[0]
-        squares, vectors = np.linalg.eigh(space.T @ felt(space))
+        fresh = felt(random.standard_normal((size, min(SOME, size - space.shape[1]))))
+        for _ in range(2):  # once more: rounding
+            fresh = np.linalg.qr(fresh - space @ (space.T @ fresh))[0]
+        space, images = np.hstack([space, fresh]), np.hstack([images, felt(fresh)])
+        squares, vectors = np.linalg.eigh(space.T @ images)
         values = np.sqrt(np.maximum(squares, 0.0))
-        least = max(tolerance, ROUNDING) * values[-2 if len(values) > 1 else -1]
-        if values[0] <= least or tried == size:
+        if not least:
+            first = even @ (space @ vectors[:, -SOME // 4 :])
+            least = max(tolerance, ROUNDING) * basis.largest(slowest.respond(first))
+        if values[0] <= least or len(values) == size:
             break
-        tried = min(2 * tried, size)
-    step.free()
     return np.asarray(even @ (space @ vectors[:, values > least][:, ::-1]))
 
 

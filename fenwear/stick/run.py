@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import xarray
 from mpi4py import MPI
-from tqdm import tqdm
 
 from fenwear.case import Case, doubts
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, OutputError
 from fenwear.parallel import on_root
+from fenwear.progress import How, Progress
 from fenwear.report.stick import write_stick_report
 from fenwear.results.history import HISTORY, free_directory, make_directory, write_case, write_summary
 from fenwear.signals import Signals
@@ -30,9 +28,7 @@ from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
 
 LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
-LINE_SECONDS = 10.0  # after which a long cycle tells that it goes on
 Log = Callable[[str], None]
-Progress = Literal["bar", "lines", "none"]
 
 
 def run_stick(
@@ -42,7 +38,7 @@ def run_stick(
     log: Log,
     *,
     resume: bool = False,
-    progress: Progress = "bar",
+    progress: How = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
     last: bool = False,
 ) -> tuple[dict[str, Any], Path]:
@@ -100,7 +96,7 @@ class _Run:
         log: Log,
         comm: MPI.Comm,
         signals: Signals,
-        progress: Progress,
+        progress: How,
         *,
         resume: bool,
     ) -> None:
@@ -117,7 +113,7 @@ class _Run:
         on_root(comm, lambda: write_case(directory, case))
         self.writer: CycleWriter | None = None  # of rank 0
         on_root(comm, self._open_history)
-        self.told = _Progress(self.cycles, self.done, comm, progress)
+        self.told = Progress("cycle", self.cycles, self.done, comm, progress)
         self._looked = time.monotonic()
         self._save_due = self._looked + case.output.checkpoint
 
@@ -174,7 +170,7 @@ class _Run:
             return dataset(self.rig, self.case, [row_of(self.rig, self.case, cycle)])
 
         on_root(self.comm, lambda: None if self.writer is None else self.writer.add(row, keep=keep))
-        self.told.cycle(self.done, cycle)
+        self.told.reached(self.done, f"p max {cycle.half_cycles[-1].pressure.max():.4g} MPa")
 
     def _watch(self) -> None:
         """Save where it is due, and tell how far the run is; collective.
@@ -218,42 +214,6 @@ class _Run:
         if report:
             write_stick_report(self.directory)
         return summary
-
-
-class _Progress:
-    """Tells how far a run is: on rank 0, by a bar on a terminal or by lines."""
-
-    def __init__(self, cycles: int, done: int, comm: MPI.Comm, progress: Progress) -> None:
-        self.cycles, self.done = cycles, done
-        self.lines = progress == "lines" and comm.rank == 0
-        hidden = progress != "bar" or comm.rank != 0 or not sys.stderr.isatty()
-        self.bar = tqdm(total=cycles, initial=done, unit=" cycles", disable=hidden)
-        self.told = time.monotonic()
-
-    def __enter__(self) -> _Progress:
-        return self
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
-        self.bar.close()
-
-    def cycle(self, done: int, cycle: Cycle) -> None:
-        """Tell of a cycle."""
-        state = f"p max {cycle.half_cycles[-1].pressure.max():.4g} MPa"
-        self.done = done
-        self.bar.update(done - self.bar.n)
-        self.bar.set_postfix_str(state)
-        if self.lines:
-            self._line(f"cycle {cycle.number:,} of {self.cycles:,}, {state}")
-
-    def working(self) -> None:
-        """Tell, now and then, that a long cycle or jump is being made."""
-        self.bar.refresh()
-        if self.lines and time.monotonic() > self.told + LINE_SECONDS:
-            self._line(f"{self.done:,} of {self.cycles:,} cycles done, in the next one")
-
-    def _line(self, text: str) -> None:
-        self.told = time.monotonic()
-        print(text, file=sys.stderr, flush=True)
 
 
 def check_touching(rig: Rig) -> None:

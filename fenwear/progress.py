@@ -1,0 +1,60 @@
+"""Tells how far a run is: on rank 0, by a bar on a terminal or by lines."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import Literal
+
+from mpi4py import MPI
+from tqdm import tqdm
+
+LINE_SECONDS = 10.0  # after which a long step tells that it goes on
+How = Literal["bar", "lines", "none"]
+
+
+class Progress:
+    """The progress of a run over half-cycles or cycles.
+
+    Args:
+        unit: Of what is counted, such as cycle.
+        total: How many there will be.
+        done: How many there were before.
+        comm: The ranks.
+        how: A bar where standard error is a terminal, lines, or none.
+    """
+
+    def __init__(self, unit: str, total: int, done: int, comm: MPI.Comm, how: How) -> None:
+        self.unit, self.total, self.done, self.before = unit, total, done, done
+        self.lines = how == "lines" and comm.rank == 0
+        hidden = how != "bar" or comm.rank != 0 or not sys.stderr.isatty()
+        self.bar = tqdm(total=total, initial=done, unit=f" {unit}s", disable=hidden)
+        self.begin = self.told = time.perf_counter()
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self.bar.close()
+
+    def reached(self, number: int, state: str) -> None:
+        """Tell how many are done, and of the state."""
+        self.done = number
+        self.bar.update(number - self.bar.n)
+        self.bar.set_postfix_str(state)
+        if self.lines:
+            rate = (number - self.before) / (time.perf_counter() - self.begin)
+            left = (self.total - number) / rate
+            self._line(f"{self.unit} {number:,} of {self.total:,}, {rate:,.3g} a second, {left:,.0f} s left, {state}")
+
+    def working(self) -> None:
+        """Tell, now and then, that a long step is being made."""
+        self.bar.refresh()
+        now = time.perf_counter()
+        if self.lines and now - self.told > LINE_SECONDS:
+            self._line(f"{self.unit} {self.done:,} of {self.total:,}, in the step after it, {now - self.begin:,.0f} s")
+
+    def _line(self, text: str) -> None:
+        self.told = time.perf_counter()
+        print(text, file=sys.stderr, flush=True)

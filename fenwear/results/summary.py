@@ -1,0 +1,108 @@
+"""The key numbers of a run, as summary.json has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.assembly import Tribosystem
+from fenwear.cycle import Block
+from fenwear.heat.exchange import TERMS
+from fenwear.results import sheet
+from fenwear.results.degrees import degrees_of
+from fenwear.results.scar import conforming
+from fenwear.versions import versions
+
+
+def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
+    """Return the key numbers of a run, each with its unit in its name.
+
+    Args:
+        last: The last block.
+        extremes: Largest errors over all half-cycles.
+        run: How the run went: stop, times, warnings.
+    """
+    plane = system.case.model.kind == "plane"
+    return {
+        "title": system.case.title,
+        "half_cycles": int(last.half_cycle[-1]),
+        **run,
+        **sheet.sheet(last),
+        **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
+        **({} if last.heat is None else _heat_summary(system, last)),
+        "periodicity": float(last.periodicity[-1]),
+        **extremes,
+        "contact_nodes": len(system.pair.x),
+        "degrees_of_freedom": system.bodies.unknowns,
+        "ranks": system.comm.size,
+        "versions": versions(),
+    }
+
+
+def _places(system: Tribosystem) -> NDArray[np.float64]:
+    """Return three places along a contact that is a line, mm."""
+    x = system.pair.x
+    places = (x[-1] + x[0]) / 2 + (x[-1] - x[0]) * np.array([-0.25, 0.0, 0.25])
+    return np.round(places, sheet.PLACES) + 0.0  # the middle is 0, not what rounding of a mesh leaves of it
+
+
+def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+    pair, places, phases = system.pair, _places(system), system.motion.half_cycles
+    return {
+        "mean_pressure_MPa": system.rigid.mean_pressure,
+        "x_mm": places.tolist(),
+        "wear_mm": pair.interpolate(last.wear[-1], places).tolist(),
+        **{
+            system.direction_words[int(d)]: {
+                "half_cycle": int(last.half_cycle[-phases:][i]),
+                "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
+                "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
+                "contact_width_mm": float(last.contact_width[-phases:][i]),
+            }
+            for i, d in enumerate(last.direction[-phases:])
+        },
+    }
+
+
+def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+    """Return the key numbers of solids and rings: their scars, and the contact of the last cycle.
+
+    The mean pressure is that over what is in contact; over the nominal contact only where the surfaces lie on each
+    other before they wear.
+    """
+    pair, phases = system.pair, system.motion.half_cycles
+    mean = {"mean_pressure_MPa": system.rigid.mean_pressure} if conforming(pair) else {}
+    cycle = slice(-phases, None)
+    rows = zip(
+        last.direction[cycle], last.half_cycle[cycle], last.pressure[cycle], last.contact_width[cycle], strict=True
+    )
+    return {
+        **mean,
+        **{
+            system.direction_words[int(d)]: {
+                "half_cycle": int(number),
+                "max_pressure_MPa": float(pressure.max()),
+                "mean_pressure_MPa": float(pair.weights @ pressure / max(area, 1e-300)),
+                "contact_area_mm2": float(area),
+            }
+            for d, number, pressure, area in rows
+        },
+    }
+
+
+def _heat_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+    assert last.heat is not None
+    heat, along, degrees = last.heat, {}, degrees_of(system.case)
+    if system.case.model.kind == "plane":
+        places, interpolate = _places(system), system.pair.interpolate
+        along = {
+            f"temperature_punch_{degrees.unit}": degrees.of(interpolate(heat.temperature_punch[-1], places)).tolist(),
+            f"temperature_strip_{degrees.unit}": degrees.of(interpolate(heat.temperature_strip[-1], places)).tolist(),
+        }
+    return {
+        f"max_temperature_{degrees.unit}": float(heat.max_temperature[-1]) - degrees.zero,
+        **along,
+        "heat_mJ": dict(zip(TERMS, heat.terms[-1].tolist(), strict=True)),
+    }

@@ -220,7 +220,7 @@ def with_exchange(
         system.heat,
         system.bodies.heat,
         system.pair,
-        gap_rows(system),
+        expansions(system),
         system.sliding.field,
         system.motion,
         heating_friction(system),
@@ -258,7 +258,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         system.heat,
         system.bodies.heat,
         system.pair,
-        gap_rows(system),
+        expansions(system),
         system.sliding.field,
         velocities,
         heating_friction(system),
@@ -266,12 +266,12 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
     )
 
 
-def gap_rows(system: Tribosystem) -> tuple[Array, Array]:
-    """Return the gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K."""
+def expansions(system: Tribosystem) -> tuple[Array, Array]:
+    """Return what each kelvin of this rank's nodes moves each surface along the normal, (n, owned) each, mm/K."""
     punch, strip = system.condensed.punch.by_temperature, system.condensed.strip.by_temperature
     if punch is None or strip is None:
         raise CaseError(InputError("heat", "missing, but required here"))
-    return punch, -strip
+    return punch, strip
 
 
 def heating_friction(system: Placed, mu: Array | None = None) -> Array:

@@ -173,6 +173,10 @@ class Functional:
         """Return the functional less a constant value (j,)."""
         return replace(self, constant=self.constant - value)
 
+    def times(self, factor: float) -> Functional:
+        """Return the functional times a number."""
+        return self if factor == 1 else replace(self, rows=self.rows * factor, constant=self.constant * factor)
+
 
 class Field(Protocol):
     """A body's temperature, with the steps that advance it numbered as they were given."""

@@ -30,7 +30,7 @@ def prepare_exchange(
     heat: Heat,
     bodies: tuple[HeatBody, HeatBody],
     pair: ContactPair,
-    gap_rows: tuple[Array, Array],
+    expansions: tuple[Array, Array],
     sliding: SlidingField,
     motion: Motion,
     friction: Array,
@@ -47,7 +47,7 @@ def prepare_exchange(
         heat: Settings of the heat.
         bodies: Conduction in the punch and in the strip.
         pair: The contact.
-        gap_rows: Gap that each kelvin of this rank's nodes opens, (n, owned) each, mm/K.
+        expansions: What each kelvin of this rank's nodes moves each surface along the normal, (n, owned) each, mm/K.
         sliding: The velocity of the strip's material for a unit speed.
         motion: The sliding motion.
         friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), in all phases.
@@ -75,7 +75,7 @@ def prepare_exchange(
     cycles = [[getattr(step, body.body.name) for plan in plans for step in plan] for body in bodies]
     sides = []
     for body, inflow, rows, own, cycle in zip(
-        bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), cycles, strict=True
+        bodies, inflows(bodies, pair), expansions, ([0.0], velocities), cycles, strict=True
     ):
         around = _surroundings(body, pair, sliding, renewed=renewed)
         steps = [body.step(velocity, duration, around, at_once=reduced) for velocity in own]
@@ -101,7 +101,7 @@ def prepare_steady(
     heat: Heat,
     bodies: tuple[HeatBody, HeatBody],
     pair: ContactPair,
-    gap_rows: tuple[Array, Array],
+    expansions: tuple[Array, Array],
     sliding: SlidingField,
     velocities: Sequence[float],
     friction: Array,
@@ -114,7 +114,7 @@ def prepare_steady(
     """
     plans = [[StepPlan(0, k, abs(v))] for k, v in enumerate(velocities)]
     sides = []
-    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), gap_rows, ([0.0], velocities), strict=True):
+    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True):
         around = _surroundings(body, pair, sliding, renewed=True)
         steps = [body.step(velocity, np.inf, around) for velocity in own]
         sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, cooled=True))
@@ -238,7 +238,7 @@ def _side(
     steps: Sequence[HeatStep],
     surroundings: Surroundings,
     pair: ContactPair,
-    gap_rows: Array,
+    expansion: Array,
     *,
     cooled: bool,
 ) -> Side:
@@ -251,12 +251,12 @@ def _side(
         balance_rows += [step.held_by_end, step.held_by_start, step.carried]
     rows = np.array(balance_rows)
     comm, moves = body.body.mesh.comm, body.body.name == "strip"
-    initial = total(comm, gap_rows @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
+    initial = total(comm, expansion @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
     capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
     side = Side(
         field,
         field.observe(contact_rows(body, pair)),
-        field.observe(gap_rows).less(initial),
+        field.observe(expansion).less(initial).times(-1.0 if moves else 1.0),  # few rows of a basis: no copy of all
         field.observe(rows),
         [step.held_source for step in steps],
         [step.brought for step in steps],

@@ -9,6 +9,7 @@ import pytest
 
 from fenwear import CaseError, Tribosystem, load_case
 from fenwear.assembly import place_case
+from fenwear.cycle import steady
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
 
@@ -88,3 +89,13 @@ def test_friction_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> No
         across = np.column_stack([-arm[:, 1], arm[:, 0]]) / np.linalg.norm(arm, axis=1, keepdims=True)
         np.testing.assert_allclose(ratio[:, :2], direction * 0.05 * across, atol=1e-14)
         np.testing.assert_allclose(ratio[:, 2], 0, atol=1e-15)
+
+
+def test_heat_of_rings(assembled: Callable[..., Tribosystem]) -> None:
+    """Hot rings end at p = F / (2 pi (r_o - r_i) r), too, warm."""
+    system = assembled("ring-on-ring-heat", "geometry.degree=2", "geometry.parameters.across=4")
+    state = steady(system)
+    (pressure,) = state.pressure
+    np.testing.assert_allclose(pressure, 2000 / (2 * np.pi * 10 * system.pair.x), rtol=1e-6)
+    assert state.heat is not None
+    assert (state.heat.punch > 50).all()

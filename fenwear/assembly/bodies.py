@@ -168,5 +168,5 @@ def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Wor
     ):
         pins = [np.array(support.at) for support in description.supports if support.at is not None]
         groups = [point for points in mesh.points.values() for point in points]
-        moved.append(follow_wear(mesh, depth, case.geometry.degree, [*pins, *groups]))
+        moved.append(follow_wear(mesh, depth, case.geometry.degree, case.model.law, [*pins, *groups]))
     return Worn(moved[0], moved[1])

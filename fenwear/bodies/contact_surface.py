@@ -62,6 +62,26 @@ class ContactSurface:
         """Coordinates of the pressure nodes (n, d), mm."""
         return self.trace[self.nodes]
 
+    @cached_property
+    def extension(self) -> csr_array:
+        """What takes values at the pressure nodes to the trace nodes (N, n): linear on triangles.
+
+        Elsewhere only a node on the axis of rings has no pressure: it takes its neighbour's value.
+        """
+        if self.cell != "triangle":
+            column = np.full(len(self.trace), -1)
+            column[self.nodes] = np.arange(len(self.nodes))
+            for lone in np.flatnonzero(column < 0):  # one at most
+                column[lone] = np.linalg.norm(self.x - self.trace[lone], axis=1).argmin()
+            shape = (len(self.trace), len(self.nodes))
+            return csr_array((np.ones(shape[0]), (np.arange(shape[0]), column)), shape=shape)
+        corners = np.searchsorted(self.nodes, self.facets[:, :3])
+        _, first = np.unique(self.facets, return_index=True)  # any facet of a node does: they agree where they meet
+        facet, place = np.divmod(first, self.facets.shape[1])
+        values = corner_functions("triangle", _lagrange("triangle", self.degree).points)[place]
+        rows = np.broadcast_to(np.arange(len(first))[:, None], values.shape)
+        return csr_array((values.ravel(), (rows.ravel(), corners[facet].ravel())))
+
     @property
     def dim(self) -> int:
         """Number of space dimensions d."""
@@ -194,14 +214,16 @@ def _in_reference_order(local: NDArray[np.int32], points: Array, cell: str, degr
 
     Edges that elements share may run either way in the numbering: nodes are told by their place.
     """
-    reference = basix.create_element(
-        basix.ElementFamily.P, basix.CellType[cell], degree, basix.LagrangeVariant.gll_warped
-    ).points
+    reference = _lagrange(cell, degree).points
     x = points[local]
     corners = x[:, : CORNERS[cell]]
     expected = np.einsum("kc,fcd->fkd", corner_functions(cell, reference), corners)
     distance = np.linalg.norm(expected[:, :, None] - x[:, None], axis=3)
     return np.argmin(distance, axis=2)
+
+
+def _lagrange(cell: str, degree: int) -> Any:
+    return basix.create_element(basix.ElementFamily.P, basix.CellType[cell], degree, basix.LagrangeVariant.gll_warped)
 
 
 def corner_functions(cell: str, points: Array) -> Array:
@@ -258,9 +280,7 @@ def vertex_surface(name: str, trace: Array, facets: NDArray[np.int64], degree: i
         np.add.at(normals, place[:, k], cross / 3)
     # Force at trace node a from the pressure function psi_i: the integral of psi_i phi_a over each facet.
     points, gauss = basix.make_quadrature(basix.CellType.triangle, degree + 1)
-    shape = basix.create_element(
-        basix.ElementFamily.P, basix.CellType.triangle, degree, basix.LagrangeVariant.gll_warped
-    ).tabulate(0, points)[0, :, :, 0]
+    shape = _lagrange("triangle", degree).tabulate(0, points)[0, :, :, 0]
     dual = 4 * corner_functions("triangle", points) - 1
     local = 2 * np.einsum("q,qa,qi->ai", gauss, shape, dual)  # over the facet's area
     values = area[:, None, None] * local / weights[place][:, None, :]

@@ -27,7 +27,9 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled_vector, destroy
 from fenwear.bodies.contact_surface import Trace, contact_surface, contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.material import measure
 from fenwear.bodies.mesh import BodyMesh
+from fenwear.case import Kind
 from fenwear.compat import geometry_degree, geometry_dofmap, interpolation_points
 from fenwear.errors import MeshQualityError
 
@@ -36,17 +38,18 @@ ACROSS = 1e-3  # cosine between a boundary's normal and the motion below which n
 PREFIX = "fenwear_shape_"
 
 
-def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]) -> Array:
+def follow_wear(body: BodyMesh, depth: Array, degree: int, kind: Kind, held: Sequence[Array]) -> Array:
     """Move a mesh, as it was made, by the depth worn off its contact surface; collective.
 
     Args:
         body: Its geometry is changed.
-        depth: At the trace nodes of this degree (N,), mm.
+        depth: At the pressure nodes of this degree (n,), mm.
         degree: Of the nodes.
+        kind: Of the model.
         held: Points that keep their place, such as pins, mm.
 
     Returns:
-        How far the trace nodes have moved into the body (N,), mm: the depth as far as the geometry's
+        How far the pressure nodes have moved into the body (n,), mm: the depth as far as the geometry's
         polynomials reach, which may be of a lower degree.
 
     Raises:
@@ -54,11 +57,11 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]
     """
     mesh, dim = body.mesh, body.mesh.geometry.dim
     space = fem.functionspace(mesh, ("Lagrange", degree))
-    trace = _trace(body, space, degree)
+    trace = _trace(body, space, degree, kind)
     x = space.tabulate_dof_coordinates()
     contact = _contact_dofs(body, space)
     shift = fem.Function(space)
-    shift.x.array[trace.local] = depth[trace.own]
+    shift.x.array[trace.local] = (trace.surface.extension @ depth)[trace.own]
     shift.x.scatter_forward()
     normal = _mean_normal(body)
     fixed = np.setdiff1d(_bent_dofs(body, space, normal), contact)
@@ -80,29 +83,31 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, held: Sequence[Array]
             "where it wears, or less wear"
         )
     owned = space.dofmap.index_map.size_local
-    return trace.pick(displaced[:owned, None])[:, 0, 0]
+    return trace.pick(displaced[:owned, None])[trace.surface.nodes, 0, 0]
 
 
 def element_height(elastic: ElasticBody) -> Array:
-    """Return the height of the elements at each trace node, volume over area of the facet (N,), mm; collective."""
+    """Return the height of the elements at each pressure node, volume over area of the facet (n,), mm; collective."""
     body, mesh = elastic.body, elastic.body.mesh
-    tag = contact_tag(body)
     cells = fem.functionspace(mesh, ("DG", 0))
-    ds = ufl.Measure("ds", domain=mesh, subdomain_data=body.facet_tags)
+    ds = ufl.Measure("ds", domain=mesh, subdomain_data=body.facet_tags)(contact_tag(body))
     v = ufl.TestFunction(cells)
-    volume, area = (fem.assemble_vector(fem.form(v * measure)).array for measure in (ufl.dx(domain=mesh), ds(tag)))
+    volume, area = (fem.assemble_vector(fem.form(v * over)).array for over in (ufl.dx(domain=mesh), ds))
     height = fem.Function(cells)
     height.x.array[:] = volume / np.maximum(area, 1e-300)
+    surface = elastic.trace.surface
+    if surface.cell == "triangle":  # shape functions of degree 2 have no integral at vertices: their values are taken
+        ds = ds(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
     w = ufl.TestFunction(elastic.space)[0]
     sums = []
     for f in (height, ufl.as_ufl(1.0)):
-        sums.append(elastic.trace.pick(assembled_vector(f * w * ds(tag))[:, None])[:, 0, 0])
+        sums.append(elastic.trace.pick(assembled_vector(f * w * ds)[:, None])[surface.nodes, 0, 0])
     return sums[0] / sums[1]
 
 
-def _trace(body: BodyMesh, space: fem.FunctionSpace, degree: int) -> Trace:
+def _trace(body: BodyMesh, space: fem.FunctionSpace, degree: int, kind: Kind) -> Trace:
     vectors = fem.functionspace(body.mesh, ("Lagrange", degree, (body.mesh.geometry.dim,)))
-    _, trace = contact_surface(body, vectors)
+    _, trace = contact_surface(body, vectors, measure(body.mesh, kind))
     return trace_of(trace, vectors, space)
 
 

@@ -160,5 +160,5 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
         for end in (0, -1):
             chi = math.degrees(state.tilt[end])
             names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
-            at = ", ".join(f"{axis} = {c:g}" for axis, c in zip(names, place, strict=False))
+            at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
             print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")

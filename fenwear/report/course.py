@@ -129,7 +129,9 @@ def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figur
     """Draw where the friction heat of each half-cycle goes."""
     figure, (ax,) = panels(1, 3.8, look=look)
     friction, x = history.heat_friction, look.course(history)
-    ax.plot(x, friction, color="0", linewidth=2.5, label="made by friction")
+    largest = float(np.abs(friction).max())
+    scale, unit = (1e-3, "J") if largest > 1e4 else (1.0, "mJ")
+    ax.plot(x, scale * friction, color="0", linewidth=2.5, label="made by friction")
     names = {
         "convected": "lost to the surroundings",
         "held": "lost where temperature is held",
@@ -138,14 +140,14 @@ def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figur
         "carried": "carried out by the strip",
     }
     assert names.keys() == HEAT_TERMS.keys() - {"friction"}
-    threshold = 1e-6 * float(np.abs(friction).max())
+    threshold = 1e-6 * largest
     for number, (name, text) in enumerate(names.items()):
         values = history[f"heat_{name}"]
         if float(np.abs(values).max()) > threshold:
-            ax.plot(x, values, label=text, **run_style(number))
+            ax.plot(x, scale * values, label=text, **run_style(number))
         else:
             ax.plot([], [], " ", label=f"{text}: none")
-    ax.set_ylabel("heat per half-cycle (mJ)")
+    ax.set_ylabel(f"heat per half-cycle ({unit})")
     legend_beside(ax, "")
     run_axis(ax, history, look)
     return figure

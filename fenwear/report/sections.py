@@ -11,7 +11,19 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case.units import convert
-from fenwear.report.style import BLUE, GREEN, GREY, RED, STANDARD, Look, contact_axis, legend_beside, panels, run_style
+from fenwear.report.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    RED,
+    STANDARD,
+    Look,
+    contact_axis,
+    legend_beside,
+    panels,
+    run_style,
+    strip_moves,
+)
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
@@ -76,7 +88,7 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look 
     names[axes[0]].write()
     axes[1].set_xlim(x.min() - 0.5 * width, x.max() + 0.5 * width)
     axes[1].set_ylim(low, high)
-    _sliding(axes[1], float(x.mean()), low, width)
+    _sliding(axes[1], fields, float(x.mean()), low, width)
     named = {
         "contact": Line2D([], [], color=GREEN, linewidth=2.0),
         "held": Line2D([], [], color=RED, linewidth=2.5),
@@ -209,11 +221,21 @@ def _group(fields: xarray.Dataset, body: str, part: Mapping[str, Any]) -> list[A
     return list(fields[name].values) if name in fields else []
 
 
-def _sliding(ax: Axes, x: float, z: float, width: float) -> None:
+def _sliding(ax: Axes, fields: xarray.Dataset, x: float, z: float, width: float) -> None:
     """Draw the axes and the way of the strip."""
-    ax.annotate("", (x + 0.25 * width, z + 0.12 * width), (x - 0.25 * width, z + 0.12 * width),
-                arrowprops={"arrowstyle": "<|-|>", "color": "0"}, zorder=5)  # fmt: skip
-    ax.annotate("strip slides", (x, z + 0.14 * width), ha="center", va="bottom", fontsize="small", bbox=PLATE, zorder=5)
+    turns = strip_moves(fields) == "strip turns"
+    if not turns:
+        ax.annotate("", (x + 0.25 * width, z + 0.12 * width), (x - 0.25 * width, z + 0.12 * width),
+                    arrowprops={"arrowstyle": "<|-|>", "color": "0"}, zorder=5)  # fmt: skip
+    ax.annotate(
+        "strip turns" if turns else "strip slides",
+        (x, z + 0.14 * width),
+        ha="center",
+        va="bottom",
+        fontsize="small",
+        bbox=PLATE,
+        zorder=5,
+    )
     for end, text in (((0.16, 0.06), "x"), ((0.06, 0.20), "z")):
         ax.annotate("", end, (0.06, 0.06), xycoords="axes fraction", textcoords="axes fraction",
                     arrowprops={"arrowstyle": "-|>", "color": "0"}, zorder=6)  # fmt: skip

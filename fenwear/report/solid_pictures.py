@@ -8,7 +8,7 @@ together, as in `fenwear.report.pictures`, by the factor that the picture tells.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,11 +31,13 @@ FIGURES = "figures"
 COLOURS = 16
 FLAT = 1e-4  # of the contact's length: how far a surface that counts as flat may be from a plane
 FADES = 0.1  # of the contact's length: over which wear, as it is drawn, fades into the bodies
-NEAR = (0.72, 0.5, 0.75)  # of the length: half of the section that is shown, and what of it below and above the contact
+NEAR = (0.72, 0.5, 0.75)  # of the length: half of the section that is shown, and most of it below and above the contact
+MARGIN = 0.05  # of the length: around bodies that end within the section
 PIXELS = 900
 OPEN, AROUND = 1.5 * np.pi, 54  # of rings: how far they are turned, and in how many parts
 NEIGHBOURS = 4
 HEXAHEDRON, TETRAHEDRON = 12, 10  # VTK's numbers
+FLIP = [0, 2, 1, 3]
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,7 @@ class SolidView:
         length: Of the contact along the sliding, mm.
         factor: Magnification of displacement and wear.
         ranges: Least and largest value of each field's colours.
+        heights: Of what is shown of the section below and above the contact, mm.
     """
 
     centre: Array
@@ -56,6 +59,7 @@ class SolidView:
     length: float
     factor: float
     ranges: dict[str, tuple[float, float]]
+    heights: tuple[float, float]
 
     @property
     def across(self) -> Array:
@@ -69,7 +73,7 @@ class SolidView:
     @property
     def box(self) -> tuple[float, float, float, float]:
         """What the section shows: along the sliding and along the normal, mm."""
-        wide, below, above = (share * self.length for share in NEAR)
+        wide, (below, above) = NEAR[0] * self.length, self.heights
         return -wide, wide, -below, above
 
     def near(self, x: Array) -> Mask:
@@ -129,7 +133,10 @@ def solid_view(datasets: Sequence[xarray.Dataset], shown: dict[str, Any]) -> Sol
     if first.attrs["model"] != "solid":  # the section of rings
         along, length = np.array([1.0, 0.0, 0.0]), float(np.ptp(x[:, 0]))
     centre = centre + ((x - centre) @ normal).min() * normal
-    view = SolidView(centre, along, normal, length, 1.0, {})
+    heights = [(points(first, body) - centre) @ normal for body in BODIES]
+    room = MARGIN * length  # thin bodies do not fill the section
+    below, above = min(NEAR[1] * length, room - heights[1].min()), min(NEAR[2] * length, room + heights[0].max())
+    view = SolidView(centre, along, normal, length, 1.0, {}, (float(below), float(above)))
     inside = {body: view.near(points(first, body)) for body in BODIES}
     moved = [np.linalg.norm(displacement(d, b), axis=1)[inside[b]].max(initial=0.0) for d in datasets for b in BODIES]
     surfaces = [(points(d, b, "_contact") - centre) @ normal for d in datasets[:1] for b in BODIES]
@@ -142,7 +149,7 @@ def solid_view(datasets: Sequence[xarray.Dataset], shown: dict[str, Any]) -> Sol
         low, high = float(values.min()), float(np.quantile(values, 0.995 if field == "von_mises" else 1.0))
         ranges[field] = (0.0 if 0 < low < high / 2 else low, high if high > low else low + 1.0)
     factor = 1.0 if curved else magnification(float(max(moved)), length)
-    return SolidView(centre, along, normal, length, factor, ranges)
+    return replace(view, factor=factor, ranges=ranges)
 
 
 def deformed(data: xarray.Dataset, body: str, view: SolidView) -> Array:
@@ -172,6 +179,9 @@ def mesh(data: xarray.Dataset, body: str, x: Array, field: str) -> Any:
         x, cells = _around(x, cells)
         values = np.tile(values, AROUND + 1)
     kind = HEXAHEDRON if cells.shape[1] == 8 else TETRAHEDRON
+    if kind == TETRAHEDRON:  # all with the same sense: else their faces seem to meet at an edge
+        first, *sides = np.moveaxis(x[cells], 1, 0)
+        cells = np.where((np.linalg.det(np.stack(sides, axis=1) - first[:, None]) < 0)[:, None], cells[:, FLIP], cells)
     listed = np.hstack([np.full((len(cells), 1), cells.shape[1]), cells]).ravel()
     grid = pyvista.UnstructuredGrid(listed, np.full(len(cells), kind, dtype=np.uint8), x)
     grid.point_data[field] = values
@@ -202,8 +212,9 @@ def solid_figure(data: xarray.Dataset, field: str, view: SolidView, named: tuple
     images = [_image(bodies, field, view, colours, whole=True, solid=solid)]
     if solid:
         images.append(_image(bodies, field, view, colours, whole=False, solid=True))
-    figure = Figure(figsize=(7.0, 8.6 if solid else 5.6), layout="constrained")
-    axes = figure.subplots(len(images), 1, squeeze=False, height_ratios=[1.0] * len(images))[:, 0]
+    shares = [1.0, images[1].shape[0] / images[1].shape[1] / (sum(NEAR[1:]) / NEAR[0] / 2)] if solid else [1.0]
+    figure = Figure(figsize=(7.0, 4.6 + 4.0 * shares[1] if solid else 5.6), layout="constrained")
+    axes = figure.subplots(len(images), 1, squeeze=False, height_ratios=shares)[:, 0]
     axes[0].imshow(images[0])
     axes[0].set_axis_off()
     half_cycle = int(data.attrs["half_cycle"])
@@ -235,15 +246,19 @@ def _image(bodies: Sequence[Any], field: str, view: SolidView, colours: str, *, 
     plotter = pyvista.Plotter(off_screen=True, window_size=size)
     plotter.set_background("white")
     for grid in bodies:
-        half = grid.clip(normal=view.across, origin=view.centre, invert=True) if solid else grid
-        surface = half.extract_surface()
-        plotter.add_mesh(surface, scalars=field, cmap=colours, clim=view.ranges[field], n_colors=COLOURS,
+        cut: dict[str, Any] = {"normal": view.across, "origin": view.centre}
+        half = grid.clip(**cut, invert=True) if solid else grid
+        plotter.add_mesh(half.extract_surface(), scalars=field, cmap=colours, clim=view.ranges[field], n_colors=COLOURS,
                          lighting=whole, ambient=0.8, diffuse=0.3, show_scalar_bar=False)  # fmt: skip
+        surface = grid.extract_surface()
         edges = surface.extract_feature_edges(
             boundary_edges=True, feature_edges=True, feature_angle=40, manifold_edges=False, non_manifold_edges=False
         )
-        if edges.n_points:
-            plotter.add_mesh(edges, color="black" if not whole else GREY, line_width=1.5)
+        # Not those of the half: where tetrahedra are cut there are slivers, whose faces point anywhere.
+        lines = [edges.clip(**cut, invert=True), surface.slice(**cut)] if solid and edges.n_points else [edges]
+        for line in lines:
+            if line.n_points:
+                plotter.add_mesh(line, color="black" if not whole else GREY, line_width=1.5)
     plotter.enable_parallel_projection()
     way = view.across if solid else np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
     if whole:

@@ -10,7 +10,7 @@ import pytest
 import ufl
 from mpi4py import MPI
 
-from fenwear import Tribosystem, assemble
+from fenwear import Tribosystem, assemble, make_case
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.errors import MeshQualityError
 from fenwear.sliding.wear import Worn
@@ -97,3 +97,53 @@ def test_limit_of_the_offset(assembled: Callable[..., Tribosystem]) -> None:
     assert not assembled("example1", *COARSE, "geometry.follow_wear=never").outworn(high)
     z = np.unique(system.bodies.punch.body.mesh.geometry.x[:, 1].round(9))
     np.testing.assert_allclose(heights, z[1] - z[0], rtol=1e-9)
+
+
+@pytest.mark.mpi
+def test_pressure_on_some_of_the_nodes() -> None:
+    """Where triangles bear on their vertices, and rings on all but the axis, heights and depths are those nodes' own.
+
+    A linear depth is followed exactly, and the volume falls by its integral.
+    """
+    block = {
+        "punch_tetrahedra": 1,
+        "strip_tetrahedra": 1,
+        "across_x": 2,
+        "across_y": 2,
+        "margin_x": 0.5,
+        "margin_y": 0.5,
+    }
+    disc = {"inner_radius": 0, "outer_radius": 1, "punch_height": 1, "across": 3, "punch_layers": 2}
+    for geometry, kind, sizes in (("solid_blocks.geo", "solid", block), ("rings.geo", "axisymmetric", disc)):
+        solid, down = kind == "solid", [0, 0, -1] if kind == "solid" else [0, -1]
+        sides = ["x", "y", "z"] if solid else ["x", "z"]
+        turn = {"kind": "rotation", "angular_speed": 1, "duration": 1}
+        to_and_fro = {"kind": "reciprocating", "amplitude": 1e-3, "period": 1}
+        system = assemble(make_case({
+            "geometry": {"file": geometry, "degree": 2, "parameters": sizes, "follow_wear": 0.5},
+            "model": {"kind": kind},
+            "materials": {"steel": {"young": 2e5, "poisson": 0.3}},
+            "punch": {"regions": {"punch_body": "steel"}, "loads": [{"on": "punch_far", "force": down}],
+                      "supports": [{"on": "punch_far", "fix": ["x", "y"]}] if solid else []},
+            "strip": {"regions": {"strip_body": "steel"}, "supports": [{"on": "strip_far", "fix": sides}]},
+            "contact": {"friction": 0.1},
+            "wear": {"punch": {"coefficient": 1e-8}},
+            "motion": to_and_fro if solid else turn,
+            "run": {"half_cycles": 1},
+        }))  # fmt: skip
+        punch, weights = system.bodies.punch, system.pair.punch.weights
+        surface = system.pair.punch
+        assert len(surface.nodes) < len(surface.trace)
+        heights = system.element_heights.punch
+        assert heights.shape == weights.shape
+        if not solid:
+            np.testing.assert_allclose(heights, 0.5, rtol=1e-9)
+        low, high = (Worn(share * heights, system.unworn().strip) for share in (0.49, 0.51))
+        assert not system.outworn(low)
+        assert system.outworn(high)
+        depth = 0.02 + 0.01 * surface.x @ [1, 2, 0] if solid else np.full(len(weights), 0.02)
+        moved = assemble(system.case, system.comm, Worn(depth, system.unworn().strip))
+        assert moved.bodies.moved is not None
+        np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
+        lost = area(punch.body) - area(moved.bodies.punch.body)
+        assert lost == pytest.approx(weights @ depth if solid else 0.02, rel=1e-9)

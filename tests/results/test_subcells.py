@@ -31,3 +31,25 @@ def test_cells_tile_the_element(cell: str, size: float, degree: int) -> None:
         sizes = np.abs([np.linalg.det(p[:, 1:] - p[:, :1]) / 6 for p in four]).sum(axis=0)
     assert (sizes > 0).all()
     assert sizes.sum() == pytest.approx(size, rel=1e-12)
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3, 4])
+@pytest.mark.parametrize(("cell", "sides"), [("triangle", 3), ("tetrahedron", 4)])
+def test_parts_of_simplices_meet(cell: str, sides: int, degree: int) -> None:
+    """Inside, two parts share each side; outside there are degree^(d - 1) alike on each side of the element."""
+    variant = basix.LagrangeVariant.equispaced
+    x = basix.create_element(basix.ElementFamily.P, basix.CellType[cell], degree, variant).points
+    corners = linear_cells(cell, degree)
+    dim = x.shape[1]
+    facets = np.sort(np.concatenate([np.delete(corners, k, axis=1) for k in range(dim + 1)]), axis=1)
+    facets, times = np.unique(facets, axis=0, return_counts=True)
+    assert set(times) <= {1, 2}
+    outer = x[facets[times == 1]]
+    barycentric = np.concatenate([outer, 1 - outer.sum(axis=2, keepdims=True)], axis=2)
+    on_side = (np.abs(barycentric) < 1e-12).all(axis=1)
+    np.testing.assert_array_equal(on_side.sum(axis=0), np.full(sides, degree ** (dim - 1)))
+    assert on_side.any(axis=1).all()
+    # Those of a side have edges along its own edges, whatever its orientation: the neighbour's are the same.
+    lengths = np.linalg.norm(outer - np.roll(outer, 1, axis=1), axis=2) if dim == 3 else np.ones((1, 1)) / degree
+    allowed = np.array([1.0, np.sqrt(2.0)]) / degree
+    assert (np.abs(lengths[..., None] - allowed).min(axis=-1) < 1e-12).all()

@@ -162,7 +162,10 @@ class Factor:
         """Return the surface's part of the solutions for right-hand sides there (m, k), on the owner alone."""
         if self._schur_factor is None:
             assert self.schur is not None
-            self._schur_factor = scipy.linalg.cho_factor(self.schur, lower=True, overwrite_a=False)[0]
+            try:
+                self._schur_factor = scipy.linalg.cho_factor(self.schur, lower=True, overwrite_a=False)[0]
+            except np.linalg.LinAlgError as error:
+                raise without_factor(self._prefix, "not positive") from error
         return np.asarray(scipy.linalg.cho_solve((self._schur_factor, True), right))
 
     def free(self) -> None:
@@ -207,6 +210,14 @@ def make_together(factors: Sequence[Factor]) -> None:
         except ConvergenceError as caught:  # raised below, on all ranks
             error = error or caught
     raised_together(factors[0].comm, error)
+
+
+def without_factor(prefix: str, reason: str) -> ConvergenceError:
+    """Return the error of a matrix that has no factor."""
+    return ConvergenceError(
+        f"the matrix of PETSc's prefix {prefix} has no factor ({reason}): a material, a time or a "
+        "coefficient is too large or too small to compute with"
+    )
 
 
 def raised_together(comm: MPI.Comm, error: ConvergenceError | None) -> None:
@@ -310,10 +321,7 @@ def _factored(
     except PETSc.Error as error:
         failed = error.ierr
     if failed:
-        raise ConvergenceError(
-            f"the matrix of PETSc's prefix {prefix} has no factor (reason {failed}): a material, a time or a "
-            "coefficient is too large or too small to compute with"
-        )
+        raise without_factor(prefix, f"reason {failed}")
     factor = ksp.pc.getFactorMatrix()
     ksp.destroy()  # and with it the matrix, where nothing else holds it
     return factor

@@ -25,7 +25,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_here
-from fenwear.bodies.factor import factored_here, raised_together, solved
+from fenwear.bodies.factor import factored_here, raised_together, solved, without_factor
 from fenwear.bodies.schur import condense_only, schur_complement
 from fenwear.errors import ConvergenceError
 
@@ -104,7 +104,7 @@ class Joint:
             sharing[place] = part.sharing
         gone, left = (np.flatnonzero(these) for these in (having == sharing, having < sharing))
         self._gone, self._left = gone, left
-        self._factor = scipy.linalg.cholesky(whole[np.ix_(gone, gone)], lower=True, check_finite=False)
+        self._factor = _cholesky(whole[np.ix_(gone, gone)])
         self._across = self._lower(whole[np.ix_(gone, left)])  # L^-1 K_gone,left
         schur = whole[np.ix_(left, left)] - self._across.T @ self._across
         self._part: Part | None = Part(numbers[left], having[left], sharing[left], schur)
@@ -136,6 +136,14 @@ class Joint:
             return right
         way = {"lower": True, "trans": int(transposed), "check_finite": False}
         return np.asarray(scipy.linalg.solve_triangular(self._factor, right, **way))
+
+
+def _cholesky(matrix: Array) -> Array:
+    """Return L with L L^T a matrix (n, n); not a number where it has none, so that the other ranks need not wait."""
+    try:
+        return np.asarray(scipy.linalg.cholesky(matrix, lower=True, check_finite=False))
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.nan)
 
 
 class Substructures:
@@ -234,12 +242,19 @@ class Substructures:
         self._joints.append((below, joint))
         self._part = joint.take()
 
-    def finish(self) -> None:
-        """Keep the Schur complement of the surface, on the rank where it has arrived."""
-        if self._part is not None:
-            order = np.searchsorted(self._part.numbers, self._surface)
-            self.schur = self._part.schur[np.ix_(order, order)]
-            self._part = None
+    def finish(self) -> ConvergenceError | None:
+        """Keep the Schur complement of the surface and its factor, on the rank where it has arrived.
+
+        Returns:
+            The error if it has no factor.
+        """
+        if self._part is None:
+            return None
+        order = np.searchsorted(self._part.numbers, self._surface)
+        self.schur = self._part.schur[np.ix_(order, order)]
+        self._part = None
+        self._surface_factor = _cholesky(self.schur)
+        return None if np.isfinite(self._surface_factor).all() else without_factor(self._prefix, "not positive")
 
     @property
     def _place(self) -> int:
@@ -251,9 +266,6 @@ class Substructures:
 
     def solve_on_surface(self, right: Array) -> Array:
         """Return the surface's part of the solutions for right-hand sides there (m, k), on the owner alone."""
-        if self._surface_factor is None:
-            assert self.schur is not None
-            self._surface_factor = scipy.linalg.cho_factor(self.schur, lower=True)[0]
         return np.asarray(scipy.linalg.cho_solve((self._surface_factor, True), right))
 
     def surface_solution(self, right: Array) -> Array:
@@ -339,5 +351,5 @@ def make_substructures(bodies: Sequence[Substructures]) -> None:
             body.receive(step, 2 * k)
         MPI.Request.waitall(requests)
         step *= 2
-    for body in bodies:
-        body.finish()
+    found = [body.finish() for body in bodies]
+    raised_together(comm, next((one for one in found if one is not None), None))

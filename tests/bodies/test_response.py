@@ -89,7 +89,8 @@ def test_substructures_solve_for_any_forces(name: str, monkeypatch: pytest.Monke
         rest = np.abs(times(body.stiffness, both) - forces)
         found = [np.abs(both), rest, np.abs(one - both[:, 0]), np.abs(both[body.supported])]
         largest, *errors = np.max(system.comm.allgather([array.max(initial=0.0) for array in found]), axis=0)
-        bounds = (1e-12 * body.stiffness.norm(PETSc.NormType.INFINITY) * largest, 1e-9 * largest, 0.0)
+        # Elimination by blocks leaves |K| |u| times rounding and the root of K's condition, 1e3 in rings (Higham).
+        bounds = (1e-10 * body.stiffness.norm(PETSc.NormType.INFINITY) * largest, 1e-9 * largest, 0.0)
         assert (np.array(errors) <= bounds).all(), (errors, bounds)
 
 

@@ -18,7 +18,8 @@ PROPERTIES = {  # of a material, that may depend on the temperature, with their 
     "heat_capacity": "mm^2/(s^2*K)",
     "expansion": "1/K",
 }
-_Conductivity = Annotated[float, *quantity("N/(s*K)"), Field(gt=0)] | None
+# Beyond 1e12, far above any material, what a body stores is lost in rounding beside what it conducts.
+_Conductivity = Annotated[float, *quantity("N/(s*K)"), Field(gt=0, le=1e12)] | None
 _HeatCapacity = Annotated[float, *quantity("mm^2/(s^2*K)"), Field(gt=0)] | None
 _Expansion = Annotated[float, *quantity("1/K")] | None
 

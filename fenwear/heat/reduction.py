@@ -156,6 +156,7 @@ class _Growing:
         hottest = self.body.body.mesh.comm.allreduce(float(np.abs(field).max(initial=0.0)), MPI.MAX)
         if hottest == 0:
             return
+        _principal(self.body, field[:, None], 0.0, 0.0)  # told here if its energy is no number
         start = field[:, None] / hottest
         start[self.body.held] = 0.0
         for fields, share in ((start, 0.0), (relaxed / hottest, tolerance)):

@@ -207,7 +207,7 @@ def test_friction_has_no_unit() -> None:
 BEYOND = {
     "fast": ("hardness", ("motion", "amplitude"), "1e300 mm", "its speed to the power of 1 is beyond all numbers"),
     "dense": ("followed", ("materials", "composite", "density"), 1e300, "has no factor"),
-    "conducting": ("followed", ("materials", "composite", "conductivity"), 1e300, "are beyond all numbers"),
+    "conducting": ("followed", ("materials", "composite", "conductivity"), 1e300, "equal to 1000000000000"),
     "hot": ("example2-heat", ("heat", "initial"), 1e300, "are beyond all numbers"),
     "finer than rounding": ("example1-heat", ("heat", "reduction_tolerance"), 5e-324, "or equal to 0.0000001"),
 }

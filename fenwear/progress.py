@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Literal
 
@@ -11,7 +12,9 @@ from mpi4py import MPI
 from tqdm import tqdm
 
 LINE_SECONDS = 10.0  # after which a long step tells that it goes on
+LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
 How = Literal["bar", "lines", "none"]
+Log = Callable[[str], None]
 
 
 class Progress:

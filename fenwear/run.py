@@ -20,7 +20,7 @@ from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.law import with_law
 from fenwear.parallel import on_root
-from fenwear.progress import How, Progress
+from fenwear.progress import LOOK, How, Log, Progress
 from fenwear.results import checkpoint
 from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
@@ -38,9 +38,7 @@ from fenwear.stick.run import run_stick
 from fenwear.watch import Watch, stroke_warnings
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
-LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
 BLOCK_SECONDS = 2.0  # after which a block ends
-Log = Callable[[str], None]
 
 
 def run_case(

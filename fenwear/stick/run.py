@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from mpi4py import MPI
 from fenwear.case import Case, doubts
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, OutputError
 from fenwear.parallel import on_root
-from fenwear.progress import How, Progress
+from fenwear.progress import LOOK, How, Log, Progress
 from fenwear.report.stick import write_stick_report
 from fenwear.results.history import HISTORY, free_directory, make_directory, write_case, write_summary
 from fenwear.signals import Signals
@@ -26,9 +26,6 @@ from fenwear.stick.results import dataset, row_of, summary_of
 from fenwear.stick.setup import make_rig, reaches_border
 from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
-
-LOOK = 0.05  # s between two looks at clock and signals, where no other rank waits for them
-Log = Callable[[str], None]
 
 
 def run_stick(

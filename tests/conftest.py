@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import gc
 import os
 import subprocess
@@ -33,6 +34,7 @@ settings.load_profile("same")
 TESTS = Path(__file__).parent
 Edit = Callable[[dict[str, Any]], object]
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
+TERMINAL = pytest.StashKey[int]()
 
 
 @lru_cache(maxsize=24)  # the largest hold some hundred MB
@@ -45,6 +47,12 @@ def assembled() -> Iterator[Callable[..., Tribosystem]]:
     """Return assembled(name, *settings): the system of a built-in case, made once a session."""
     yield lambda name, *settings: _assembled(name, settings)
     _assembled.cache_clear()
+
+
+@pytest.fixture
+def tmp_path(tmp_path: Path) -> Path:
+    """Return the test's folder: that of rank 0 on every rank, since rank 0 writes and all read."""
+    return MPI.COMM_WORLD.bcast(tmp_path)
 
 
 @pytest.fixture(scope="session")
@@ -129,9 +137,29 @@ def _length(item: pytest.Item) -> str:
     return next((mark for mark in ("slow", "process") if item.get_closest_marker(mark)), "")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep a way to the terminal past what pytest captures."""
+    config.stash[TERMINAL] = os.dup(2)
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Show where each rank is, and end, if the ranks wait for one another for ever."""
+    if MPI.COMM_WORLD.size > 1:
+        faulthandler.dump_traceback_later(PATIENCE, exit=True, file=item.config.stash[TERMINAL])
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    """End all ranks where one fails: the others would wait for it in their next collective for ever."""
+    if report.failed and MPI.COMM_WORLD.size > 1:
+        text = f"\nrank {MPI.COMM_WORLD.rank}: {report.nodeid} failed in {report.when}\n{report.longreprtext}\n"
+        print(text, file=sys.__stderr__, flush=True)
+        MPI.COMM_WORLD.Abort(1)
+
+
 def pytest_runtest_teardown() -> None:
     """Destroy what is collective on all ranks together."""
     if MPI.COMM_WORLD.size > 1:
         gc.collect()
         PETSc.garbage_cleanup()
         MPI.COMM_WORLD.Barrier()
+        faulthandler.cancel_dump_traceback_later()

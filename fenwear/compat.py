@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 CORNERS = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8}
 
 
-def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags, MeshTags]:
+def model_to_mesh(
+    model: Any, comm: MPI.Comm, gdim: int, owner: int | None = None
+) -> tuple[Mesh, MeshTags, MeshTags]:
     """Distribute the gmsh model of rank 0: its mesh, cell tags and facet tags.
 
     Every rank gets as many cells, from left to right: always the same ones, unlike from a graph's
-    partitioner. dolfinx 0.9 has io.gmshio and returns three items, later versions io.gmsh and more.
+    partitioner; or one rank, the owner, gets all. dolfinx 0.9 has io.gmshio and returns three items, later versions io.gmsh and more.
     """
     gmsh_io = getattr(dolfinx.io, "gmsh", None) or __import__("dolfinx.io.gmshio", fromlist=["gmshio"])
     x = gmsh_io.extract_geometry(model)[:, 0] if comm.rank == 0 else np.empty(0)
@@ -29,7 +31,7 @@ def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags
         corners = np.asarray(cells[0]).reshape(-1, CORNERS[kinds[0].name])
         ranks_of = np.empty(len(corners), dtype=np.int32)
         order = np.argsort(x[corners].mean(axis=1).round(9), kind="stable")
-        ranks_of[order] = np.arange(len(corners)) * ranks // max(len(corners), 1)
+        ranks_of[order] = np.arange(len(corners)) * ranks // max(len(corners), 1) if owner is None else owner
         links = adjacencylist(ranks_of)
         return getattr(links, "_cpp_object", links)  # wrapped from 0.10 on
 

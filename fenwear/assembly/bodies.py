@@ -95,7 +95,9 @@ def build_bodies(
         MeshQualityError: an element does not survive the motion.
     """
     release(comm)  # what earlier systems have left
-    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
+    meshes = build_meshes(
+        case.geometry, case.folder, comm, case.model.law, whole=case.setup.reproducible
+    )
     moved = None if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (
@@ -157,7 +159,7 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
         at = nodal_function(mesh, case.geometry.degree, theta)
         law = isotropic(mesh, regions, case.materials, kind, at)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
-    return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)
+    return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
 
 
 def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Worn:

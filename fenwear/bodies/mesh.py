@@ -127,7 +127,7 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
 
 
 def build_meshes(
-    geometry: Geometry, folder: Path | None, comm: MPI.Comm, kind: Kind = "stress"
+    geometry: Geometry, folder: Path | None, comm: MPI.Comm, kind: Kind = "stress", *, whole: bool = False
 ) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
 
@@ -136,6 +136,7 @@ def build_meshes(
         folder: Where its path starts.
         comm: The ranks.
         kind: Of the model: solids are meshed in volumes.
+        whole: Whether each body is on one rank, the strip on the first and the punch on the second.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
@@ -144,10 +145,10 @@ def build_meshes(
     if comm.rank == 0:
         with _gmsh() as gmsh:
             on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind))
-            punch, strip = (_distribute(gmsh, name, comm, _dim(kind)) for name in BODIES)
+            punch, strip = (_distribute(gmsh, name, comm, kind, whole=whole) for name in BODIES)
     else:
         on_root(comm, lambda: None)
-        punch, strip = (_distribute(None, name, comm, _dim(kind)) for name in BODIES)
+        punch, strip = (_distribute(None, name, comm, kind, whole=whole) for name in BODIES)
     return punch, strip
 
 
@@ -297,22 +298,24 @@ def _solid_types(gmsh: Any) -> list[str]:
     return problems
 
 
-def _distribute(gmsh: Any, body: str, comm: MPI.Comm, whole: int) -> BodyMesh:
-    """Distribute one body's part of rank 0's gmsh model, of dimension `whole`; collective."""
-    groups: list[dict[str, int]] = [{} for _ in range(whole + 1)]
+def _distribute(gmsh: Any, body: str, comm: MPI.Comm, kind: Kind, *, whole: bool) -> BodyMesh:
+    """Distribute one body's part of rank 0's gmsh model over the ranks, or whole to one of them; collective."""
+    top = _dim(kind)
+    groups: list[dict[str, int]] = [{} for _ in range(top + 1)]
     points: dict[str, NDArray[np.float64]] = {}
     model = None
     if gmsh is not None:
         model = gmsh.model
-        for dim in range(whole + 1):
+        for dim in range(top + 1):
             groups[dim] = {n: t for n, t in _groups(gmsh, dim).items() if n.startswith(f"{body}_")}
         for name, tag in groups[0].items():
-            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :whole]
+            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :top]
         both = model.getCurrent()
         _isolate(gmsh, body, groups)
     *_, curves, regions = comm.bcast(groups)
     points = comm.bcast(points)
-    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, gdim=whole)
+    owner = (len(BODIES) - 1 - BODIES.index(body)) % comm.size if whole else None
+    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, top, owner)
     if gmsh is not None:
         gmsh.model.remove()
         gmsh.model.setCurrent(both)

@@ -95,9 +95,7 @@ def build_bodies(
         MeshQualityError: an element does not survive the motion.
     """
     release(comm)  # what earlier systems have left
-    meshes = build_meshes(
-        case.geometry, case.folder, comm, case.model.law, whole=case.setup.reproducible
-    )
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, _owners(case, comm))
     moved = None if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (
@@ -111,6 +109,14 @@ def build_bodies(
     )
     heat = build_conduction(case, punch, strip, warmed)
     return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip), warmed)
+
+
+def _owners(case: Case, comm: MPI.Comm) -> tuple[int, int] | None:
+    """Return the ranks that have the whole punch and the whole strip; None where all share both.
+
+    Sums within a body are then those of one rank.
+    """
+    return (1 % comm.size, 0) if case.setup.reproducible else None
 
 
 def build_conduction(

@@ -276,6 +276,8 @@ def moved(matrix: PETSc.Mat, owner: int) -> PETSc.Mat | None:
         PETSc.IS().createGeneral(np.arange(size if here else 0, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
         for size in matrix.getSize()
     )
+    for chosen, block in zip((rows, columns), matrix.getBlockSizes(), strict=True):
+        chosen.setBlockSize(block)  # MUMPS orders by blocks
     (whole,) = matrix.createSubMatrices([rows], [columns])
     if here:
         return whole

@@ -127,7 +127,11 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
 
 
 def build_meshes(
-    geometry: Geometry, folder: Path | None, comm: MPI.Comm, kind: Kind = "stress", *, whole: bool = False
+    geometry: Geometry,
+    folder: Path | None,
+    comm: MPI.Comm,
+    kind: Kind = "stress",
+    owners: tuple[int, int] | None = None,
 ) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
 
@@ -136,19 +140,20 @@ def build_meshes(
         folder: Where its path starts.
         comm: The ranks.
         kind: Of the model: solids are meshed in volumes.
-        whole: Whether each body is on one rank, the strip on the first and the punch on the second.
+        owners: The ranks that have the whole punch and the whole strip; by default all have parts of both.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
     """
     on_root(comm, lambda: find_geometry(geometry, folder))
+    owned = owners or (None, None)
     if comm.rank == 0:
         with _gmsh() as gmsh:
             on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind))
-            punch, strip = (_distribute(gmsh, name, comm, kind, whole=whole) for name in BODIES)
+            punch, strip = (_distribute(gmsh, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     else:
         on_root(comm, lambda: None)
-        punch, strip = (_distribute(None, name, comm, kind, whole=whole) for name in BODIES)
+        punch, strip = (_distribute(None, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     return punch, strip
 
 
@@ -298,8 +303,8 @@ def _solid_types(gmsh: Any) -> list[str]:
     return problems
 
 
-def _distribute(gmsh: Any, body: str, comm: MPI.Comm, kind: Kind, *, whole: bool) -> BodyMesh:
-    """Distribute one body's part of rank 0's gmsh model over the ranks, or whole to one of them; collective."""
+def _distribute(gmsh: Any, body: str, owner: int | None, comm: MPI.Comm, kind: Kind) -> BodyMesh:
+    """Distribute one body's part of rank 0's gmsh model over the ranks, or the whole to its owner; collective."""
     top = _dim(kind)
     groups: list[dict[str, int]] = [{} for _ in range(top + 1)]
     points: dict[str, NDArray[np.float64]] = {}
@@ -314,7 +319,6 @@ def _distribute(gmsh: Any, body: str, comm: MPI.Comm, kind: Kind, *, whole: bool
         _isolate(gmsh, body, groups)
     *_, curves, regions = comm.bcast(groups)
     points = comm.bcast(points)
-    owner = (len(BODIES) - 1 - BODIES.index(body)) % comm.size if whole else None
     mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, top, owner)
     if gmsh is not None:
         gmsh.model.remove()

@@ -60,8 +60,9 @@ class Request:
     def identity(self) -> list[object]:
         """Return all that the answer follows from, on this rank."""
         patterns, coupling = csr_array(self.patterns), self.thermal_coupling
-        values: list[object] = [self.elastic.setup, patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
-        return [*self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
+        values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
+        setup = self.elastic.setup
+        return [setup, *self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
 
     def forces(self, columns: NDArray[np.int64]) -> Array:
         """Return the forces on the trace nodes of some columns (N, d, k): column l a is pattern l along direction a."""

@@ -86,7 +86,7 @@ class Case(Part):
             problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
-        problems += self.setup.problems(heat=self.heat is not None, full=self.contact.solver == "full")
+        problems += self.setup.problems(None if self.heat is None else self.heat.operator, self.contact.solver)
         problems += [*self._kind_problems(), *self._sliding_problems()]
         problems += [*self._program_problems(), *self._stick_problems()]
         problems += [

@@ -23,22 +23,24 @@ class Setup(Part):
     )
     reproducible: bool = Field(
         default=False,
-        description="results equal to the last bit on any number of ranks: each body on one rank, so that at most two work",
+        description="results equal to the last bit on any number of ranks: each body is on one, so that two work",
     )
 
-    def problems(self, *, heat: bool, full: bool) -> list[str]:
+    def problems(self, heat: Literal["reduced", "full"] | None, contact: Literal["condensed", "full"]) -> list[str]:
         """Return what of it does not go together.
 
         Args:
-            heat: Whether bodies answer to temperatures, too.
-            full: Whether the contact is solved for with all displacements.
+            heat: The operator of the heat; None without.
+            contact: What the contact is solved with.
         """
         found = []
-        if heat and self.way not in OF_TEMPERATURES:
+        if heat is not None and self.way not in OF_TEMPERATURES:
             names = ", ".join(f"'{way}'" for way in OF_TEMPERATURES)
             found.append(f"setup.way: expected one of {names} with heat: temperatures act inside the bodies")
         if self.reproducible and self.way in ("substructures", "multigrid"):
             found.append(f"setup.reproducible: expected another way than '{self.way}', whose sums go over the ranks")
-        if self.reproducible and full:
+        if self.reproducible and contact == "full":
             found.append("setup.reproducible: expected contact.solver = 'condensed', whose sums stay on a rank")
+        if self.reproducible and heat == "full":
+            found.append("setup.reproducible: expected heat.operator = 'reduced', whose steps every rank makes alike")
         return found

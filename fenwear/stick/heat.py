@@ -196,7 +196,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
 
 
 def read_at(surface: ContactSurface, points: Array) -> csr_array:
-    """Return what takes values at the trace nodes of a surface to points near it (p, N): linear, beside it as at its rim.
+    """Return what takes values at the trace nodes of a surface to points near it (p, N): linear, beside it as its rim.
 
     Args:
         surface: Seen along the axis that is nearest to its mean normal.

@@ -18,12 +18,12 @@ from typing import Any
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
 os.environ["FENWEAR_KEPT_GIB"] = "0"  # each test computes what it checks
 
+import forked
 import pytest
 from hypothesis import HealthCheck, settings
 from mpi4py import MPI
 from petsc4py import PETSc
 
-import forked
 from fenwear import Case, Tribosystem, assemble, load_case, make_case
 
 # The same examples on every machine and every rank; --hypothesis-profile=search looks for others.

@@ -19,7 +19,7 @@ CASES = {
     "jump": ("example1", "run.half_cycles=2000", "run.integration=jump"),
     "heat": ("example1-heat", "run.half_cycles=30"),
     "two worn bodies": ("fretting", "run.half_cycles=2000", "motion.positions=5"),
-    # Several ranks talk a hundred times in each of their steps: a few half-cycles, the first of which wears enough to move the meshes.
+    # Several ranks talk a hundred times in each of their steps: few half-cycles; after the first the meshes are moved.
     "followed meshes": ("example1-heat", "run.half_cycles=4", "run.integration=implicit", "geometry.follow_wear=5e-6"),
     "full heat": ("example1-heat", "run.half_cycles=4", "heat.operator=full"),
 }

@@ -65,9 +65,11 @@ def pattern_rows(pattern: Any) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
 
 
 def facet_nodes(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the geometry's nodes of facets (f, nodes), corners first; dolfinx 0.9 fails on a rank that has none."""
+    """Return the geometry's nodes of facets (f, nodes), corners first; dolfinx 0.9 fails where there are none."""
     if not len(facets):
-        return np.zeros((0, {"tetrahedron": 3, "hexahedron": 4}.get(mesh.basix_cell().name, 2)), dtype=np.int32)
+        order, cell = geometry_degree(mesh), mesh.basix_cell().name
+        nodes = {"tetrahedron": (order + 1) * (order + 2) // 2, "hexahedron": (order + 1) ** 2}.get(cell, order + 1)
+        return np.zeros((0, nodes), dtype=np.int32)
     return np.asarray(dolfinx.mesh.entities_to_geometry(mesh, mesh.topology.dim - 1, facets))
 
 

@@ -167,9 +167,9 @@ def _mapped(path: Path) -> dict[str, Array]:
             if member.compress_type != zipfile.ZIP_STORED or zlib.crc32(stored) != member.CRC:
                 raise zipfile.BadZipFile(member.filename)
             file.seek(begin)
-            if np.lib.format.read_magic(file) != (1, 0):
+            if np.lib.format.read_magic(file) != (1, 0):  # type: ignore[no-untyped-call]
                 raise ValueError(member.filename)
-            shape, in_columns, kind = np.lib.format.read_array_header_1_0(file)
+            shape, in_columns, kind = np.lib.format.read_array_header_1_0(file)  # type: ignore[no-untyped-call]
             values = np.frombuffer(stored, kind, math.prod(shape), file.tell() - begin)
             found[member.filename.removesuffix(".npy")] = values.reshape(shape, order="F" if in_columns else "C")
     return found

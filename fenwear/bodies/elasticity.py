@@ -22,6 +22,7 @@ from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.bodies.multigrid import Multigrid
 from fenwear.bodies.substructure import Boundary, Substructures
 from fenwear.case import Body, Kind, Load, Setup, Support
 from fenwear.errors import CaseError, InputError
@@ -212,6 +213,10 @@ class ElasticBody:
             matrix = self.stiffness
             surface = self.surface_dofs if with_surface else None
             comm = self.body.mesh.comm
+            if self.setup.way == "multigrid":
+                self._factors.append(Multigrid(matrix, self._rigid_basis(), PREFIX, comm))
+                del self.stiffness
+                return self._factors[0]
             factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface)
             self._factors.append(factor)
             if not kept:  # all that needs it has it now

@@ -223,13 +223,10 @@ class Coupled:
 
     def through(self, state: Array, pressure: Array) -> list[Array]:
         """Return the temperatures (dim,) before, between and after the phases of a cycle at these pressures."""
-        heat, states = self.heat, [state]
-        if heat is None:
-            return states
-        for one, p, mu in zip(heat.maps(heat.conductances(pressure)), pressure, self.mu, strict=True):
-            after: Array = one.propagator @ states[-1] + one.source + one.response @ (mu * p)
-            states.append(after)
-        return states
+        if self.heat is None:
+            return [state]
+        cycle = self.heat.cycle(self.heat.conductances(pressure))
+        return [state, *cycle.states(state, self.mu * pressure)]
 
     def _update(
         self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: Worn | None, passing: Passing | None

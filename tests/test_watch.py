@@ -17,14 +17,14 @@ from markupsafe import escape
 from fenwear import Tribosystem, assemble, load_case, make_case, steady
 from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
-from fenwear.clipped import contact_ends
 from fenwear.errors import MeshQualityError
 from fenwear.report.page import page
-from fenwear.rim import contact_rim
 from fenwear.run import run_case
 from fenwear.stick.cycle import Records
 from fenwear.stick.setup import make_rig
 from fenwear.watch import elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
+from fenwear.watch.ends import contact_ends
+from fenwear.watch.rim import contact_rim
 
 Assembled = Callable[..., Tribosystem]
 FLAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")

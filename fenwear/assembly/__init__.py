@@ -12,7 +12,8 @@ takes again what a changed case makes necessary, and keeps the rest.
 """
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
-from fenwear.assembly.placed import Clock, Placed, Sliding, make_sliding, place
+from fenwear.assembly.placed import Clock, Placed, place
+from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
     Condensed,
     Preparation,

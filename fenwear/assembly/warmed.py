@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies, build_conduction, elastic_body
-from fenwear.assembly.placed import make_sliding, place
+from fenwear.assembly.placed import place
+from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
     Tribosystem,
     condense_bodies,

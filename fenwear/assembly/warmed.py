@@ -84,6 +84,15 @@ def taken_at(system: Tribosystem) -> tuple[Array, Array]:
     return punch, strip
 
 
+def warming_key(system: Tribosystem) -> str:
+    """Return the key of a property that depends on the temperature; "" where none does."""
+    if system.made_from is None:
+        return ""
+    case = system.case
+    used = sorted({*case.punch.regions.values(), *case.strip.regions.values()})
+    return next((f"materials.{name}.{key}" for name in used for key in case.materials[name].dependent), "")
+
+
 def _change(case: Case, body: HeatBody, description: Body, now: Array, then: Array) -> float:
     """Return the largest change of a property at this rank's own nodes, over what it was."""
     largest = 0.0

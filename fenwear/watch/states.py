@@ -9,6 +9,7 @@ from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
 from fenwear.cycle import Block, Steady
+from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import ContactEnds, contact_ends, opened
 from fenwear.watch.rim import ContactRim, contact_rim
 from fenwear.watch.stroke import stroke_warnings
@@ -24,7 +25,7 @@ class Watch:
     """
 
     def __init__(self, system: Tribosystem) -> None:
-        self.system, self.limits = system, contact_limits(system)
+        self.system, self.limits, self.chamfer = system, contact_limits(system), contact_chamfer(system)
         self._texts: dict[str, str] = {}
         self._first_clipped = 0
 
@@ -32,6 +33,8 @@ class Watch:
         """Take the next block and return what is to be said of it that was not said of an earlier one."""
         case, weights = self.system.case, block.system.pair.weights
         found = {"clipped": self._clipped(block)}
+        if self.chamfer is not None:
+            found["chamfer"] = self.chamfer.text(self.chamfer.widened(self.system, block.end.worn))
         found["pressed"] = pressed(case, float(mean_pressures(block.pressure, weights).max()))
         if block.heat is not None:
             hottest = int(np.argmax(block.heat.max_temperature))
@@ -40,7 +43,7 @@ class Watch:
         said = {kind: text for kind, text in found.items() if text}
         new = [text for kind, text in said.items() if kind not in self._texts]
         # The width that is needed grows with the scar; of the others the first time is what counts.
-        self._texts = {**said, **self._texts, **({"clipped": found["clipped"]} if found["clipped"] else {})}
+        self._texts = {**said, **self._texts, **{kind: said[kind] for kind in ("clipped", "chamfer") if kind in said}}
         return new
 
     def warnings(self) -> list[str]:

@@ -247,7 +247,6 @@ class Case(Part):
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
             "contact.solver: expected 'condensed'": self.contact.solver == "full",
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
-            "heat: expected none in a solid": self.heat is not None and self.model.kind == "solid",
             "heat.track: expected none": self.heat is not None and self.heat.track is not None,
             "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",

@@ -48,11 +48,11 @@ class _Level:
         """Return a polynomial of D^-1 A times D^-1 b, from zero (Saad 2003, algorithm 12.1)."""
         sigma = self._middle / self._half
         rho = 1 / sigma
-        rest: Array = self._inverse * right
-        step: Array = rest / self._middle
+        rest: Array = np.multiply(self._inverse, right)
+        step: Array = np.divide(rest, self._middle)
         found: Array = step.copy()
         for _ in range(DEGREE - 1):
-            rest = rest - self._inverse * times(self.matrix, step)
+            rest = np.subtract(rest, self._inverse * times(self.matrix, step))
             before, rho = rho, 1 / (2 * sigma - rho)
             step = rho * before * step + (2 * rho / self._half) * rest
             found += step

@@ -189,7 +189,7 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Spare the collector what is loaded by now and stays: after every test on several ranks it looks at all the rest."""
+    """Spare the collector what is loaded by now and stays: it looks at the rest after each test on several ranks."""
     gc.collect()
     gc.freeze()
 

@@ -37,14 +37,8 @@ from fenwear.paper.section import (
     readings_markdown,
     summary,
 )
-from fenwear.paper.study import (
-    StabilityMap,
-    central_runs,
-    heat_runs,
-    no_heat,
-    stability_maps,
-    steady_heat,
-)
+from fenwear.paper.states import StabilityMap
+from fenwear.paper.study import central_runs, heat_runs, no_heat, stability_maps, steady_heat
 
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 ROUND, LITERAL = (reading for reading in READINGS if reading.name in ("round values", "text literal"))

@@ -17,14 +17,15 @@ from markupsafe import escape
 from fenwear import Tribosystem, assemble, load_case, make_case, steady
 from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
-from fenwear.clipped import contact_ends
 from fenwear.errors import MeshQualityError
 from fenwear.report.page import page
-from fenwear.rim import contact_rim
 from fenwear.run import run_case
 from fenwear.stick.cycle import Records
 from fenwear.stick.setup import make_rig
 from fenwear.watch import elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
+from fenwear.watch.chamfer import contact_chamfer
+from fenwear.watch.ends import contact_ends
+from fenwear.watch.rim import contact_rim
 
 Assembled = Callable[..., Tribosystem]
 FLAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
@@ -262,3 +263,83 @@ def test_long_strokes_are_not_told(assembled: Assembled, name: str) -> None:
 def test_frictionless_stroke_is_not_told(assembled: Assembled) -> None:
     """Nothing follows where there is no friction."""
     assert stroke_warnings(assembled("fretting", *CYLINDER, "motion.amplitude=1 um")) == []
+
+
+CHAMFERED = """
+SetFactory("OpenCASCADE");
+rise = {rise}; w = {width};
+Point(1) = {{-1.4, 0, 0}}; Point(2) = {{1.4, 0, 0}}; Point(3) = {{w, rise, 0}}; Point(4) = {{w, 4, 0}};
+Point(5) = {{-w, 4, 0}}; Point(6) = {{-w, rise, 0}};
+Line(1) = {{1, 2}}; Line(2) = {{2, 3}}; Line(3) = {{3, 4}}; Line(4) = {{4, 5}}; Line(5) = {{5, 6}}; Line(6) = {{6, 1}};
+Curve Loop(1) = {{1, 2, 3, 4, 5, 6}}; Plane Surface(1) = {{1}};
+Point(11) = {{-4, -2, 0}}; Point(12) = {{4, -2, 0}}; Point(13) = {{4, 0, 0}}; Point(14) = {{w, 0, 0}};
+Point(15) = {{-w, 0, 0}}; Point(16) = {{-4, 0, 0}};
+Line(11) = {{11, 12}}; Line(12) = {{12, 13}}; Line(13) = {{13, 14}}; Line(14) = {{14, 15}}; Line(15) = {{15, 16}};
+Line(16) = {{16, 11}};
+Curve Loop(2) = {{11, 12, 13, 14, 15, 16}}; Plane Surface(2) = {{2}};
+Mesh.MeshSizeMax = 0.7;
+"""
+IN_PLANE = """
+Physical Surface("punch_body") = {{1}}; Physical Surface("strip_body") = {{2}};
+Physical Curve("punch_contact") = {{{tagged}}}; Physical Curve("strip_contact") = {{14}};
+Physical Curve("punch_top") = {{4}}; Physical Curve("strip_bottom") = {{11}};
+"""
+IN_SPACE = """
+Rotate {{{{1, 0, 0}}, {{0, 0, 0}}, Pi/2}} {{ Surface{{1, 2}}; }}
+punch[] = Extrude {{0, 2, 0}} {{ Surface{{1}}; }};
+strip[] = Extrude {{0, 2, 0}} {{ Surface{{2}}; }};
+e = 1e-3; flat[] = Surface In BoundingBox{{-1.4 - e, -e, -e, 1.4 + e, 2 + e, e}};
+below[] = Surface In BoundingBox{{-w - e, -e, -e, w + e, 2 + e, e}}; below[] -= flat[];
+cut[] = Surface In BoundingBox{{-w - e, -e, -e, w + e, 2 + e, rise + e}}; cut[] -= {{flat[], below[]}};
+Physical Volume("punch_body") = punch[1]; Physical Volume("strip_body") = strip[1];
+Physical Surface("punch_contact") = {{flat[]{tagged}}}; Physical Surface("strip_contact") = below[];
+Physical Surface("punch_top") = Surface In BoundingBox{{-w - e, -e, 4 - e, w + e, 2 + e, 4 + e}};
+Physical Surface("strip_bottom") = Surface In BoundingBox{{-9, -e, -2 - e, 9, 2 + e, -2 + e}};
+"""
+
+
+def chamfered(folder: Path, kind: str, rise: float, width: float = 2.0, *, tagged: bool = False) -> Tribosystem:
+    """Return a flat punch 2.8 mm wide with chamfers of this rise and (width - 1.4) mm of run, without elasticity."""
+    text = CHAMFERED + (IN_SPACE if kind == "solid" else IN_PLANE)
+    chosen = {("solid", True): ", cut[]", ("solid", False): "", ("plane", True): "6, 1, 2", ("plane", False): "1"}
+    (folder / "punch.geo").write_text(text.format(rise=rise, width=width, tagged=chosen[kind, tagged]), "utf-8")
+    fixed = ["x", "y", "z"] if kind == "solid" else ["x", "z"]
+    case = {
+        "geometry": {"file": str(folder / "punch.geo"), "degree": 2},
+        "model": {"kind": kind},
+        "materials": {"steel": {"young": 2e5, "poisson": 0.3}},
+        "punch": {
+            "regions": {"punch_body": "steel"},
+            "supports": [{"on": "punch_top", "fix": fixed[:-1]}],
+            "loads": [{"on": "punch_top", "force": [*[0] * (len(fixed) - 1), -10]}],
+        },
+        "strip": {"regions": {"strip_body": "steel"}, "supports": [{"on": "strip_bottom", "fix": fixed}]},
+        "contact": {"friction": 0.1},
+        "wear": {"punch": {"coefficient": 1e-8}},
+        "motion": {"kind": "reciprocating", "amplitude": 1, "period": 1},
+        "run": {"half_cycles": 1},
+    }
+    return place_case(make_case(case))
+
+
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+@pytest.mark.parametrize(("rise", "wider"), [(0.6, 0.1), (0.3, 0.2), (1.2, 0.05)])
+def test_a_chamfer_that_wear_reaches(tmp_path: Path, kind: str, rise: float, wider: float) -> None:
+    """Reference: 0.05 mm off a flat beside a chamfer of rise over 0.6 mm makes it 0.05 * 0.6 / rise wider a side."""
+    system = chamfered(tmp_path, kind, rise)
+    chamfer = contact_chamfer(system)
+    assert chamfer is not None
+    worn = system.unworn()
+    assert chamfer.text(chamfer.widened(system, worn)) == ""
+    worn = replace(worn, punch=np.full_like(worn.punch, 0.05))
+    assert chamfer.widened(system, worn) == pytest.approx(wider, rel=1e-6)
+    text = chamfer.text(chamfer.widened(system, worn))
+    assert ("" if wider < 0.02 * 2.8 else f"about {wider:.2g} mm wider than the 2.8") in text
+    assert bool(text) == (wider > 0.02 * 2.8)
+
+
+@pytest.mark.parametrize("kind", ["plane", "solid"])
+def test_what_is_no_chamfer(tmp_path: Path, kind: str) -> None:
+    """One that is tagged, and sides that are nearly upright."""
+    assert contact_chamfer(chamfered(tmp_path, kind, 0.3, tagged=True)) is None
+    assert contact_chamfer(chamfered(tmp_path, kind, 3.9, 1.5)) is None

@@ -12,7 +12,8 @@ takes again what a changed case makes necessary, and keeps the rest.
 """
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
-from fenwear.assembly.placed import Clock, Placed, Sliding, make_sliding, place
+from fenwear.assembly.placed import Clock, Placed, place
+from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
     Condensed,
     Preparation,
@@ -27,7 +28,7 @@ from fenwear.assembly.tribosystem import (
     with_reduced_heat,
 )
 from fenwear.assembly.variants import assemble, in_parts, place_case, set_up_by, vary, with_case
-from fenwear.assembly.warmed import outwarmed, property_change, taken_at, warmed_system
+from fenwear.assembly.warmed import outwarmed, property_change, taken_at, warmed_system, warming_key
 
 __all__ = [
     "Bodies",
@@ -57,6 +58,7 @@ __all__ = [
     "taken_at",
     "vary",
     "warmed_system",
+    "warming_key",
     "with_case",
     "with_exchange",
     "with_reduced_heat",

@@ -9,7 +9,8 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies, build_conduction
-from fenwear.assembly.placed import Placed, make_sliding, place
+from fenwear.assembly.placed import Placed, place
+from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
     Preparation,
     Tribosystem,

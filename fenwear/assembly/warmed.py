@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies, build_conduction, elastic_body
-from fenwear.assembly.placed import make_sliding, place
+from fenwear.assembly.placed import place
+from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
     Tribosystem,
     condense_bodies,
@@ -81,6 +82,15 @@ def taken_at(system: Tribosystem) -> tuple[Array, Array]:
     start = system.case.heat.initial
     punch, strip = (np.full(body.owned, start) for body in system.bodies.heat)
     return punch, strip
+
+
+def warming_key(system: Tribosystem) -> str:
+    """Return the key of a property that depends on the temperature; "" where none does."""
+    if system.made_from is None:
+        return ""
+    case = system.case
+    used = sorted({*case.punch.regions.values(), *case.strip.regions.values()})
+    return next((f"materials.{name}.{key}" for name in used for key in case.materials[name].dependent), "")
 
 
 def _change(case: Case, body: HeatBody, description: Body, now: Array, then: Array) -> float:

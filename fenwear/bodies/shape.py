@@ -80,7 +80,7 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, kind: Kind, held: Seq
         raise MeshQualityError(
             f"the wear of the {body.name} has used up the elements at its contact: one is left with "
             f"{max(ratio, 0.0):.0%} of its size; the depth is {depth.max():.3g} mm. Expected a geometry that is higher "
-            "where it wears, or less wear"
+            "where it wears, a chamfer beside the contact that is part of it, or less wear"
         )
     owned = space.dofmap.index_map.size_local
     return trace.pick(displaced[:owned, None])[trace.surface.nodes, 0, 0]

@@ -26,37 +26,42 @@ def steady_command(
     from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
     from fenwear.law import with_law
+    from fenwear.results.degrees import degrees_of
     from fenwear.watch import steady_warnings
 
     begin = time.perf_counter()
     loaded = with_law(load(case, settings), log)
     if loaded.contact.law == "coulomb":
-        _print_final(case, loaded, as_json=as_json)
+        _print_final(case, loaded, as_json=as_json, fresh=fresh)
         return
     system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
-    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(system, state)]
+    found = state.system
+    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(found, state)]
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
-        _print_steady(case, system, state)
+        _print_steady(case, found, state)
     way = time.perf_counter()
-    rate = growth_rate(system, state.phase_pressure)
-    cycles = cycles_to_reach(system, state, 0.01) if rate < 0 else None
+    rate = growth_rate(found, state.phase_pressure)
+    cycles = cycles_to_reach(found, state, 0.01) if rate < 0 else None
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
     if not as_json:
         _print_way(rate, cycles, seconds, time.perf_counter() - begin)
         return
+    degrees = degrees_of(loaded)
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     print_json(
         {
-            **_coordinates(system),
+            **_coordinates(found),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
-            "temperature": None if state.heat is None else state.heat.punch[-1].tolist(),
-            "temperature_strip": None if state.heat is None else state.heat.strip[-1].tolist(),
+            "temperature": None if state.heat is None else degrees.of(state.heat.punch[-1]).tolist(),
+            "temperature_strip": None if state.heat is None else degrees.of(state.heat.strip[-1]).tolist(),
+            "temperature_unit": None if state.heat is None else degrees.unit,
+            "property_passes": state.passes,
             "growth_rate": rate,
             "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
@@ -69,11 +74,11 @@ def steady_command(
     )
 
 
-def _print_final(name: str, case: Case, *, as_json: bool) -> None:
+def _print_final(name: str, case: Case, *, as_json: bool, fresh: bool) -> None:
     """Print the shape to which partial slip wears."""
     from fenwear.stick.command import final_of, final_text
 
-    _, numbers = final_of(case)
+    _, numbers = final_of(case, fresh=fresh)
     if as_json:
         print_json(numbers)
     else:
@@ -109,6 +114,9 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     scale = pressure_scale(system, state.phase_pressure)
     print(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
     print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
+    if state.passes:
+        times = "once" if state.passes == 1 else f"{state.passes} times"
+        print(f"  properties of materials are those of these temperatures, taken anew {times}")
     if state.heat is not None:
         degrees = degrees_of(system.case)
         punch, strip = (degrees.of(body.max()) for body in (state.heat.punch, state.heat.strip))

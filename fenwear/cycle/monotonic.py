@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, steady_exchange
-from fenwear.cycle.steady import check_constant_materials
-from fenwear.errors import CaseError, InputError
+from fenwear.assembly import Tribosystem, steady_exchange, warming_key
+from fenwear.errors import CaseError, ConvergenceError, InputError
 
 DIRECTIONS = (-1, 1)
 
@@ -43,7 +42,11 @@ def monotonic(system: Tribosystem) -> Monotonic:
     """
     if system.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
-    check_constant_materials(system)
+    if key := warming_key(system):
+        raise ConvergenceError(
+            f"no steady temperatures of one-way sliding are solved for where {key} depends on the temperature; "
+            'expected `steady`, or a motion.kind = "one-way"'
+        )
     speed = system.motion.mean_speed
     exchange = steady_exchange(system, [d * speed for d in DIRECTIONS])
     pressures = [system.optimum(d).pressure for d in DIRECTIONS]

@@ -12,35 +12,36 @@ wear outruns the rigid motion for ever the surface opens without limit: there om
 Wear of the strip joins where it keeps the strip's shape: sliding out of the plane, or on a closed
 track. Under a punch that goes to and fro the strip's track deepens for ever, most where every
 position touches it: there is no state that repeats.
+
+Where properties of materials depend on the temperature, state and bodies follow each other: the state of the
+bodies as they are, the bodies with the properties of its temperatures at the end of a cycle, and so on, until no
+property changes any more.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import linprog
-from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key
 from fenwear.contact import ContactState
-from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Operator
-from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.cycle.coupled import Coupled
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
+from fenwear.cycle.steady_inequality import OPEN, SteadyInequality
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
+from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
-from fenwear.sliding.friction import ContactConditions
 
-DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 ZERO = 1e-12  # of the largest: a velocity that is rounding
-OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
+LEFT = 0.1  # of heat.property_tolerance: what properties may still change by in the state that is found
+FALLING = 0.7  # of the change of the properties in the pass before
+PASSES = 30
 
 
 @dataclass(frozen=True, repr=False)
@@ -50,10 +51,12 @@ class SteadyHeat:
     Attributes:
         punch: Of the punch's contact surface at the end of each half-cycle (half_cycles, n), K.
         strip: Of the strip's (half_cycles, n), K.
+        end: Of the whole bodies at the end of a cycle, which is its beginning.
     """
 
     punch: Array
     strip: Array
+    end: HeatState
 
     def __repr__(self) -> str:
         """Say in a line what it is."""
@@ -77,6 +80,8 @@ class Steady:
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
         coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
+        system: What it is the state of: with the properties of its own temperatures, where they depend on them.
+        passes: How often the properties were taken anew; 0 where they are constants.
     """
 
     directions: tuple[int, ...]
@@ -91,6 +96,8 @@ class Steady:
     seconds: float
     heat: SteadyHeat | None = None
     coordinates: Array = field(kw_only=True)
+    system: Tribosystem = field(kw_only=True)
+    passes: int = field(default=0, kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -103,166 +110,69 @@ class Steady:
         return f"<Steady: {n} contact nodes, {len(self.directions)} half-cycles, largest pressure {most:.5g} MPa>"
 
 
-class _SteadyInequality:
-    """Unknown: p of each phase, omega, the rigid modes a of all phases but the first, lambda."""
-
-    def __init__(self, system: Tribosystem) -> None:
-        rigid, interface = system.rigid, system.interface
-        self.system = system
-        m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
-        self.m, self.n, self.r = m, n, r
-        self.wear = system.phases_wear
-        self.p_scale = rigid.mean_pressure
-        self.gap_scale = self.p_scale * interface.elastic_length
-        self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
-        self.lengths = system.mode_lengths
-        self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
-        self.omega = slice(m * n, m * n + n)
-        self._slide(system.friction_ratios())
-        size = self.equations.size
-        self._cold: Array = np.zeros(size)  # what the rows have besides the unknowns, without heat
-        for k, own in enumerate(system.interfaces):
-            moved = own.pair.initial_gap - system.pair.initial_gap
-            self._cold[k * n : (k + 1) * n] = (own.load_gap + moved) / self.gap_scale
-            last = m * n + n + k * r
-            self._cold[last : last + r] = own.rigid.resultant / self.moment[:, 0]
-        self.offset: Array = self._cold
-        # At its upper bound a variational inequality wants F <= 0: the wear balance with its sign turned.
-        lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
-        lower[: m * n] = 0.0
-        upper[self.omega] = OPEN
-        self.x = self._start()
-        self._solved = False
-        self.inequality = Inequality(
-            lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
-        )
-
-    def _slide(self, ratios: Sequence[Array]) -> None:
-        """Take friction."""
-        made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
-        compliances, balances = [], []
-        for own, ratio in zip(self.system.interfaces, ratios, strict=True):
-            key = (id(own.gap_by_force), np.asarray(ratio + own.pair.normal).tobytes())
-            if key not in made:
-                made[key] = own.compliance(ratio) * (self.p_scale / self.gap_scale)
-            compliances.append(made[key])
-            balances.append(own.rigid.equilibrium(ratio) * self.p_scale / self.moment)
-        modes = self.system.rigid.rigid_normal / self.lengths
-        self.equations = ShapeEquations(compliances, modes, np.array(balances))
-        self._known: tuple[list[csr_array], Array, Operator] | None = None  # the last derivative, and what it is of
-
-    def take(self, conditions: Sequence[ContactConditions]) -> None:
-        """Take friction and wear at the conditions of the phases."""
-        self.wear = self.system.wear.phases(conditions)
-        if not self.system.friction.constant:
-            self._slide(self.system.friction_ratios(conditions))
-
-    def _residual(self, x: Array) -> Array:
-        m, n = self.m, self.n
-        f = self.equations.multiply(x) + self.offset
-        pressure = x[: m * n].reshape(m, n) * self.p_scale
-        f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
-        return f
-
-    def _jacobian(self, x: Array) -> Operator:
-        pressure = x[: self.m * self.n].reshape(self.m, self.n)
-        slopes = self.wear.slopes(pressure * self.p_scale)
-        # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
-        held = np.where(pressure.max(axis=0) <= 0, DRIVE, 0.0)
-        known = self._known
-        if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):
-            return known[2]
-        scaled = [slope * (self.p_scale / self.wear_scale) for slope in slopes]
-        self._known = (slopes, held, self.equations.derivative(scaled, held))
-        return self._known[2]
-
-    def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
-        """Return the contact of all phases, starting from the last solution.
-
-        Args:
-            thermal: Thermal gap without pressure (m, n), mm.
-            coupling: Thermal gap from the pressures of the phases (m, n, m, n), mm/MPa.
-        """
-        m, n = self.m, self.n
-        self.offset = self._cold
-        if thermal is not None:
-            self.offset = self._cold.copy()
-            self.offset[: m * n] += thermal.ravel() / self.gap_scale
-        if coupling is not None or self.equations.coupling is not None:
-            scale = self.p_scale / self.gap_scale
-            by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
-            self.equations, self._known = self.equations.with_heat(by_heat), None
-        if self.m == 1 or not self._solved:
-            self.x = self._touching(self.x)
-        self.x = self.inequality.solve(self.x, near=self._solved)
-        self._solved = True
-        f = self.inequality.residual
-        pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
-        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.iterations)
-
-    def _start(self) -> Array:
-        """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""
-        m, n, r = self.m, self.n, self.r
-        x = np.zeros(self.equations.size)
-        if m == 1:
-            optimum = self.system.optimum(self.system.motion.directions[0])
-            x[:n] = optimum.pressure / self.p_scale
-            velocity = np.array([optimum.velocity[name] for name in self.system.rigid.mode_names])
-            x[n + n :] = velocity * self.system.motion.period * self.lengths / self.wear_scale
-        else:
-            x[: m * n] = 1.0
-            if r:
-                x[-r:] = np.linalg.lstsq(self.equations.modes, np.full(n, float(m)), rcond=None)[0]
-        return x
-
-    def _touching(self, x: Array) -> Array:
-        """Return x with the shape that carries its first pressure, open where the motion leaves the wear behind."""
-        n = self.n
-        x = x.copy()
-        pressure, _, _, velocity = self.equations.parts(x)
-        outrun = (x[:n] == 0) & (self.equations.modes @ velocity < 0)
-        x[self.omega] = -(self.equations.gaps(pressure)[0] + self.offset[:n])
-        x[self.omega] = np.where(outrun & (self.m == 1), OPEN, x[self.omega])
-        return x
-
-
-def _same(one: csr_array, other: csr_array) -> bool:
-    return all(np.array_equal(getattr(one, n), getattr(other, n)) for n in ("indptr", "indices", "data"))
-
-
-def steady(system: Tribosystem) -> Steady:
+def steady(system: Tribosystem, *, properties_within: float | None = None) -> Steady:
     """Solve for the cyclic steady state; collective.
 
     With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is.
 
+    Args:
+        system: The assembled problem.
+        properties_within: Relative change of the materials' properties that is left where they depend on the
+            temperature; by default a tenth of heat.property_tolerance.
+
     Raises:
-        CaseError: with heat, a body that loses heat nowhere.
-        ConvergenceError: the inequality did not converge, or not with the nodes that conduct.
+        CaseError: with heat, a body that loses heat nowhere; a property that is not positive.
+        ConvergenceError: the inequality did not converge, or not with the nodes that conduct, or not with the
+            properties of the temperatures.
     """
-    _check_exists(system)
     begin = time.perf_counter()
-    problem = _SteadyInequality(system)
+    state = _of_these_bodies(system)
+    if warming_key(system) and system.heat is not None:
+        share = LEFT if properties_within is None else properties_within / system.heat.property_tolerance
+        state = _warmed(state, share)
+    return replace(state, seconds=time.perf_counter() - begin)
+
+
+def _of_these_bodies(system: Tribosystem) -> Steady:
+    """Return the state of the bodies as they are, whatever its temperatures."""
+    _check_exists(system)
+    problem = SteadyInequality(system)
     for body, side in zip(system.bodies.heat or (), system.exchange.sides if system.exchange else (), strict=True):
         if not side.cooled:
             raise CaseError(no_heat_sink(body.body.name))
-    contact, heat, temperature = _solve(problem)
-    return _result(problem, contact, heat, temperature, time.perf_counter() - begin)
+    return _result(problem, *_solve(problem))
 
 
-def check_constant_materials(system: Tribosystem) -> None:
-    """Raise where the properties of materials follow the temperature: a state at once would have to find both.
+def _warmed(state: Steady, share: float) -> Steady:
+    """Return the state whose bodies have the properties of its own temperatures; collective.
 
-    Raises:
-        ConvergenceError: they do.
+    Where the change does not fall from pass to pass, half of it is followed, then a quarter, and so on.
+
+    Args:
+        state: Of bodies with other properties.
+        share: Of heat.property_tolerance, that properties may still change by.
     """
-    if system.made_from is not None and system.case.warming:
-        used = sorted({*system.case.punch.regions.values(), *system.case.strip.regions.values()})
-        name = next(name for name in used if system.case.materials[name].dependent)
-        key = f"materials.{name}.{system.case.materials[name].dependent[0]}"
-        raise ConvergenceError(
-            f"no steady state is solved for at once where {key} depends on the temperature: `run` with "
-            'run.integration = "jump" and run.periodic_within comes to it'
-        )
+    followed, before = 1.0, np.inf
+    for done in range(PASSES):
+        system, found = state.system, state.heat
+        if found is None:
+            break
+        change = property_change(system, found.end)
+        if change <= share:
+            return replace(state, passes=done)
+        followed, before = followed / 2 if change > FALLING * before else followed, change
+        heat = system.bodies.heat
+        if followed < 1 and heat is not None:
+            pairs = zip(found.end.temperatures(), taken_at(system), strict=True)
+            mixed = [followed * new + (1 - followed) * old for new, old in pairs]
+            system = warmed_system(system, HeatState.nodal(heat, mixed, found.end.bulk))
+        else:
+            system = warmed_system(system, found.end)
+        state = _of_these_bodies(system)
+    raise ConvergenceError(
+        f"the temperatures of the steady state and the properties that depend on them, {warming_key(system)}, did not "
+        f"come together in {PASSES} passes: follow them by `run`"
+    )
 
 
 def _check_exists(system: Tribosystem) -> None:
@@ -278,7 +188,6 @@ def _check_exists(system: Tribosystem) -> None:
             f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
             "slid, as long as it slides. Follow the wear by `run`"
         )
-    check_constant_materials(system)
     if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
         raise ConvergenceError(
             "no cyclic steady state is solved for with a pressure_threshold: below it any pressure stays. Follow the "
@@ -293,12 +202,14 @@ def _check_exists(system: Tribosystem) -> None:
             )
 
 
-def _solve(problem: _SteadyInequality) -> tuple[ContactState, CycleHeat | None, Array | None]:
+def _solve(problem: SteadyInequality) -> tuple[ContactState, CycleHeat | None, Array | None]:
     """Return the contact of all phases, and with heat the temperature."""
     system = problem.system
     try:
         contact = problem.solve()
     except ConvergenceError as error:
+        if capped := _no_state_under_cap(problem):
+            raise ConvergenceError(capped) from error
         if system.strip_wears or _uniform_wear_exists(system):
             raise
         raise ConvergenceError(
@@ -315,8 +226,27 @@ def _solve(problem: _SteadyInequality) -> tuple[ContactState, CycleHeat | None, 
     return contact, coupled.at_friction(), temperature
 
 
+def _no_state_under_cap(problem: SteadyInequality) -> str:
+    """Return why there is no state where wear grows no more beyond a cap; "" where that is not why."""
+    found, mean, cap = problem.peak_without_cap, problem.p_scale, problem.wear.cap
+    if not cap < found:
+        return ""
+    laws = zip(("punch", "strip"), problem.system.sliding.wear, strict=True)
+    keys = [f"wear.{body}.pressure_cap" for body, law in laws if law is not None and law.pressure_cap == cap]
+    why = (
+        "the mean pressure is beyond it, all that is pressed so wears alike, and any shape stays"
+        if cap <= mean
+        else "no pressures wear the contact by a rigid motion: where it lags behind they grow without end"
+    )
+    return (
+        f"no cyclic steady state exists with {keys[0]} = {cap:.4g} MPa: beyond it wear grows no more, and {why}; the "
+        f"mean pressure is {mean:.4g} MPa and the largest one of the state without the cap {found:.4g} MPa. Expected "
+        "a higher cap, or the wear followed by `run`"
+    )
+
+
 def _result(
-    problem: _SteadyInequality, contact: ContactState, heat: CycleHeat | None, temperature: Array | None, seconds: float
+    problem: SteadyInequality, contact: ContactState, heat: CycleHeat | None, temperature: Array | None
 ) -> Steady:
     system = problem.system
     weights, motion = system.pair.weights, system.motion
@@ -337,9 +267,10 @@ def _result(
         problem.wear.opening(contact.pressure)[0],
         {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
         contact.iterations,
-        seconds,
+        0.0,
         None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure, middle),
         coordinates=system.pair.punch.x,
+        system=system,
     )
 
 
@@ -353,7 +284,7 @@ def _steady_heat(heat: CycleHeat, state: Array, pressure: Array, middle: slice) 
         punch.append(temperatures[0])
         strip.append(temperatures[1])
     ends = slice(middle.step - 1, None, middle.step)  # the last phase of each half-cycle
-    return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends])
+    return SteadyHeat(np.array(punch)[ends], np.array(strip)[ends], now)
 
 
 def _uniform_wear_exists(system: Tribosystem) -> bool:
@@ -387,6 +318,7 @@ def cycles_to_reach(system: Tribosystem, state: Steady, fraction: float, limit: 
     Found by a run of cycle jumps; within the jump that crosses the distance is taken to decay exponentially.
 
     Args:
+        system: The assembled problem. Its properties stay: where they depend on the temperature take the state's own.
         state: The steady state.
         fraction: Of the pressure scale.
         limit: Cycles tried; None is returned beyond.

@@ -111,7 +111,10 @@ class Model:
             raise CaseError(InputError("program", message))
         for name, material in self.case.materials.items():
             for key in material.dependent:
-                message = "depends on the temperature: not followed here; expected a constant"
+                message = (
+                    "depends on the temperature, and is taken anew step by step: what comes of it is no smooth "
+                    "function of other keys; expected a constant, such as its value where `steady` finds the heat"
+                )
                 raise CaseError(InputError(f"materials.{name}.{key}", message))
         laws = {"contact.friction": self.case.contact.friction}
         for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
@@ -218,7 +221,7 @@ class Model:
         system = self.system(values, settings)
         self.evaluations += 1
         state = steady(system)
-        return steady_snapshot(system, state.phase_pressure, state.velocity)
+        return steady_snapshot(state.system, state.phase_pressure, state.velocity)
 
     def run_in(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
         """Return after how many cycles the pressure is within 1 % of the pressure scale of its end; infinite if never.
@@ -228,7 +231,8 @@ class Model:
         """
         system = self.system(values, settings)
         self.evaluations += 1
-        cycles = cycles_to_reach(system, steady(system), NEAR_THE_END)
+        state = steady(system)
+        cycles = cycles_to_reach(state.system, state, NEAR_THE_END)
         return np.inf if cycles is None else float(cycles)
 
     def critical_speed(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:

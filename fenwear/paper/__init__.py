@@ -4,7 +4,7 @@ from fenwear.paper.figures import Picture, paper_figures
 from fenwear.paper.readings import READINGS, Reading
 from fenwear.paper.rows import Row, Verdict, paper_rows, sensitivity_rows
 from fenwear.paper.section import write_section
-from fenwear.paper.study import BRIEF, FULL, Scope
+from fenwear.paper.states import BRIEF, FULL, Scope
 
 __all__ = [
     "BRIEF",

@@ -16,7 +16,8 @@ from fenwear.paper.published import (
     TEMPERATURE_HALF_CYCLE,
 )
 from fenwear.paper.rows import sensitivity_rows
-from fenwear.paper.study import FULL, HeatRun, Scope, Variant, central_runs, heat_runs, no_heat, stability_maps
+from fenwear.paper.states import FULL, HeatRun, Scope, Variant
+from fenwear.paper.study import central_runs, heat_runs, no_heat, stability_maps
 from fenwear.report.style import (
     ALONG_CONTACT,
     BLUE,

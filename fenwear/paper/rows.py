@@ -26,18 +26,8 @@ from fenwear.paper.published import (
     Velocity,
     last_digit,
 )
-from fenwear.paper.study import (
-    FULL,
-    HeatRun,
-    Scope,
-    Variant,
-    central_runs,
-    convergence,
-    heat_runs,
-    no_heat,
-    open_choices,
-    velocities,
-)
+from fenwear.paper.states import FULL, HeatRun, Scope, Variant
+from fenwear.paper.study import central_runs, convergence, heat_runs, no_heat, open_choices, velocities
 
 Verdict = Literal["reproduced", "reproduced under an assumption", "not reproduced"]
 YES: Verdict = "reproduced"

@@ -16,7 +16,8 @@ from fenwear.paper.figures import paper_figures
 from fenwear.paper.published import OPEN
 from fenwear.paper.readings import TRIED
 from fenwear.paper.rows import Row, Verdict, paper_rows, sensitivity_rows
-from fenwear.paper.study import FULL, HeatRun, Scope, StabilityMap, Variant, central_runs, heat_runs, stability_maps
+from fenwear.paper.states import FULL, HeatRun, Scope, StabilityMap, Variant
+from fenwear.paper.study import central_runs, heat_runs, stability_maps
 from fenwear.report.html_page import Picture, picture, render
 
 COLUMNS = ("quantity", "paper", "fenwear", "verdict", "why")

@@ -46,12 +46,16 @@ class Worn:
 
 @dataclass(frozen=True)
 class _BodyWear:
-    """What a body loses in each phase: rate q^b, q = min(p, cap) - threshold >= 0, rate = beta~ S (m, n), mm/MPa^b."""
+    """What a body loses in each phase: rate q^b, q = min(p, cap) - threshold >= 0, rate = beta~ S (m, n), mm/MPa^b.
+
+    `beyond` is the share of the pressure beyond the cap that adds to q: 0 but on the way to a solution.
+    """
 
     rate: Array
     exponent: float
     threshold: float = 0.0
     cap: float = np.inf
+    beyond: float = 0.0
 
     @property
     def linear(self) -> bool:
@@ -62,16 +66,22 @@ class _BodyWear:
         """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes."""
         if self.linear:
             return self.rate * pressure
-        return self.rate * np.maximum(np.minimum(pressure, self.cap) - self.threshold, 0.0) ** self.exponent
+        return self.rate * np.maximum(self._felt(pressure) - self.threshold, 0.0) ** self.exponent
+
+    def _felt(self, pressure: Array) -> Array:
+        """Return min(p, cap), and a share of what is beyond."""
+        below = np.minimum(pressure, self.cap)
+        return below + self.beyond * (pressure - below) if self.beyond else below
 
     def slope(self, pressure: Array) -> Array:
         """Return their derivatives to the pressures (m, n), mm/MPa."""
         if self.linear:
             return np.broadcast_to(self.rate, pressure.shape)
         floor = 1e-9 * max(float(pressure.max()), 1e-300)  # b < 1: the slope at p = 0 is infinite
-        above = np.maximum(pressure - self.threshold, floor)
-        wears = ((pressure >= self.threshold) | (self.threshold == 0)) & (pressure <= self.cap)
-        return np.where(wears, self.rate * self.exponent * above ** (self.exponent - 1), 0.0)
+        above = np.maximum(self._felt(pressure) - self.threshold, floor)
+        wears = np.where((pressure >= self.threshold) | (self.threshold == 0), 1.0, 0.0)
+        wears = np.where(pressure <= self.cap, wears, self.beyond)
+        return wears * self.rate * self.exponent * above ** (self.exponent - 1)
 
 
 @dataclass(frozen=True)
@@ -86,6 +96,16 @@ class PhasesWear:
     punch: _BodyWear | None
     strip: _BodyWear | None
     pairs: Sequence[ContactPair]
+
+    @property
+    def cap(self) -> float:
+        """The lowest pressure beyond which the wear of a body grows no more, MPa; infinite without."""
+        return min((body.cap for body in (self.punch, self.strip) if body is not None), default=np.inf)
+
+    def softened(self, share: float) -> PhasesWear:
+        """Return the same where a share of the pressure beyond a cap wears, too: 1 is without cap, 0 with it."""
+        punch, strip = (None if one is None else replace(one, beyond=share) for one in (self.punch, self.strip))
+        return replace(self, punch=punch, strip=strip)
 
     def some(self, phases: Sequence[int]) -> PhasesWear:
         """Return the wear of some of the phases."""

@@ -14,6 +14,7 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.case import Case
+from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import writing
 from fenwear.sweeps.evaluate import MEANINGS, Values, meaning
 from fenwear.sweeps.plan import Plan
@@ -84,8 +85,11 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     data, coordinates = {}, _coordinates(plan)
     for name in order:
         what = meaning(name, plan.of, case)
-        attributes = {"units": what.unit, "long_name": what.name}
+        scale = degrees_of(case) if what.unit == KELVIN.unit else None
+        attributes = {"units": what.unit if scale is None else scale.unit, "long_name": what.name}
         arrays = {place: np.asarray(values[name]) for place, values in good.items() if name in values}
+        if scale is not None:
+            arrays = {place: scale.of(values) for place, values in arrays.items()}
         if name in NODES and len(arrays) == len(good) and _same(list(arrays.values())):
             coordinates[name] = (what.dims, next(iter(arrays.values())), attributes)
         else:

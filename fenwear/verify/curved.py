@@ -7,10 +7,10 @@ import numpy as np
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.clipped import contact_ends
 from fenwear.verify.bodies import STEEL, builtin
 from fenwear.verify.contact import measured_half_width, semi_ellipse
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
+from fenwear.watch.ends import contact_ends
 
 LIGHT = {"young": 7e4, "poisson": 0.33}  # the cylinder; the flat is of steel
 RADIUS, LOADS, SCAR = 6.0, (18.5, 50.0, 150.0), 0.6  # mm; N/mm; width of the even elements, mm

@@ -197,3 +197,33 @@ def test_blocks_of_many_nodes(
     other = steady(system)
     np.testing.assert_allclose(other.phase_pressure, one.phase_pressure, rtol=0, atol=1e-9 * MEAN)
     np.testing.assert_allclose(other.shape, one.shape, rtol=0, atol=1e-9 * np.nanmax(np.abs(one.shape)))
+
+
+CAPPED = ("geometry.degree=2", "geometry.parameters.elements_along_contact=12")
+
+
+@pytest.mark.parametrize(("name", "cap"), [("example2", 25), ("example1", 16)])
+def test_pressure_cap(assembled: Callable[..., Tribosystem], name: str, cap: int) -> None:
+    """Beyond a cap wear grows no more: what both ways wear is a rigid motion, and a long run ends there."""
+    system = assembled(name, *CAPPED, f"wear.punch.pressure_cap={cap}")
+    state = steady(system)
+    assert state.pressure.max() > 2.5 * MEAN
+    touched = state.pressure.max(axis=0) > 0
+    worn = np.minimum(state.pressure, cap).sum(axis=0)[touched] * COEFFICIENT * 3
+    arm = system.pair.x[touched] - system.bodies.punch.pivot[0]
+    turned = arm * state.velocity.get("lambda_M", 0.0)
+    moved = [state.velocity["lambda_F"] + sign * turned for sign in (1, -1)]
+    assert min(np.abs(worn - one).max() for one in moved) < 1e-9 * worn.max()
+    np.testing.assert_allclose(state.pressure @ system.pair.weights, 1000, rtol=1e-10)
+    last = list(jump(system, 400_000, tolerance=1e-2))[-1]
+    np.testing.assert_allclose(last.pressure[-2:], state.pressure, atol=1e-6 * MEAN)
+
+
+def test_cap_that_holds_nothing(assembled: Callable[..., Tribosystem]) -> None:
+    """A cap above the largest pressure changes nothing; where no state exists the cap is named, and why."""
+    plain, capped = (steady(assembled("example2", *CAPPED, *more)) for more in ((), ("wear.punch.pressure_cap=34",)))
+    np.testing.assert_allclose(capped.pressure, plain.pressure, atol=1e-9 * MEAN)
+    with pytest.raises(ConvergenceError, match=r"wear.punch.pressure_cap = 12 MPa.*the mean pressure is beyond it"):
+        steady(assembled("example2", *CAPPED, "wear.punch.pressure_cap=12"))
+    with pytest.raises(ConvergenceError, match=r"pressure_cap = 20 MPa.*they grow without end.*without the cap 25 MPa"):
+        steady(assembled("monotonic-lz20", *CAPPED, "wear.punch.pressure_cap=20"))

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fenwear import Case, Tribosystem, assemble, jump, make_case, march, read_history, run_case, steady
 from fenwear.assembly import outwarmed, taken_at, warmed_system
-from fenwear.cycle import Block, follow
-from fenwear.cycle.state import RunState
+from fenwear.cycle import Block, Steady, evolve, follow, monotonic
+from fenwear.cycle.state import RunState, beginning
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.life.model import Model
+from fenwear.sliding.wear import Worn
 
 HEIGHTS, FAR, SLOPE = (2.0, 3.0), (90.0, 20.0), 0.02
 K0 = (5.0, 1.5)
@@ -96,6 +99,57 @@ def test_kirchhoff() -> None:
     assert errors[1] < 0.1 * errors[0]
     assert errors[0] < 0.3 * (FAR[0] - FAR[1])
     assert errors[2] < 1e-5
+
+
+@pytest.mark.mpi
+def test_steady_heat_by_kirchhoff() -> None:
+    """Friction heats both blocks: the whole fields of `steady` are those of Kirchhoff's transform, node by node.
+
+    q flows off through both, so that in each K(T) - K(T far) = q_i h_i (1 - depth / h_i), K(T) = k0 (T + a T² / 2),
+    with the same temperature at the contact. The error falls with the tolerance of the properties, to the mesh's.
+    """
+    mu, p, speed = 0.5, 4.0, 400.0  # 800 mW/mm²
+    materials = {
+        name: {"conductivity": growing(k0), "heat_capacity": 1.0}  # next to no heat is carried along
+        for name, k0 in zip(("upper", "lower"), K0, strict=True)
+    }
+    case = stack(materials, 1.0, 2, reduction_tolerance=1e-7)
+    tables = case.model_dump(exclude_unset=True) | {
+        "contact": {"friction": mu},
+        "wear": {"punch": {"coefficient": 1e-9}},
+        "motion": {"kind": "one-way", "speed": speed, "direction": "rightward", "duration": 1.0},
+        "geometry": {
+            "file": "blocks.geo",
+            "degree": 3,
+            "parameters": {**case.geometry.parameters, "punch_layers": 4, "strip_layers": 4},
+        },
+    }
+    system = assemble(make_case(tables), heat="reduced")
+
+    def kirchhoff(k0: float, t: Any) -> Any:
+        return k0 * (t + SLOPE * t**2 / 2)
+
+    def carried(t: float) -> float:
+        return sum((kirchhoff(k0, t) - kirchhoff(k0, far)) / h for k0, far, h in zip(K0, FAR, HEIGHTS, strict=True))
+
+    top = float(brentq(lambda t: carried(t) - mu * p * speed, FAR[1], 1e3, xtol=1e-12))
+    errors = []
+    for within in (0.1, 1e-5):
+        state = steady(system, properties_within=within)
+        assert state.heat is not None
+        assert state.system.bodies.heat is not None
+        worst = 0.0
+        for body, found, k0, far, h in zip(
+            state.system.bodies.heat, state.heat.end.temperatures(), K0, FAR, HEIGHTS, strict=True
+        ):
+            depth = np.abs(body.space.tabulate_dof_coordinates()[: body.owned, 1])
+            share = kirchhoff(k0, far) + (kirchhoff(k0, top) - kirchhoff(k0, far)) * (1 - depth / h)
+            exact = (np.sqrt(1 + 2 * SLOPE * share / k0) - 1) / SLOPE
+            worst = max(worst, float(np.abs(found - exact).max(initial=0.0)))
+        errors.append(system.comm.allreduce(worst, op=MPI.MAX))
+    assert top > FAR[0] + 30
+    assert errors[0] > 1e-4 * top
+    assert errors[1] < 2e-5 * top
 
 
 def test_heating_up() -> None:
@@ -182,6 +236,32 @@ def softening(tables: dict[str, Any]) -> None:
     tables["heat"]["property_tolerance"] = 0.05
 
 
+def _settled(state: Steady) -> Block:
+    """Return two cycles of a march from a steady state."""
+    assert state.heat is not None
+    system = state.system
+    worn = Worn(np.nan_to_num(state.shape - np.nanmin(state.shape)), system.unworn().strip)
+    start = replace(beginning(system, state.heat.end), worn=worn)
+    return list(evolve(system, 4, integration="explicit", start=start))[-1]
+
+
+def test_steady_is_the_end_of_a_march(edited: Edited) -> None:
+    """Gone on with from there, a march stays: its properties are those of its temperatures already."""
+    case = edited("example1-heat", softening, *SMALL, "heat.steps=2", "heat.property_tolerance=1e-3")
+    system = assemble(case, heat="reduced")
+    state = steady(system, properties_within=1e-5)
+    assert state.passes > 2
+    assert state.heat is not None
+    cold = steady(system, properties_within=10.0)
+    assert cold.heat is not None
+    assert np.abs(cold.heat.punch - state.heat.punch).max() > 5
+    last = _settled(state)
+    assert last.heat is not None
+    assert last.system.bodies.warmed is state.system.bodies.warmed
+    np.testing.assert_allclose(last.pressure[-2:], state.pressure, atol=2e-3 * state.pressure.max())
+    np.testing.assert_allclose(last.heat.temperature_punch[-2:], state.heat.punch, atol=2e-3 * state.heat.punch.max())
+
+
 def test_jumps_follow_as_marches(edited: Edited) -> None:
     """Jumped and marched, the properties follow alike, to what they lag behind by."""
     case = edited("example1-heat", softening, *SMALL, "run.half_cycles=16", "heat.steps=2")
@@ -232,9 +312,9 @@ def test_refused(edited: Edited) -> None:
     with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -1 at T = 0 K"):
         assemble(edited("example1-heat", composite(conductivity={"expression": "T - 1"}), *SMALL))
     warm = edited("example1-heat", softening, *SMALL)
-    with pytest.raises(ConvergenceError, match=r"materials.composite.young depends on the temperature"):
-        steady(assemble(warm))
-    with pytest.raises(CaseError, match=r"materials.composite.young: depends on the temperature: not followed here"):
+    with pytest.raises(ConvergenceError, match=r"where materials.composite.young depends on the temperature"):
+        monotonic(assemble(warm, heat="none"))
+    with pytest.raises(CaseError, match=r"materials.composite.young: depends on the temperature, and is taken anew"):
         Model(warm)
     sinking = edited("example1-heat", composite(conductivity={"expression": "5 - 0.5 * T"}), *SMALL)
     with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -"):

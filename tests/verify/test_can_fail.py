@@ -27,10 +27,11 @@ from fenwear.verify import wear as wear_cases
 from fenwear.verify.bodies import builtin, rigid_punch
 from fenwear.verify.conduction import conducting_square
 from fenwear.verify.contact import half_planes
+from fenwear.verify.solid_instability import sliding_blocks
 from fenwear.verify.thermal import conductor
 
 Patch = pytest.MonkeyPatch
-CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor)
+CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor, sliding_blocks)
 
 
 @pytest.fixture(autouse=True)
@@ -234,6 +235,8 @@ def forgotten_heat(patch: Patch) -> None:
         ("conductance", other_share),
         ("burton", thermal_modulus_without_poisson),
         ("burton", other_share),
+        ("solid-burton", other_share),
+        ("square-source", material_the_other_way),
         ("energy", half_speed),
         ("energy", forgotten_heat),
     ],

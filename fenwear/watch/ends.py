@@ -9,7 +9,7 @@ How wide it should be is estimated by areas: the worn cross-section A fills the 
     integral of max(D - g, 0) dx = A,    g the gap of the unworn bodies with its least value taken off,
 
 and D is at least what Hertz's line contact closes, 2 F / (pi E*), F the load over the thickness, or of a ring over its
-mean circumference. Of solids: `fenwear.rim`.
+mean circumference. Of solids: `fenwear.watch.rim`.
 """
 
 from __future__ import annotations

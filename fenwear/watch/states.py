@@ -8,11 +8,12 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
-from fenwear.clipped import ContactEnds, contact_ends, opened
 from fenwear.cycle import Block, Steady
-from fenwear.rim import ContactRim, contact_rim
+from fenwear.watch.chamfer import contact_chamfer
+from fenwear.watch.ends import ContactEnds, contact_ends, opened
+from fenwear.watch.rim import ContactRim, contact_rim
+from fenwear.watch.stroke import stroke_warnings
 
-TAKEN_UP = 0.1  # of the amplitude: slip and worn volume are too large by that
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
 
 
@@ -24,7 +25,7 @@ class Watch:
     """
 
     def __init__(self, system: Tribosystem) -> None:
-        self.system, self.limits = system, contact_limits(system)
+        self.system, self.limits, self.chamfer = system, contact_limits(system), contact_chamfer(system)
         self._texts: dict[str, str] = {}
         self._first_clipped = 0
 
@@ -32,6 +33,8 @@ class Watch:
         """Take the next block and return what is to be said of it that was not said of an earlier one."""
         case, weights = self.system.case, block.system.pair.weights
         found = {"clipped": self._clipped(block)}
+        if self.chamfer is not None:
+            found["chamfer"] = self.chamfer.text(self.chamfer.widened(self.system, block.end.worn))
         found["pressed"] = pressed(case, float(mean_pressures(block.pressure, weights).max()))
         if block.heat is not None:
             hottest = int(np.argmax(block.heat.max_temperature))
@@ -40,7 +43,7 @@ class Watch:
         said = {kind: text for kind, text in found.items() if text}
         new = [text for kind, text in said.items() if kind not in self._texts]
         # The width that is needed grows with the scar; of the others the first time is what counts.
-        self._texts = {**said, **self._texts, **({"clipped": found["clipped"]} if found["clipped"] else {})}
+        self._texts = {**said, **self._texts, **{kind: said[kind] for kind in ("clipped", "chamfer") if kind in said}}
         return new
 
     def warnings(self) -> list[str]:
@@ -127,43 +130,6 @@ def initial_warnings(system: Tribosystem) -> list[str]:
         needed = limits.width_needed(0.0, float(weights @ pressure))
         texts.append(clipped_text(limits, where, needed, system.case))
     return [*(text for text in texts if text), *stroke_warnings(system)]
-
-
-def elastic_way(system: Tribosystem) -> float:
-    """Return about how far each way the bodies follow friction elastically before they slide as a whole, mm.
-
-    mu times the mean displacement of the contact by an even pressure under the load, in which the bodies give way
-    along the surface as they do across it: on a half-plane the displacement along a line force across the surface
-    and along it is the same, on a half-space (2 - nu) / (2 - 2 nu) times larger along it (K. L. Johnson, Contact
-    Mechanics, 1985). 0 where supports and not the contact carry the load.
-    """
-    if not system.normal_force:
-        return 0.0
-    weights = system.pair.weights
-    pressure = np.full(len(weights), system.rigid.mean_pressure)
-    pressed_in = float(weights @ (system.interface.compliance(0.0) @ pressure) / weights.sum())
-    ratio = float(weights @ np.linalg.norm(system.friction_ratio(1), axis=1) / weights.sum())
-    return ratio * max(pressed_in, 0.0)
-
-
-def elastic_and_amplitude(system: Tribosystem) -> tuple[float, float]:
-    """Return the elastic way, see `elastic_way`, and the mean amplitude of the sliding to and fro, mm."""
-    slid = float((system.slid.mean(axis=1) * system.motion.sliding()).sum())
-    return elastic_way(system), slid / (2 * system.motion.half_cycles)
-
-
-def stroke_warnings(system: Tribosystem) -> list[str]:
-    """Return what is to be said of a stroke to and fro that the bodies take up elastically."""
-    if len(set(system.motion.directions)) == 1:
-        return []
-    way, amplitude = elastic_and_amplitude(system)
-    if way <= TAKEN_UP * amplitude:
-        return []
-    return [
-        f"before they slide as a whole the bodies follow friction elastically, by an estimate {1e3 * way:.3g} µm each "
-        f"way, {100 * way / amplitude:.3g} % of the amplitude of {1e3 * amplitude:.3g} µm; gross sliding leaves that "
-        'out, and its slip and wear are too large by it; set contact.law = "coulomb" to follow stick and slip'
-    ]
 
 
 def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:

@@ -26,7 +26,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface, contact_tag
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.clipped import SMOOTH, WIDER, contact_modulus
+from fenwear.watch.ends import SMOOTH, WIDER, contact_modulus
 
 NEAR = 1e-6  # of the surface's extent: corners that are the same
 BESIDE = 1e-3  # of the surface's extent: nodes on an edge of the other body
@@ -109,14 +109,25 @@ def contact_rim(system: Tribosystem) -> ContactRim | None:
     return ContactRim(at_nodes, x, float(widths.max()), _curvatures(system), contact_modulus(system.case))
 
 
-def _rim(elastic: ElasticBody) -> tuple[_Ints, _Ints]:
-    """Return the trace nodes on each edge of the rim (., k), two corners first: where the body goes on, and not."""
+def rim_edges(elastic: ElasticBody) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return the trace nodes on each edge of the rim (m, k), two corners first, and where the surface lies; collective.
+
+    Returns:
+        The edges, and unit vectors (m, 3) at right angles to them into the contact surface and into the boundary
+        beyond it, which are zero where nothing is beyond.
+    """
     surface = elastic.surface
     edges, middles = _outer_edges(surface)
     beyond, ends = _beyond(elastic, edges)
     first, second = surface.trace[edges[:, 0]], surface.trace[edges[:, 1]]
     inward, outward = (_across(first, second, point) for point in (middles, beyond))
-    goes_on = ends & (np.einsum("ij,ij->i", inward, outward) < -SMOOTH)
+    return edges, inward, np.where(ends[:, None], outward, 0.0)
+
+
+def _rim(elastic: ElasticBody) -> tuple[_Ints, _Ints]:
+    """Return the trace nodes on each edge of the rim (., k), two corners first: where the body goes on, and not."""
+    edges, inward, outward = rim_edges(elastic)
+    goes_on = np.einsum("ij,ij->i", inward, outward) < -SMOOTH
     return edges[goes_on], edges[~goes_on]
 
 

@@ -1,0 +1,99 @@
+"""How the counter-body slides by a case, and that it stays in its surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.case import Case, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.errors import CaseError, InputError
+from fenwear.interface import (
+    ContactPair,
+)
+from fenwear.interface.placement import in_space
+from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
+from fenwear.sliding.friction import Friction
+from fenwear.sliding.motion import Motion, make_motion
+
+OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """How the counter-body slides, and what that does to both surfaces.
+
+    Attributes:
+        motion: The phases of a cycle.
+        field: The velocity of the counter-body over the contact.
+        friction: The law of friction.
+        wear: The wear laws of punch and strip; None where a body does not wear.
+        track: What closes the track that a strip which wears runs on: its length, mm, or 2 pi rad; None for none.
+        to_and_fro: Whether the strip's worn track passes to and fro under the punch.
+    """
+
+    motion: Motion
+    field: SlidingField
+    friction: Friction
+    wear: tuple[WearLaw | None, WearLaw | None]
+    track: float | None = None
+    to_and_fro: bool = False
+
+
+def make_sliding(case: Case, parts: int = 1) -> Sliding:
+    """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
+    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None and case.passes).in_parts(parts)
+    sliding_field = _sliding_field(case)
+    one_way = isinstance(case.motion, OneWay | Rotation)
+    return Sliding(
+        motion,
+        sliding_field,
+        Friction(case.contact, sliding_field),
+        (case.wear.punch, case.wear.strip),
+        _closed_track(case),
+        case.passes and not one_way,
+    )
+
+
+def _sliding_field(case: Case) -> SlidingField:
+    motion = case.motion
+    if isinstance(motion, Oscillation | Rotation):
+        return SlidingField(turn=_unit(motion.axis), centre=motion.centre)
+    if motion.along is not None:
+        return SlidingField(shift=_unit(motion.along))
+    return ALONG_X if motion.axis == "x" else ALONG_Y
+
+
+def _closed_track(case: Case) -> float | None:
+    if isinstance(case.motion, OneWay):
+        return case.motion.track
+    turns = isinstance(case.motion, Rotation) and case.passes  # rings have their whole track under the punch
+    return 2 * math.pi if turns and case.wear.strip is not None else None
+
+
+def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    x, y, z = (np.array(vector) / np.linalg.norm(vector)).tolist()
+    return x, y, z
+
+
+def check_stays(middle: ContactPair, sliding: Sliding) -> None:
+    """Raise where a strip that turns in place is none of revolution about the axis, or a moving one leaves contact."""
+    along = np.array(sliding.field.shift)
+    if middle.punch.dim == 3 and along.any():
+        normal = middle.weights @ middle.normal
+        out = abs(along @ normal) / np.linalg.norm(normal)
+        if out > OUT_OF_SURFACE:
+            way = ", ".join(f"{part:.3g}" for part in along - (along @ normal) / (normal @ normal) * normal + 0.0)
+            hint = f"along it is ({way})" if out < 1 - OUT_OF_SURFACE else "along it is any way at right angles to that"
+            raise CaseError(InputError("motion.along", f"the strip would move out of the contact: {hint}"))
+    if not any(sliding.field.turn) or sliding.motion.reach > 0:
+        return
+    velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)
+    out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
+    if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
+        raise CaseError(
+            InputError(
+                "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
+            )
+        )

@@ -1,0 +1,184 @@
+"""The inequality of the cyclic steady state: its unknowns, its scales and its start; see `fenwear.cycle.steady`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.contact import ContactState
+from fenwear.contact.inequality import Inequality
+from fenwear.contact.operators import Operator
+from fenwear.contact.worn_shape import ShapeEquations
+from fenwear.errors import ConvergenceError
+from fenwear.sliding.friction import ContactConditions
+
+DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
+SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
+OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
+
+
+class SteadyInequality:
+    """Unknown: p of each phase, omega, the rigid modes a of all phases but the first, lambda.
+
+    Args:
+        system: The assembled problem.
+
+    Attributes:
+        peak_without_cap: Largest pressure where no cap holds the wear, MPa; 0 before that was solved for.
+    """
+
+    def __init__(self, system: Tribosystem) -> None:
+        rigid, interface = system.rigid, system.interface
+        self.system = system
+        m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
+        self.m, self.n, self.r = m, n, r
+        self.wear = system.phases_wear
+        self.p_scale = rigid.mean_pressure
+        self.gap_scale = self.p_scale * interface.elastic_length
+        self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
+        self.lengths = system.mode_lengths
+        self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
+        self.omega = slice(m * n, m * n + n)
+        self._slide(system.friction_ratios())
+        size = self.equations.size
+        self._cold: Array = np.zeros(size)  # what the rows have besides the unknowns, without heat
+        for k, own in enumerate(system.interfaces):
+            moved = own.pair.initial_gap - system.pair.initial_gap
+            self._cold[k * n : (k + 1) * n] = (own.load_gap + moved) / self.gap_scale
+            last = m * n + n + k * r
+            self._cold[last : last + r] = own.rigid.resultant / self.moment[:, 0]
+        self.offset: Array = self._cold
+        # At its upper bound a variational inequality wants F <= 0: the wear balance with its sign turned.
+        lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+        lower[: m * n] = 0.0
+        upper[self.omega] = OPEN
+        self.x = self._start()
+        self.peak_without_cap = 0.0
+        self._solved = False
+        self.inequality = Inequality(
+            lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
+        )
+
+    def _slide(self, ratios: Sequence[Array]) -> None:
+        """Take friction."""
+        made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
+        compliances, balances = [], []
+        for own, ratio in zip(self.system.interfaces, ratios, strict=True):
+            key = (id(own.gap_by_force), np.asarray(ratio + own.pair.normal).tobytes())
+            if key not in made:
+                made[key] = own.compliance(ratio) * (self.p_scale / self.gap_scale)
+            compliances.append(made[key])
+            balances.append(own.rigid.equilibrium(ratio) * self.p_scale / self.moment)
+        modes = self.system.rigid.rigid_normal / self.lengths
+        self.equations = ShapeEquations(compliances, modes, np.array(balances))
+        self._known: tuple[list[csr_array], Array, Operator] | None = None  # the last derivative, and what it is of
+
+    def take(self, conditions: Sequence[ContactConditions]) -> None:
+        """Take friction and wear at the conditions of the phases."""
+        self.wear = self.system.wear.phases(conditions)
+        self._known = None
+        if not self.system.friction.constant:
+            self._slide(self.system.friction_ratios(conditions))
+
+    def _residual(self, x: Array) -> Array:
+        m, n = self.m, self.n
+        f = self.equations.multiply(x) + self.offset
+        pressure = x[: m * n].reshape(m, n) * self.p_scale
+        f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
+        return f
+
+    def _jacobian(self, x: Array) -> Operator:
+        pressure = x[: self.m * self.n].reshape(self.m, self.n)
+        slopes = self.wear.slopes(pressure * self.p_scale)
+        # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
+        held = np.where(pressure.max(axis=0) <= 0, DRIVE, 0.0)
+        known = self._known
+        if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):
+            return known[2]
+        scaled = [slope * (self.p_scale / self.wear_scale) for slope in slopes]
+        self._known = (slopes, held, self.equations.derivative(scaled, held))
+        return self._known[2]
+
+    def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
+        """Return the contact of all phases, starting from the last solution.
+
+        Args:
+            thermal: Thermal gap without pressure (m, n), mm.
+            coupling: Thermal gap from the pressures of the phases (m, n, m, n), mm/MPa.
+        """
+        m, n = self.m, self.n
+        self.offset = self._cold
+        if thermal is not None:
+            self.offset = self._cold.copy()
+            self.offset[: m * n] += thermal.ravel() / self.gap_scale
+        if coupling is not None or self.equations.coupling is not None:
+            scale = self.p_scale / self.gap_scale
+            by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
+            self.equations, self._known = self.equations.with_heat(by_heat), None
+        if self.m == 1 or not self._solved:
+            self.x = self._touching(self.x)
+        self.x = self._newton()
+        self._solved = True
+        f = self.inequality.residual
+        pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
+        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.iterations)
+
+    def _newton(self) -> Array:
+        """Return the solution; where wear is capped by the solutions of ever harder caps, from none at all.
+
+        At nodes beyond the cap the balance of wear says nothing of the pressure: from afar it holds nothing.
+        """
+        capped = self.wear
+        if capped.cap == np.inf:
+            return self.inequality.solve(self.x, near=self._solved)
+        if self._solved:
+            try:
+                return self.inequality.solve(self.x, near=True)
+            except ConvergenceError:
+                pass
+        x = self.x
+        try:
+            for share in SOFTENED:
+                self.wear, self._known = capped.softened(share), None
+                x = self.inequality.solve(x, near=share < SOFTENED[0])
+                peak = float(x[: self.m * self.n].max()) * self.p_scale
+                if share == SOFTENED[0]:
+                    self.peak_without_cap = peak
+                if peak <= capped.cap:
+                    break  # it is the solution whatever is beyond
+        finally:
+            self.wear, self._known = capped, None
+        return x
+
+    def _start(self) -> Array:
+        """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""
+        m, n, r = self.m, self.n, self.r
+        x = np.zeros(self.equations.size)
+        if m == 1:
+            optimum = self.system.optimum(self.system.motion.directions[0])
+            x[:n] = optimum.pressure / self.p_scale
+            velocity = np.array([optimum.velocity[name] for name in self.system.rigid.mode_names])
+            x[n + n :] = velocity * self.system.motion.period * self.lengths / self.wear_scale
+        else:
+            x[: m * n] = 1.0
+            if r:
+                x[-r:] = np.linalg.lstsq(self.equations.modes, np.full(n, float(m)), rcond=None)[0]
+        return x
+
+    def _touching(self, x: Array) -> Array:
+        """Return x with the shape that carries its first pressure, open where the motion leaves the wear behind."""
+        n = self.n
+        x = x.copy()
+        pressure, _, _, velocity = self.equations.parts(x)
+        outrun = (x[:n] == 0) & (self.equations.modes @ velocity < 0)
+        x[self.omega] = -(self.equations.gaps(pressure)[0] + self.offset[:n])
+        x[self.omega] = np.where(outrun & (self.m == 1), OPEN, x[self.omega])
+        return x
+
+
+def _same(one: csr_array, other: csr_array) -> bool:
+    return all(np.array_equal(getattr(one, n), getattr(other, n)) for n in ("indptr", "indices", "data"))

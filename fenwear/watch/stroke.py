@@ -1,0 +1,46 @@
+"""What gross sliding leaves out of a stroke: the way that the bodies follow friction elastically before they slide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenwear.assembly import Tribosystem
+
+TAKEN_UP = 0.1  # of the amplitude: slip and worn volume are too large by that
+
+
+def elastic_way(system: Tribosystem) -> float:
+    """Return about how far each way the bodies follow friction elastically before they slide as a whole, mm.
+
+    mu times the mean displacement of the contact by an even pressure under the load, in which the bodies give way
+    along the surface as they do across it: on a half-plane the displacement along a line force across the surface
+    and along it is the same, on a half-space (2 - nu) / (2 - 2 nu) times larger along it (K. L. Johnson, Contact
+    Mechanics, 1985). 0 where supports and not the contact carry the load.
+    """
+    if not system.normal_force:
+        return 0.0
+    weights = system.pair.weights
+    pressure = np.full(len(weights), system.rigid.mean_pressure)
+    pressed_in = float(weights @ (system.interface.compliance(0.0) @ pressure) / weights.sum())
+    ratio = float(weights @ np.linalg.norm(system.friction_ratio(1), axis=1) / weights.sum())
+    return ratio * max(pressed_in, 0.0)
+
+
+def elastic_and_amplitude(system: Tribosystem) -> tuple[float, float]:
+    """Return the elastic way, see `elastic_way`, and the mean amplitude of the sliding to and fro, mm."""
+    slid = float((system.slid.mean(axis=1) * system.motion.sliding()).sum())
+    return elastic_way(system), slid / (2 * system.motion.half_cycles)
+
+
+def stroke_warnings(system: Tribosystem) -> list[str]:
+    """Return what is to be said of a stroke to and fro that the bodies take up elastically."""
+    if len(set(system.motion.directions)) == 1:
+        return []
+    way, amplitude = elastic_and_amplitude(system)
+    if way <= TAKEN_UP * amplitude:
+        return []
+    return [
+        f"before they slide as a whole the bodies follow friction elastically, by an estimate {1e3 * way:.3g} µm each "
+        f"way, {100 * way / amplitude:.3g} % of the amplitude of {1e3 * amplitude:.3g} µm; gross sliding leaves that "
+        'out, and its slip and wear are too large by it; set contact.law = "coulomb" to follow stick and slip'
+    ]

@@ -110,7 +110,7 @@ def cuts(history: xarray.Dataset) -> Figure:
 def sliding_map(history: xarray.Dataset) -> Figure:
     """Draw the slip of each node in a cycle and its work of friction, in the first and the last cycle."""
     surface, places = surface_of(history), sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = _panels_of_maps(history, surface, 2, len(places))
+    figure, axes = panels_of_maps(history, surface, 2, len(places))
     cycles = history.isel(cycle=places)
     slid = np.hypot(cycles.slip, cycles.slip_across).where(cycles.pressure > 0, 0)
     work = -(cycles.traction * cycles.slip + cycles.traction_across * cycles.slip_across)
@@ -151,7 +151,7 @@ def scar(history: xarray.Dataset) -> Figure:
     """Draw the worn depth of both bodies before the last cycle."""
     bodies = ("punch", "strip")
     surfaces = [surface_of(history, body) for body in bodies]
-    figure, axes = _panels_of_maps(history, surfaces[0], 1, 2)
+    figure, axes = panels_of_maps(history, surfaces[0], 1, 2)
     for ax, body, surface, name in zip(axes[0], bodies, surfaces, ("wear", "wear_strip"), strict=True):
         values = 1e3 * history[name].isel(cycle=-1).values
         drawn = ax.tripcolor(*surface.drawn(values), shading="gouraud", cmap="YlOrBr", vmin=0,
@@ -164,7 +164,7 @@ def scar(history: xarray.Dataset) -> Figure:
 def stresses(history: xarray.Dataset) -> Figure:
     """Draw the largest stress along the sliding in the strip's surface over the first and the last cycle."""
     surface, places = surface_of(history), sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = _panels_of_maps(history, surface, 1, len(places))
+    figure, axes = panels_of_maps(history, surface, 1, len(places))
     most = history.surface_stress.isel(cycle=places).max("step").values
     size = float(np.abs(most).max()) or 1.0
     for ax, found, place in zip(axes[0], most, places, strict=True):
@@ -211,14 +211,14 @@ def _few(surface: Surface, history: xarray.Dataset) -> Array:
 
 def _maps(history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int]) -> tuple[Figure, Any]:
     """Return a figure with a row of maps for each cycle, one for each time step."""
-    figure, axes = _panels_of_maps(history, surface, len(places), len(steps))
+    figure, axes = panels_of_maps(history, surface, len(places), len(steps))
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
             ax.set_title(f"cycle {int(history.cycle[place]):,} + {float(history.fraction[step]):.3g}", loc="left")
     return figure, axes
 
 
-def _panels_of_maps(history: xarray.Dataset, surface: Surface, rows: int, columns: int) -> tuple[Figure, Any]:
+def panels_of_maps(history: xarray.Dataset, surface: Surface, rows: int, columns: int) -> tuple[Figure, Any]:
     """Return a figure of equal maps of the contact and a little more."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure

@@ -217,7 +217,8 @@ def _lasting_fluxes(
         return total(comm, even.T @ step.advance(step.respond(body.store(lasting(fluxes))), sources=False))
 
     size, random = even.shape[1], np.random.default_rng(0)  # the same on every rank and in every run
-    space, fields, gram, least = np.zeros((size, 0)), np.zeros((body.owned, 0)), np.zeros((0, 0)), 0.0
+    space, fields, least = np.zeros((size, 0)), np.zeros((body.owned, 0)), 0.0
+    gram: Array = np.zeros((0, 0))
     while True:
         fresh = felt(random.standard_normal((size, min(SOME, size - space.shape[1]))))
         for _ in range(2):  # once more: rounding

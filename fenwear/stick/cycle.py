@@ -109,6 +109,8 @@ class RigState:
         next_step: Its number in the cycle.
         temperature: Of both bodies, on the bases of the rig's heat (dim,); None without heat.
         heating: Heat of friction of the nodes in the last step (n,), mW/mm²; None without heat.
+        pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
+            was not: zones come back from cycle to cycle, so that Newton starts there. None before the first cycle.
     """
 
     contact: StickState
@@ -117,6 +119,23 @@ class RigState:
     next_step: int = 0
     temperature: Array | None = None
     heating: Array | None = None
+    pressures: Array | None = None
+    trials: Array | None = None
+
+    @property
+    def near(self) -> tuple[Array, Array] | None:
+        """Pressure and trial of the next time step a cycle ago; None where there was none."""
+        if self.pressures is None or self.trials is None or np.isnan(self.pressures[self.next_step, 0]):
+            return None
+        return self.pressures[self.next_step], self.trials[self.next_step]
+
+    def then(self, state: StickState) -> tuple[Array | None, Array | None]:
+        """Return pressures and trials of the time steps with those of the next one."""
+        if self.pressures is None or self.trials is None:
+            return None, None
+        pressures, trials = self.pressures.copy(), self.trials.copy()
+        pressures[self.next_step], trials[self.next_step] = state.pressure, state.trial
+        return pressures, trials
 
 
 class Rig:
@@ -184,9 +203,11 @@ class Rig:
         at = RigState(state, before, worn)
         for step in program.lead_in:
             at = self._stepped(at, step)
+        steps, (n, m) = len(program.steps), state.trial.shape
+        at = replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=np.full((steps, n, m), np.nan))
         if self.heat is None:
-            return replace(at, next_step=0)
-        return replace(at, next_step=0, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
+            return at
+        return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
 
     def opening(self, position: Position, worn: Worn) -> Array:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
@@ -208,15 +229,16 @@ class Rig:
         self.watch()
         position, imposed = self.imposed(step, at.worn)
         if self.heat is None or at.temperature is None or at.heating is None:
-            state, warm, heating = self._advance(at, imposed, position), None, None
+            state, warm, heating = self._advance(at, imposed, position, at.near), None, None
         else:
             state, imposed, warm, heating = self._with_heat(
                 self.heat, (at.temperature, at.heating), at, step, imposed, position
             )
-        return RigState(state, imposed, at.worn, (at.next_step + 1) % len(self.program.steps), warm, heating)
+        following = (at.next_step + 1) % len(self.program.steps)
+        return RigState(state, imposed, at.worn, following, warm, heating, *at.then(state))
 
     def _advance(
-        self, at: RigState, imposed: Imposed, position: Position, near: StickState | None = None
+        self, at: RigState, imposed: Imposed, position: Position, near: tuple[Array, Array] | None
     ) -> StickState:
         return advance(self.interface, at.contact, at.imposed, imposed, self.friction, position, near)
 
@@ -249,7 +271,8 @@ class Rig:
             conductance = heat.conductance(np.where(last.closed, np.maximum(p, 1e-300), 0.0))
             warm = heat.step(number, warmth[0], q, conductance).values
             expanded = replace(imposed, loaded=heat.expanded(imposed.loaded, warm, step.offset))
-            state = self._advance(at, expanded, position, None if last is at.contact else last)
+            near = at.near if last is at.contact else (last.pressure, last.trial)
+            state = self._advance(at, expanded, position, near)
             same, last = bool((state.closed == last.closed).all()), state
             made = state.heat / step.duration
             return units * np.concatenate([made, state.pressure]), (state, expanded), False

@@ -320,10 +320,19 @@ class Case(Part):
         return data
 
     def to_toml(self) -> str:
-        """Return the resolved case as a case file that reads back as the same case."""
+        """Return the resolved case as a case file that reads back as the same case, without keys that say nothing."""
         import tomli_w
 
-        return tomli_w.dumps(self.resolved())
+        data = self.resolved()
+        if self.model.kind != "plane":  # these are of plane models alone
+            del data["model"]["plane"], data["model"]["thickness"]
+            if self.heat is not None and self.heat.convecting_faces:
+                del data["heat"]["convecting_faces"]
+            if data["motion"].get("along") is not None:
+                del data["motion"]["axis"]
+        if self.contact.law == "gross-sliding":
+            del data["stick"]
+        return tomli_w.dumps(data)
 
 
 def part_models(annotation: Any) -> list[Any]:

@@ -91,7 +91,7 @@ def cuts(history: xarray.Dataset) -> Figure:
     """Draw the traction along the sliding between its bounds, on a cut along it through the middle of the contact."""
     surface, places = surface_of(history), sorted({0, history.sizes["cycle"] - 1})
     figure, axes = panels(len(places), 2.8)
-    mu, at = float(history.attrs["friction"]), _middle(history)
+    mu, at = float(history.attrs["friction"]), middle_of_contact(history)
     for ax, place in zip(axes, places, strict=True):
         cycle = history.isel(cycle=place)
         for colour, step in shades([*_steps(history), history.sizes["step"] - 1]):
@@ -131,7 +131,7 @@ def sliding_map(history: xarray.Dataset) -> Figure:
 def shapes(history: xarray.Dataset, chosen: Sequence[int]) -> Figure:
     """Draw worn depths and pressure on a cut along the sliding through the middle, for the chosen records."""
     figure, (depth, pressure) = panels(2, 2.4)
-    punch, strip, at = surface_of(history), surface_of(history, "strip"), _middle(history)
+    punch, strip, at = surface_of(history), surface_of(history, "strip"), middle_of_contact(history)
     for colour, place in shades(chosen):
         cycle = history.isel(cycle=place)
         x, worn = punch.cut(cycle.wear.values, at, along=True)
@@ -187,7 +187,7 @@ def _touched(history: xarray.Dataset) -> Array:
     return touched if touched.any() else np.ones_like(touched)
 
 
-def _middle(history: xarray.Dataset) -> Array:
+def middle_of_contact(history: xarray.Dataset) -> Array:
     """Return the places along and across the sliding of the middle of what touches (2,), mm."""
     touched = _touched(history)
     return np.array([np.average(history[name].values[touched], weights=history.weight.values[touched])

@@ -214,7 +214,7 @@ def _maps(history: xarray.Dataset, surface: Surface, places: Sequence[int], step
     figure, axes = panels_of_maps(history, surface, len(places), len(steps))
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
-            ax.set_title(f"cycle {int(history.cycle[place]):,} + {float(history.fraction[step]):.3g}", loc="left")
+            ax.set_title(f"cycle {int(history.cycle[place]):,}\n+ {float(history.fraction[step]):.3g}", loc="left")
     return figure, axes
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from mpi4py import MPI
 
 from fenwear import CaseError, ConvergenceError, load_case
 from fenwear.assembly import place_case
@@ -19,11 +18,11 @@ CASES = {"example1": SMALL, "ball-on-flat": COARSE}
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", CASES)
 def test_all_ways_agree(name: str) -> None:
-    """Response to forces and loads against one rank's columns by a factor: of rounding, grown by the condition."""
-    alone = condense_bodies(place_case(load_case(name, [*CASES[name], "setup.way=columns"]), MPI.COMM_SELF), fresh=True)
+    """Response to forces and loads against columns by a factor on the same ranks, which hold the same nodes."""
+    expected = condense_bodies(place_case(load_case(name, [*CASES[name], "setup.way=columns"])), fresh=True)
     for way in ("automatic", "substructures", "elimination", "columns", "multigrid"):
         found = condense_bodies(place_case(load_case(name, [*CASES[name], f"setup.way={way}"])), fresh=True)
-        for one, other in ((found.punch, alone.punch), (found.strip, alone.strip)):
+        for one, other in ((found.punch, expected.punch), (found.strip, expected.strip)):
             scale = np.abs(other.response).max()
             np.testing.assert_allclose(one.response, other.response, rtol=0, atol=1e-11 * scale, err_msg=way)
             scale = np.abs(other.by_load).max() + 1e-300

@@ -63,6 +63,11 @@ class Look:
         """What a single value of it is called."""
         return AXES[self.axis][1]
 
+    @property
+    def of_unit(self) -> str:
+        """Unit of a single value of it."""
+        return {"cycles": "", "distance": "m", "time": "s"}[self.axis]
+
     def name(self, history: xarray.Dataset, half_cycle: int) -> str:
         """Return a half-cycle in words of the axis, such as its cycle."""
         row = int(np.flatnonzero(history.half_cycle.values == half_cycle)[0])

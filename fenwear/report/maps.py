@@ -11,7 +11,7 @@ import xarray
 from fenwear.arrays import Array
 from fenwear.report.course import temperature_unit
 from fenwear.report.figures import early_half_cycles, pressure_top
-from fenwear.report.style import GREY, NARROW, STANDARD, Look, legend_beside, panels, shades
+from fenwear.report.style import GREY, NARROW, STANDARD, Look, legend_beside, name_panel, panels, shades
 from fenwear.report.surface import Surface, centre_of_wear, surface_of
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def map_figure(
             _contact_edge(ax, surface, found)
             title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
         size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
-        ax.set_title(f"{title}\n≤ {size} {quantity.unit}", loc="left")
+        name_panel(ax, f"{title}\n≤ {size} {quantity.unit}")
     every: Any = axes
     bar = figure.colorbar(drawn, ax=every, shrink=min(1.0, 3.5 / figure.get_figheight()), aspect=25)
     name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
@@ -181,5 +181,5 @@ def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look 
     place, other = (float(at[1]), "across") if along else (float(at[0]), "along")
     grain = 1e-4 * float(np.ptp(surface_of(history).sliding, axis=0).max())
     place = round(place / grain) * grain
-    axes[-1].set_xlabel(f"place {'along' if along else 'across'} the sliding (mm), at {place:.4g} mm {other} it")
+    axes[-1].set_xlabel(f"place {'along' if along else 'across'} the sliding (mm),\nat {place:.4g} mm {other} it")
     return figure

@@ -10,7 +10,7 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
-from fenwear.report.style import GREY, STANDARD, Look, legend_beside, panels, shades
+from fenwear.report.style import STANDARD, Look, legend_beside, panels, shades
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -91,7 +91,7 @@ def traction_panels(
             now = cycle.isel(step=step)
             ax.plot(*line(now.traction.values), color=colour, label=f"{float(now.fraction):.3g}")
         x, bound = line(mu * cycle.pressure.max("step").values)
-        ax.fill_between(x, -bound, bound, color=GREY, alpha=0.25, linewidth=0, label="µ p")
+        ax.fill_between(x, -bound, bound, color="0.85", linewidth=0, zorder=0, label="µ p")
         ax.set_ylabel(f"{title(history, place, look)}:\ntraction (MPa)")
         legend_beside(ax, "part of the cycle")
     limit(axes[-1])

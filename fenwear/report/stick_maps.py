@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.report.stick_course import cycle_name, first_and_last, title, traction_panels
-from fenwear.report.style import BLUE, NARROW, RED, STANDARD, Look, legend_beside, panels, shades
+from fenwear.report.style import BLUE, NARROW, RED, STANDARD, Look, legend_beside, name_panel, panels, shades
 from fenwear.report.surface import Surface, surface_of
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         ]  # fmt: skip
         figure.colorbar(drawn[-1], ax=list(axes[row]), aspect=15).set_label(text)
     for ax, place in zip(axes[0], places, strict=True):
-        ax.set_title(title(history, place, look), loc="left")
+        name_panel(ax, title(history, place, look))
     return figure
 
 
@@ -149,7 +149,7 @@ def scar(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         values = 1e3 * history[name].isel(cycle=-1).values
         drawn = ax.tripcolor(*surface.drawn(values), shading="gouraud", cmap="YlOrBr", vmin=0,
                              vmax=float(values.max()) or 1.0, rasterized=True)  # fmt: skip
-        ax.set_title(f"{body}, {title(history, -1, look)}", loc="left")
+        name_panel(ax, f"{body}, {title(history, -1, look)}")
         figure.colorbar(drawn, ax=ax, location="bottom", shrink=0.8, aspect=25).set_label("worn depth (µm)")
     return figure
 
@@ -163,7 +163,7 @@ def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     for ax, found, place in zip(axes[0], most, places, strict=True):
         drawn = ax.tripcolor(*surface.drawn(found), shading="gouraud", cmap="RdBu_r", vmin=-size, vmax=size,
                              rasterized=True)  # fmt: skip
-        ax.set_title(title(history, place, look), loc="left")
+        name_panel(ax, title(history, place, look))
     bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.6, aspect=35)
     bar.set_label("largest stress along the sliding in the strip's surface (MPa)")
     return figure
@@ -209,7 +209,7 @@ def _maps(
     figure, axes = _panels_of_maps(history, surface, len(places), len(steps), look)
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
-            ax.set_title(f"{title(history, place, look)}, part {float(history.fraction[step]):.3g}", loc="left")
+            name_panel(ax, f"{title(history, place, look)}, part {float(history.fraction[step]):.3g}")
     return figure, axes
 
 

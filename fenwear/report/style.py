@@ -140,6 +140,12 @@ def legend_beside(ax: Axes, title: str) -> None:
                   fontsize="small", title_fontsize="small", handlelength=1.5, columnspacing=1.0)  # fmt: skip
 
 
+def name_panel(ax: Axes, text: str) -> None:
+    """Write what a panel shows above its left end, in letters that fit the figure's width."""
+    figure: Any = ax.figure
+    ax.set_title(text, loc="left", fontsize=8.5 if figure.get_size_inches()[0] >= NARROW else 6.5)
+
+
 def level_line(ax: Axes, height: float, name: str) -> None:
     """Draw a dotted level that the legend names."""
     ax.axhline(height, color=GREY, linewidth=1.0, linestyle=":", label=name)

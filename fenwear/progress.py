@@ -48,8 +48,8 @@ class Progress:
         self.bar.set_postfix_str(state)
         if self.lines:
             rate = (number - self.before) / (time.perf_counter() - self.begin)
-            left = (self.total - number) / rate
-            self._line(f"{self.unit} {number:,} of {self.total:,}, {rate:,.3g} a second, {left:,.0f} s left, {state}")
+            pace = f"{rate:,.3g} a second, {(self.total - number) / rate:,.0f} s left, " if rate > 0 else ""
+            self._line(f"{self.unit} {number:,} of {self.total:,}, {pace}{state}")
 
     def working(self) -> None:
         """Tell, now and then, that a long step is being made."""

@@ -78,7 +78,7 @@ def run_case(
     """
     case = with_law(case, log, comm)
     if case.contact.law == "coulomb":
-        return run_stick(case, name, output, log, resume=resume, progress=progress, comm=comm, last=last)
+        return run_stick(case, name, output, log, resume=resume, progress=progress, comm=comm, last=last, fresh=fresh)
     begin = time.perf_counter()
     system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
     if not resume:

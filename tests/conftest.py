@@ -7,15 +7,18 @@ import gc
 import os
 import subprocess
 import sys
+import time
 import tomllib
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
 os.environ["FENWEAR_KEPT_GIB"] = "0"  # each test computes what it checks
 
+import forked
 import pytest
 from hypothesis import HealthCheck, settings
 from mpi4py import MPI
@@ -81,12 +84,16 @@ def edited() -> Callable[..., Case]:
     return edited
 
 
+def process_environment() -> dict[str, str]:
+    """Return the environment of processes: the session's own MPI must not show through to what they start."""
+    inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE", "OMPI_COMM", "OMPI_FILE"))}
+    return {**inherited, "OMP_NUM_THREADS": "1"}
+
+
 @pytest.fixture(scope="session")
 def run_python() -> Callable[..., subprocess.CompletedProcess[str]]:
     """Return run_python(*arguments, ranks=1, ...): python3 in a process of its own, under mpirun where ranks > 1."""
-    # The session's own MPI must not show through to the processes that it starts.
-    inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE", "OMPI_COMM", "OMPI_FILE"))}
-    environment = {**inherited, "OMP_NUM_THREADS": "1"}
+    environment = process_environment()
 
     def run_python(*arguments: object, ranks: int = 1, cwd: Path | None = None, **variables: str) -> Any:
         start = [sys.executable] if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable]
@@ -98,9 +105,48 @@ def run_python() -> Callable[..., subprocess.CompletedProcess[str]]:
 
 
 @pytest.fixture(scope="session")
-def fenwear(run_python: Callable[..., Any]) -> Callable[..., Any]:
-    """Return fenwear(*arguments, ranks=1, ...): the command line in a process of its own."""
-    return lambda *arguments, **options: run_python("-m", "fenwear", *arguments, **options)
+def forks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Return the address of the process that forks fenwear's commands: see tests/forked.py."""
+    folder = tmp_path_factory.mktemp("forks")
+    address = str(folder / "door")
+    with open(folder / "messages", "wb") as said:
+        server = subprocess.Popen(
+            [sys.executable, str(TESTS / "forked.py"), address],
+            stdin=subprocess.PIPE,
+            stdout=said,
+            stderr=said,
+            env={**process_environment(), "PYTHONPATH": f"{TESTS.parent}"},
+        )
+    end = time.monotonic() + PATIENCE
+    while not os.path.exists(address):
+        assert server.poll() is None, (folder / "messages").read_text()
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    yield address
+    server.communicate()
+
+
+@pytest.fixture(scope="session")
+def fenwear(run_python: Callable[..., Any], forks: str) -> Callable[..., Any]:
+    """Return fenwear(*arguments, ranks=1, ...): the command line in a process of its own.
+
+    It is forked from one with all modules loaded, but for several ranks, and for what is read when these are loaded.
+    """
+
+    def fenwear(*arguments: object, ranks: int = 1, cwd: Path | None = None, **variables: str) -> Any:
+        words = ["-m", "fenwear", *map(str, arguments)]
+        if ranks > 1 or variables or "--" in words:
+            return run_python(*words, ranks=ranks, cwd=cwd, **variables)
+        with TemporaryFile("w+b") as out, TemporaryFile("w+b") as err, open(os.devnull, "rb") as none:
+            streams = [none.fileno(), out.fileno(), err.fileno()]
+            status = forked.call(forks, words, os.fspath(cwd or Path.cwd()), process_environment(), streams)
+            printed = []
+            for stream in (out, err):
+                stream.seek(0)
+                printed.append(stream.read().decode("utf-8"))
+        return subprocess.CompletedProcess(words, status, *printed)
+
+    return fenwear
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -24,13 +24,17 @@ BLOCK = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
-# What docker/fenwear does with its words: fenwear's own commands are its, others run as they are.
+# What docker/fenwear does with its words: fenwear's own commands are its, others run as they are. Those on one rank,
+# and scripts, are forked from a process that has the modules loaded (tests/forked.py).
 SHIM = f"""#!/bin/sh
+forked="{sys.executable} -IS {ROOT}/tests/forked.py DOOR"
+case " $* " in *" -- "*) forked="{sys.executable}" ;; esac
 case $1 in
   run|steady|optimum|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|export|info|new|schema)
-    exec {sys.executable} -m fenwear "$@" ;;
-  *) exec "$@" ;;
+    exec $forked -m fenwear "$@" ;;
+  python3) case $2 in *.py) shift && exec $forked "$@" ;; esac ;;
 esac
+exec "$@"
 """
 
 
@@ -63,14 +67,14 @@ def _pages() -> Iterator[object]:
 
 
 @pytest.mark.parametrize("page", _pages())
-def test_page(page: Path, tmp_path: Path) -> None:
+def test_page(page: Path, tmp_path: Path, forks: str) -> None:
     """All that a page shows works, in the order in which it stands, and prints what the page says."""
     tools, folder = tmp_path / "tools", tmp_path / "reader"
     (tools / "docker").mkdir(parents=True)
     folder.mkdir()
     for shim in (tools / "fenwear", folder / "docker" / "fenwear"):
         shim.parent.mkdir(exist_ok=True)
-        shim.write_text(SHIM)
+        shim.write_text(SHIM.replace("DOOR", forks))
         shim.chmod(0o755)
     environment = {**os.environ, "PATH": f"{tools}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT)}
 
@@ -96,7 +100,7 @@ def test_page(page: Path, tmp_path: Path) -> None:
         if block.kind == "python":
             if not block.saved:
                 (folder / "block.py").write_text(block.text, "utf-8")
-            done(f"{sys.executable} {block.saved or 'block.py'}")
+            done(f"fenwear python3 {block.saved or 'block.py'}")
         elif block.kind == "sh":
             done(block.text)
         elif block.kind == "console":

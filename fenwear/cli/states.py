@@ -32,7 +32,7 @@ def steady_command(
     begin = time.perf_counter()
     loaded = with_law(load(case, settings), log)
     if loaded.contact.law == "coulomb":
-        _print_final(case, loaded, as_json=as_json)
+        _print_final(case, loaded, as_json=as_json, fresh=fresh)
         return
     system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
@@ -74,11 +74,11 @@ def steady_command(
     )
 
 
-def _print_final(name: str, case: Case, *, as_json: bool) -> None:
+def _print_final(name: str, case: Case, *, as_json: bool, fresh: bool) -> None:
     """Print the shape to which partial slip wears."""
     from fenwear.stick.command import final_of, final_text
 
-    _, numbers = final_of(case)
+    _, numbers = final_of(case, fresh=fresh)
     if as_json:
         print_json(numbers)
     else:

@@ -98,6 +98,14 @@ class _Unknowns:
         )
 
 
+def _touching(pressure: NDArray[Any]) -> Array:
+    """Return pressures with zeros where they are none but for `CLOSE`.
+
+    A combination of pressures tends to nothing at a node that opens and never gets there: the node would conduct on.
+    """
+    return np.where(pressure > CLOSE * pressure.max(), pressure, 0.0)
+
+
 class Coupled:
     """Contact of all phases of a cycle at the heat and the coefficients of its own end.
 
@@ -169,7 +177,7 @@ class Coupled:
                 contact = solve(None, None, contact)
                 state, same = None, True
             else:
-                conductances = heat.conductances(pressure)
+                conductances = heat.conductances(_touching(pressure))
                 key = conductances.tobytes()
                 if known is None or known[0] != key:
                     known = (key, heat.jump(temperature, cycles, conductances))
@@ -178,7 +186,7 @@ class Coupled:
                     self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling * self.mu, contact)
                 )
                 state = end.state(self.mu * contact.pressure)
-                same = np.array_equal(heat.conductances(contact.pressure), conductances, equal_nan=True)
+                same = np.array_equal(heat.conductances(_touching(contact.pressure)), conductances, equal_nan=True)
                 if warm:
                     found.append(self.surfaces(state, contact.pressure).ravel())
             if passing is not None:
@@ -223,13 +231,10 @@ class Coupled:
 
     def through(self, state: Array, pressure: Array) -> list[Array]:
         """Return the temperatures (dim,) before, between and after the phases of a cycle at these pressures."""
-        heat, states = self.heat, [state]
-        if heat is None:
-            return states
-        for one, p, mu in zip(heat.maps(heat.conductances(pressure)), pressure, self.mu, strict=True):
-            after: Array = one.propagator @ states[-1] + one.source + one.response @ (mu * p)
-            states.append(after)
-        return states
+        if self.heat is None:
+            return [state]
+        cycle = self.heat.cycle(self.heat.conductances(pressure))
+        return [state, *cycle.states(state, self.mu * pressure)]
 
     def _update(
         self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: Worn | None, passing: Passing | None

@@ -26,6 +26,7 @@ from fenwear.case import Heat
 from fenwear.errors import HeatError
 from fenwear.heat.field import Basis, Field, Functional, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
+from fenwear.heat.step_map import PreparedStep, StepMap
 
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more
@@ -94,15 +95,6 @@ class _Ends:
     surfaces: tuple[Array, Array] | None
 
 
-@dataclass(frozen=True)
-class StepMap:
-    """One step for given conductances: s' = propagator s + source + response Q, Q the friction heat (n,)."""
-
-    propagator: Array
-    source: Array
-    response: Array
-
-
 class HeatExchange:
     """Both bodies' temperatures over half-cycles, with the heat between them.
 
@@ -132,7 +124,13 @@ class HeatExchange:
         self._contact_responses = [
             side.field.contact_responses or [side.contact.of_changes(r) for r in side.field.responses] for side in sides
         ]
+        self._forget()
+
+    def _forget(self) -> None:
+        """Begin without any fluxes, which follow from friction's partition and the conductances."""
         self._flux_maps: dict[tuple[int, int, bytes], Fluxes] = {}
+        self._flux_factors: dict[tuple[int, int], FluxFactor] = {}  # the last one of each step
+        self._prepared: dict[tuple[int, int], PreparedStep] = {}
 
     @property
     def reduced(self) -> bool:
@@ -148,7 +146,8 @@ class HeatExchange:
     def varied(self, heat: Heat, friction: Array) -> HeatExchange:
         """Return the exchange of another friction, partition or conductance with the same prepared bodies."""
         other = copy.copy(self)
-        other.heat, other.friction, other._flux_maps = heat, friction, {}
+        other.heat, other.friction = heat, friction
+        other._forget()
         return other
 
     @cached_property
@@ -394,20 +393,10 @@ class HeatExchange:
             kinds: Which prepared step each body takes.
             conductance: Of each node.
         """
-        fluxes, parts = self._flux_map(kinds, conductance), [np.eye(len(basis)) for basis in self.bases]
-        free, bare, source, bare_source = [], [], [], []
-        for side, kind, every in zip(self.sides, kinds, parts, strict=True):
-            free.append(side.field.advance(kind, every, sources=False))
-            bare.append(side.contact.of_changes(free[-1]))
-            source.append(side.field.advance(kind, np.zeros(len(every))))
-            bare_source.append(side.contact(source[-1]))
-        responses = scipy.linalg.block_diag(
-            *(side.field.responses[kind] for side, kind in zip(self.sides, kinds, strict=True))
-        )
-        propagator = scipy.linalg.block_diag(*free)
-        propagator += responses @ fluxes.of(scipy.linalg.block_diag(*bare), None, 0.0)
-        at_rest = fluxes.of(np.concatenate(bare_source), None, self.heat.ambient)
-        return StepMap(propagator, np.concatenate(source) + responses @ at_rest, fluxes.heat_of(responses))
+        if kinds not in self._prepared:
+            fields, contacts = [side.field for side in self.sides], [side.contact for side in self.sides]
+            self._prepared[kinds] = PreparedStep(fields, kinds, contacts, self.heat.ambient)
+        return self._prepared[kinds].map(self._flux_map(kinds, conductance))
 
     def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
         """Return the map to the fluxes; kept for conductances met before."""
@@ -420,7 +409,15 @@ class HeatExchange:
 
     def _make_flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
         step = self._exchanged(kinds, conductance)
-        return FluxMap.made(step) if len(conductance) <= FEW else FluxFactor(step)
+        if len(conductance) <= FEW:
+            return FluxMap.made(step)
+        last = self._flux_factors.get(kinds)
+        found = None if last is None else last.updated(step)
+        if found is None:
+            self._flux_maps = {key: value for key, value in self._flux_maps.items() if key[:2] != kinds}
+            self._flux_factors.pop(kinds, None)
+            found = self._flux_factors[kinds] = FluxFactor(step)
+        return found
 
     def _exchanged(self, kinds: tuple[int, int], conductance: Array) -> Exchanged:
         first, second = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))

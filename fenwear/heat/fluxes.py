@@ -4,9 +4,14 @@ At a node that conducts, with the friction heat Q,
 
     q_1 + q_2 = (1 - gamma_d) Q,    kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2),
 
-elsewhere q_i = -h (theta_i - theta_a), and theta_i = bare_i + T_i q_i: a dense system. Of few nodes its solution
-is made into a matrix, which serves many steps; of many it is eliminated down to q_1 and what open nodes of the
-second body lose, n unknowns or a few more in place of 2 n, and kept as a factor.
+elsewhere q_i = -h (theta_i - theta_a), and theta_i = bare_i + T_i q_i: a dense system M q = r. Of few nodes its
+solution is made into a matrix, which serves many steps; of many it is eliminated down to q_1 and what open nodes of
+the second body lose, n unknowns or a few more in place of 2 n, and kept as a factor.
+
+From one step to the next few nodes begin or cease to conduct: of M and r other rows c than those of the factor's M_0
+and r_0. With E the columns of the identity at these rows the factor serves on, exactly, by Woodbury's formula:
+
+    q = M_0^-1 (r_0 + E y),    Z = M_c M_0^-1,    (Z E) y = r_c - Z r_0.
 """
 
 from __future__ import annotations
@@ -20,6 +25,32 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+
+UPDATED = 0.1  # of the nodes: those that may conduct otherwise than a factor has it
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Rows of something that is linear in what fluxes come from.
+
+    Attributes:
+        first, second: On the surfaces' temperatures without flux (r, n) each.
+        heat: On the friction heat (r, n).
+        ambient: On the temperature of the surroundings (r,).
+    """
+
+    first: Array
+    second: Array
+    heat: Array
+    ambient: Array
+
+    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+        """Return the values (r,) or (r, k), see `Fluxes.of`."""
+        n = self.first.shape[1]
+        total = self.first @ bare[:n] + self.second @ bare[n:]
+        if heat is not None:
+            total += self.heat @ heat
+        return total + _down(bare.ndim)(self.ambient) * ambient
 
 
 @dataclass(frozen=True)
@@ -46,14 +77,55 @@ class Exchanged:
         jump = np.where(perfect, 1.0, np.nan_to_num(self.conductance, nan=0.0, posinf=0.0))
         return ~np.isnan(self.conductance), np.where(perfect, 0.0, 1.0), jump
 
+    @property
+    def loss(self) -> Array:
+        """H where no heat is conducted, else 0 (n,), mW/(mm² K)."""
+        return np.where(np.isnan(self.conductance), self.convection, 0.0)
+
+    def rows(self, nodes: NDArray[np.int64]) -> Array:
+        """Return the rows of both bodies' nodes in the matrix of the system for (q_1, q_2) (2 k, 2 n)."""
+        (t1, t2), k, n = self.responses, len(nodes), len(self.conductance)
+        conducts, own, jump = (a[nodes] for a in self.row_factors())
+        loss, every = self.loss[nodes], np.arange(k)
+        rows: Array = np.empty((2 * k, 2 * n))
+        rows[:k, :n] = (jump + loss)[:, None] * t1[nodes]
+        rows[:k, n:] = -jump[:, None] * t2[nodes]
+        rows[k:, :n] = 0.0
+        rows[k:, n:] = loss[:, None] * t2[nodes]
+        rows[every, nodes] += own
+        rows[k + every, nodes] += conducts
+        rows[k + every, n + nodes] += 1.0
+        return rows
+
     def matrix(self) -> Array:
         """Return the matrix of the system for (q_1, q_2) (2 n, 2 n)."""
-        t1, t2 = self.responses
-        conducts, own, jump = (a[:, None] for a in self.row_factors())
-        eye, h = np.eye(len(self.conductance)), self.convection
-        first = np.hstack([np.where(conducts, own * eye + jump * t1, eye + h * t1), np.where(conducts, -jump * t2, 0)])
-        second = np.hstack([np.where(conducts, eye, 0), np.where(conducts, eye, eye + h * t2)])
-        return np.vstack([first, second])
+        return self.rows(np.arange(len(self.conductance)))
+
+    def right(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+        """Return the right-hand side of the system, see `Fluxes.of`."""
+        conducts, own, jump = self.row_factors()
+        n, loss, down = len(conducts), self.loss, _down(bare.ndim)
+        first, second = bare[:n], bare[n:]
+        right = np.concatenate(
+            [down(jump) * (second - first) - down(loss) * (first - ambient), -down(loss) * (second - ambient)]
+        )
+        if heat is not None:
+            kept = down(conducts * (1 - self.debris)) * heat
+            right[:n] += down(own * self.partition) * kept
+            right[n:] += kept
+        return right
+
+    def sources(self, rows: Array) -> Sources:
+        """Return rows (r, 2 n) of the right-hand side as rows of what it follows from."""
+        conducts, own, jump = self.row_factors()
+        first, second = np.hsplit(rows, 2)
+        loss, kept = self.loss, conducts * (1 - self.debris)
+        return Sources(
+            -first * (jump + loss),
+            first * jump - second * loss,
+            (first * (own * self.partition) + second) * kept,
+            (first + second) @ loss,
+        )
 
 
 class Fluxes(Protocol):
@@ -68,8 +140,8 @@ class Fluxes(Protocol):
             ambient: Temperature of the surroundings, K.
         """
 
-    def heat_of(self, rows: Array) -> Array:
-        """Return rows (r, 2 n) of the fluxes as rows of the friction heat (r, n)."""
+    def sources(self, rows: Array) -> Sources:
+        """Return rows (r, 2 n) of the fluxes as rows of what they come from."""
 
 
 @dataclass(frozen=True)
@@ -89,14 +161,8 @@ class FluxMap:
     @classmethod
     def made(cls, step: Exchanged) -> FluxMap:
         """Return the map of a step."""
-        conducts, own, jump = step.row_factors()
-        kept, h, n = 1 - step.debris, step.convection, len(conducts)
-        inverse = scipy.linalg.inv(step.matrix())
-        loss = np.where(conducts, 0.0, h)
-        first, second = inverse[:, :n], inverse[:, n:]
-        by_temperature = np.hstack([first * (-jump * conducts - loss), first * (jump * conducts) - second * loss])
-        by_heat = (first * (own * step.partition) + second) * (kept * conducts)
-        return cls(by_temperature, by_heat, first @ loss + second @ loss)
+        made = step.sources(scipy.linalg.inv(step.matrix()))
+        return cls(np.hstack([made.first, made.second]), made.heat, made.ambient)
 
     def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
         """Return the fluxes."""
@@ -107,59 +173,136 @@ class FluxMap:
             total += _down(bare.ndim)(self.by_ambient) * ambient
         return total
 
-    def heat_of(self, rows: Array) -> Array:
-        """Return rows of the fluxes as rows of the friction heat."""
-        return rows @ self.by_heat
+    def sources(self, rows: Array) -> Sources:
+        """Return rows of the fluxes as rows of what they come from."""
+        first, second = np.hsplit(rows @ self.by_temperature, 2)
+        return Sources(first, second, rows @ self.by_heat, rows @ self.by_ambient)
 
 
 class FluxFactor:
-    """They by a factor for q_1 (n,) and q_2 of open nodes: where a node conducts q_2 = (1 - gamma_d) Q - q_1."""
+    """They by a factor for q_1 (n,) and q_2 of open nodes: where a node conducts q_2 follows from q_1.
+
+    Attributes:
+        step: What they follow from.
+    """
 
     def __init__(self, step: Exchanged) -> None:
         """Factor the system of a step."""
-        self._step = step
-        conducts, own, jump = step.row_factors()
-        self._open = np.flatnonzero(~conducts)
-        self._conducts, self._own, self._jump = conducts, np.where(conducts, own, 1.0), jump * conducts
-        self._loss = np.where(conducts, 0.0, step.convection)
+        self.step = step
+        conducts, own, self._jump = step.row_factors()
+        self._open, self._conducts = np.flatnonzero(~conducts), conducts
         t1, t2 = step.responses
         n, apart = len(conducts), self._open
         matrix: Array = np.empty((n + len(apart), n + len(apart)))
-        matrix[:n, :n] = t1 * (self._jump + self._loss)[:, None]
+        matrix[:n, :n] = t1 * (self._jump + step.loss)[:, None]
         matrix[:n, :n] += t2 * np.outer(self._jump, conducts)
-        matrix[np.arange(n), np.arange(n)] += self._own
+        matrix[np.arange(n), np.arange(n)] += own
         matrix[:n, n:] = -t2[:, apart] * self._jump[:, None]
         matrix[n:, :n] = t2[apart] * (-step.convection * conducts)
         matrix[n:, n:] = np.eye(len(apart)) + step.convection * t2[np.ix_(apart, apart)]
         self._factor = scipy.linalg.lu_factor(matrix, overwrite_a=True, check_finite=False)
+        self._adjoint: dict[tuple[int, float], Array] = {}  # rows Z of nodes and their conductances
 
     def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
         """Return the fluxes."""
-        step, n, apart = self._step, len(self._conducts), self._open
-        down = _down(bare.ndim)
-        first, second = bare[:n], bare[n:]
-        right = np.concatenate([down(self._jump) * (second - first) - down(self._loss) * (first - ambient),
-                                -step.convection * (second[apart] - ambient)])  # fmt: skip
-        if heat is not None:
-            kept = down(self._conducts * (1 - step.debris)) * heat
-            met = step.responses[1] @ kept
-            right[:n] += down(self._own * self._conducts * step.partition) * kept + down(self._jump) * met
-            right[n:] -= step.convection * met[apart]
-        found = scipy.linalg.lu_solve(self._factor, right, overwrite_b=True, check_finite=False)
-        other = np.where(down(self._conducts), (0.0 if heat is None else kept) - found[:n], 0.0)
+        return self.solve(self.step.right(bare, heat, ambient))
+
+    def sources(self, rows: Array) -> Sources:
+        """Return rows of the fluxes as rows of what they come from."""
+        return self.step.sources(self.solve_rows(rows))
+
+    def solve(self, right: Array) -> Array:
+        """Return M^-1 times right-hand sides (2 n,) or (2 n, k)."""
+        step, n, apart, down = self.step, len(self._conducts), self._open, _down(right.ndim)
+        entering = down(self._conducts) * right[n:]
+        reduced = np.concatenate([right[:n], right[n:][apart]])
+        if entering.any():
+            met = step.responses[1] @ entering
+            reduced[:n] += down(self._jump) * met
+            reduced[n:] -= step.convection * met[apart]
+        found = scipy.linalg.lu_solve(self._factor, reduced, overwrite_b=True, check_finite=False)
+        other: Array = entering - down(self._conducts) * found[:n]
         other[apart] = found[n:]
         return np.concatenate([found[:n], other])
 
-    def heat_of(self, rows: Array) -> Array:
-        """Return rows of the fluxes as rows of the friction heat."""
-        step, n, apart = self._step, len(self._conducts), self._open
-        first, second = rows[:, :n], rows[:, n:] * self._conducts
-        right = np.hstack([first - second, rows[:, n:][:, apart]]).T
+    def solve_rows(self, rows: Array) -> Array:
+        """Return rows (r, 2 n) times M^-1."""
+        step, n, apart = self.step, len(self._conducts), self._open
+        second = rows[:, n:] * self._conducts
+        right = np.hstack([rows[:, :n] - second, rows[:, n:][:, apart]]).T
         z = scipy.linalg.lu_solve(self._factor, right, trans=1, overwrite_b=True, check_finite=False).T
         through = z[:, :n] * self._jump
         through[:, apart] -= z[:, n:] * step.convection
-        found = through @ step.responses[1] + z[:, :n] * (self._own * self._conducts * step.partition) + second
-        return np.asarray(found * (self._conducts * (1 - step.debris)))
+        second += (through @ step.responses[1]) * self._conducts
+        second[:, apart] = z[:, n:]
+        return np.hstack([z[:, :n], second])
+
+    def updated(self, step: Exchanged) -> Fluxes | None:
+        """Return the fluxes of a step at other conductances by this factor; None where too many nodes differ."""
+        ours, others = np.nan_to_num(self.step.conductance, nan=-1.0), np.nan_to_num(step.conductance, nan=-1.0)
+        nodes = np.flatnonzero(ours != others)
+        if not len(nodes):
+            return self
+        most = int(UPDATED * len(ours))
+        if len(nodes) > most:
+            return None
+        keys = [(int(node), float(others[node])) for node in nodes]
+        if len(self._adjoint) + len(keys) > 2 * most:
+            self._adjoint.clear()
+        new = np.array([key[0] for key in keys if key not in self._adjoint], dtype=np.int64)
+        if len(new):
+            pairs = self.solve_rows(step.rows(new)).reshape(2, len(new), -1).transpose(1, 0, 2)
+            self._adjoint.update(zip([key for key in keys if key not in self._adjoint], pairs, strict=True))
+        rows = np.array([self._adjoint[key] for key in keys]).reshape(len(keys), 2, 2 * len(ours))
+        return FluxUpdate(self, step, nodes, np.concatenate([rows[:, 0], rows[:, 1]]))
+
+
+class FluxUpdate:
+    """They by the factor of a step of which a few nodes conduct otherwise.
+
+    Attributes:
+        base: That factor.
+        changed: Rows of the system that differ (2 k,).
+        added: What is added to their right-hand sides, y.
+    """
+
+    def __init__(self, base: FluxFactor, step: Exchanged, nodes: NDArray[np.int64], rows: Array) -> None:
+        """Solve for what is added.
+
+        Args:
+            base: The factor.
+            step: What the fluxes follow from.
+            nodes: Those that differ (k,).
+            rows: Z, their rows times the inverse of the factor's matrix (2 k, 2 n).
+        """
+        self.base, self.changed = base, np.concatenate([nodes, nodes + len(step.conductance)])
+        picked: Array = np.zeros_like(rows)
+        picked[np.arange(len(rows)), self.changed] = 1.0
+        own, others = step.sources(picked), base.step.sources(rows)
+        factor = scipy.linalg.lu_factor(rows[:, self.changed])
+        self.added = Sources(
+            *(
+                scipy.linalg.lu_solve(factor, getattr(own, name) - getattr(others, name))
+                for name in ("first", "second", "heat", "ambient")
+            )
+        )
+
+    def of(self, bare: Array, heat: Array | None, ambient: float) -> Array:
+        """Return the fluxes."""
+        right = self.base.step.right(bare, heat, ambient)
+        right[self.changed] += self.added.of(bare, heat, ambient)
+        return self.base.solve(right)
+
+    def sources(self, rows: Array) -> Sources:
+        """Return rows of the fluxes as rows of what they come from."""
+        through = self.base.solve_rows(rows)
+        base, picked, added = self.base.step.sources(through), through[:, self.changed], self.added
+        return Sources(
+            base.first + picked @ added.first,
+            base.second + picked @ added.second,
+            base.heat + picked @ added.heat,
+            base.ambient + picked @ added.ambient,
+        )
 
 
 def _down(ndim: int) -> Callable[[NDArray[Any]], NDArray[Any]]:

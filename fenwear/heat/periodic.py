@@ -9,34 +9,89 @@ periodic state itself, which is N -> infinity: (I - P_c) s = b_c + Q_c p.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import accumulate
 
 import numpy as np
 import scipy.linalg
 
 from fenwear.arrays import Array
-from fenwear.heat.exchange import HeatExchange, StepMap
+from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.step_map import StepMap
 
 KEPT, MEMORY = 8, 5 * 10**8  # cycles of different conducting nodes that are kept, and bytes that they may take
 
 
-@dataclass(frozen=True)
 class PhaseMap:
-    """One phase: s' = propagator s + source + response p."""
+    """One phase: s' = propagator s + source + response p.
 
-    propagator: Array
-    source: Array
-    response: Array
+    Args:
+        steps: Its steps in their order, with the friction heat of unit pressures in each (n,).
+    """
+
+    def __init__(self, steps: Sequence[tuple[StepMap, Array]]) -> None:
+        self.steps = steps
+
+    @cached_property
+    def propagator(self) -> Array:
+        """From the state at its start (dim, dim)."""
+        return reduce(lambda through, step: step[0].propagator @ through, self.steps[1:], self.steps[0][0].propagator)
+
+    @cached_property
+    def source(self) -> Array:
+        """Without state and pressure (dim,)."""
+        return self.after(np.zeros(len(self.steps[0][0].source)), np.zeros(len(self.steps[0][1])))
+
+    @cached_property
+    def response(self) -> Array:
+        """From its pressure (dim, n): of few nodes, which ask for it; of many `after` costs less."""
+        response: Array = np.zeros_like(self.steps[0][0].response)
+        for one, friction in self.steps:
+            response = one.propagator @ response + one.response * friction
+        return response
+
+    def after(self, state: Array, pressure: Array) -> Array:
+        """Return the state at its end (dim,) from that at its start and its pressure (n,)."""
+        heated: dict[int, Array] = {}  # steps there and back are of one kind
+        for one, friction in self.steps:
+            if id(one) not in heated:
+                heated[id(one)] = one.response @ (friction * pressure)
+            state = one.propagator @ state + one.source + heated[id(one)]
+        return state
 
 
-@dataclass(frozen=True)
-class _Passed:
-    """What is there after a phase of a cycle: through s + source + responses p, s at its start, p of all phases."""
+class Cycle:
+    """The phases of a cycle one after the other.
 
-    through: Array
-    source: Array
-    responses: Array  # (dim, m n)
+    Attributes:
+        maps: Of each phase.
+        through: State after each phase from that at the start of the cycle without sources and pressures (m, dim, dim).
+    """
+
+    def __init__(self, maps: Sequence[PhaseMap]) -> None:
+        self.maps = maps
+        self.through = list(accumulate((one.propagator for one in maps), lambda through, one: one @ through))
+
+    def states(self, state: Array, pressure: Array) -> list[Array]:
+        """Return the states after each phase from that at the start (dim,) and the pressures (m, n)."""
+        found = []
+        for phase, one in enumerate(self.maps):
+            state = one.after(state, pressure[phase])
+            found.append(state)
+        return found
+
+    @cached_property
+    def responses(self) -> list[Array]:
+        """State after each phase from the pressures of all phases (dim, m n), m of them."""
+        m, (dim, n) = len(self.maps), self.maps[0].response.shape
+        responses: Array = np.zeros((dim, m, n))
+        found: list[Array] = []
+        for phase, one in enumerate(self.maps):
+            for before in range(phase):
+                responses[:, before] = one.propagator @ responses[:, before]
+            responses[:, phase] = one.response
+            found.append(responses.reshape(dim, -1).copy())
+        return found
 
 
 class CycleJump:
@@ -46,50 +101,48 @@ class CycleJump:
         start: What the end solves for without pressure and without what cycles bring (dim,).
         weight: How many cycles bring it.
         matrix: Of the end (dim, dim).
-        passed: The cycle, phase by phase.
+        cycle: The cycle.
         gap_rows: Thermal gap of the coordinates (n, dim), mm.
         gap_constant: The same where they are zero (n,), mm.
     """
 
     def __init__(
-        self,
-        start: Array,
-        weight: float,
-        matrix: Array,
-        passed: Sequence[_Passed],
-        gap_rows: Array,
-        gap_constant: Array,
+        self, start: Array, weight: float, matrix: Array, cycle: Cycle, gap_rows: Array, gap_constant: Array
     ) -> None:
-        self._start, self._weight, self._passed = start, weight, passed
+        self._start, self._weight, self._cycle = start, weight, cycle
         self._gap_rows, self._gap_constant = gap_rows, gap_constant
         self._factor = scipy.linalg.lu_factor(matrix)
 
     def state(self, pressure: Array) -> Array:
         """Return the state at the end of the jump (dim,) for pressures (m, n)."""
-        last = self._passed[-1]
-        brought = last.source + last.responses @ pressure.ravel()
-        return np.asarray(scipy.linalg.lu_solve(self._factor, self._start + self._weight * brought))
+        return self._end(self._brought(pressure)[-1])
 
     def gaps(self, pressure: Array) -> Array:
         """Return the thermal gap at the end of each phase of the cycle that starts there (m, n), mm, at pressures."""
-        end, p = self.state(pressure), pressure.ravel()
-        return (
-            np.array([self._gap_rows @ (one.through @ end + one.source + one.responses @ p) for one in self._passed])
-            + self._gap_constant
-        )
+        brought = self._brought(pressure)
+        end = self._end(brought[-1])
+        states = [through @ end + one for through, one in zip(self._cycle.through, brought, strict=True)]
+        return np.array([self._gap_rows @ state for state in states]) + self._gap_constant
+
+    def _brought(self, pressure: Array) -> list[Array]:
+        """Return the states after each phase of a cycle from zero (dim,)."""
+        return self._cycle.states(np.zeros(len(self._start)), pressure)
+
+    def _end(self, brought: Array) -> Array:
+        return np.asarray(scipy.linalg.lu_solve(self._factor, self._start + self._weight * brought))
 
     @cached_property
     def gap(self) -> Array:
-        """The same without pressure."""
-        return self.gaps(np.zeros((len(self._passed), len(self._gap_constant))))
+        """The thermal gaps without pressure."""
+        return self.gaps(np.zeros((len(self._cycle.maps), len(self._gap_constant))))
 
     @cached_property
     def coupling(self) -> Array:
         """Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa."""
-        m, n = len(self._passed), len(self._gap_constant)
-        end_response = scipy.linalg.lu_solve(self._factor, self._weight * self._passed[-1].responses)
-        parts = [self._gap_rows @ (one.through @ end_response + one.responses) for one in self._passed]
-        return np.array(parts).reshape(m, n, m, n)
+        m, n, responses = len(self._cycle.maps), len(self._gap_constant), self._cycle.responses
+        end = scipy.linalg.lu_solve(self._factor, self._weight * responses[-1])
+        pairs = zip(self._cycle.through, responses, strict=True)
+        return np.array([self._gap_rows @ (through @ end + own) for through, own in pairs]).reshape(m, n, m, n)
 
 
 class CycleHeat:
@@ -100,7 +153,7 @@ class CycleHeat:
         dim = sum(len(basis) for basis in exchange.bases)
         self.gap_rows = exchange.gap_change(np.eye(dim))
         self._gap_constant = exchange.gap(exchange.at(np.zeros(dim)))
-        self._maps: dict[bytes, tuple[list[PhaseMap], list[_Passed]]] = {}
+        self._cycles: dict[bytes, Cycle] = {}
 
     def initial(self) -> Array:
         """Return the initial state (dim,)."""
@@ -110,57 +163,34 @@ class CycleHeat:
         """Return the conductance of each phase's nodes (m, n)."""
         return np.array([self.exchange.conductance(p) for p in pressure])
 
-    def maps(self, conductances: Array) -> list[PhaseMap]:
-        """Return the map of each phase for its conductances (m, n); the last few are kept."""
-        return self._cycle(conductances)[0]
-
-    def _cycle(self, conductances: Array) -> tuple[list[PhaseMap], list[_Passed]]:
-        """Return the map of each phase, and what is there after each one of a cycle."""
+    def cycle(self, conductances: Array) -> Cycle:
+        """Return the cycle for the conductances of its phases (m, n); the last few are kept."""
         key = conductances.tobytes()
-        if key not in self._maps:
-            m, n = conductances.shape
-            each = 8 * m * (2 * self.gap_rows.shape[1] ** 2 + self.gap_rows.shape[1] * (m + 1) * n)
-            if len(self._maps) > min(KEPT, MEMORY // each):
-                self._maps.clear()
-            maps = [self._phase_map(phase, conductances[phase]) for phase in range(len(conductances))]
-            self._maps[key] = maps, self._passed(maps)
-        return self._maps[key]
+        if key not in self._cycles:
+            (m, n), dim = conductances.shape, self.gap_rows.shape[1]
+            steps = len({(plan.punch, plan.strip) for plans in self.exchange.plans for plan in plans})
+            each = 8 * dim * (2 * m * dim + steps * (dim + n))
+            if len(self._cycles) > min(KEPT, MEMORY // each):
+                self._cycles.clear()
+            self._cycles[key] = Cycle([self._phase_map(phase, conductances[phase]) for phase in range(m)])
+        return self._cycles[key]
 
     def _phase_map(self, phase: int, conductance: Array) -> PhaseMap:
-        exchange, dim = self.exchange, self.gap_rows.shape[1]
-        steps: dict[tuple[int, int], StepMap] = {}
-        propagator: Array = np.eye(dim)
-        source: Array = np.zeros(dim)
-        response: Array = np.zeros((dim, len(conductance)))
+        exchange = self.exchange
+        maps: dict[tuple[int, int], StepMap] = {}
+        steps = []
         for plan in exchange.plans[phase]:
             kinds = (plan.punch, plan.strip)
-            if kinds not in steps:
-                steps[kinds] = exchange.step_map(kinds, conductance)
-            one = steps[kinds]
-            propagator, source = one.propagator @ propagator, one.propagator @ source + one.source
-            response = one.propagator @ response + one.response * (exchange.friction[phase] * plan.speed)
-        return PhaseMap(propagator, source, response)
-
-    @staticmethod
-    def _passed(maps: Sequence[PhaseMap]) -> list[_Passed]:
-        m, (dim, n) = len(maps), maps[0].response.shape
-        through: Array = np.eye(dim)
-        source: Array = np.zeros(dim)
-        responses: Array = np.zeros((dim, m, n))
-        passed = []
-        for phase, one in enumerate(maps):
-            through, source = one.propagator @ through, one.propagator @ source + one.source
-            for before in range(phase):
-                responses[:, before] = one.propagator @ responses[:, before]
-            responses[:, phase] = one.response
-            passed.append(_Passed(through, source, responses.reshape(dim, -1).copy()))
-        return passed
+            if kinds not in maps:
+                maps[kinds] = exchange.step_map(kinds, conductance)
+            steps.append((maps[kinds], exchange.friction[phase] * plan.speed))
+        return PhaseMap(steps)
 
     def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
         """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""
-        _, passed = self._cycle(conductances)
-        changes = np.eye(len(passed[0].source)) - passed[-1].through
+        cycle = self.cycle(conductances)
+        changes = np.eye(len(state)) - cycle.through[-1]
         if np.isinf(cycles):
-            return CycleJump(np.zeros(len(changes)), 1.0, changes, passed, self.gap_rows, self._gap_constant)
-        matrix = np.eye(len(changes)) + cycles * changes
-        return CycleJump(state, cycles, matrix, passed, self.gap_rows, self._gap_constant)
+            return CycleJump(np.zeros(len(state)), 1.0, changes, cycle, self.gap_rows, self._gap_constant)
+        matrix = np.eye(len(state)) + cycles * changes
+        return CycleJump(state, cycles, matrix, cycle, self.gap_rows, self._gap_constant)

@@ -125,6 +125,16 @@ def friction_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
+WHERE_HEAT_GOES = {
+    "convected": "lost to the surroundings",
+    "held": "lost where temperature is held",
+    "stored": "gained by both bodies",
+    "debris": "carried off by debris",
+    "carried": "carried out by the strip",
+}
+assert WHERE_HEAT_GOES.keys() == HEAT_TERMS.keys() - {"friction"}
+
+
 def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw where the friction heat of each half-cycle goes."""
     figure, (ax,) = panels(1, 3.8, look=look)
@@ -132,16 +142,8 @@ def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figur
     largest = float(np.abs(friction).max())
     scale, unit = (1e-3, "J") if largest > 1e4 else (1.0, "mJ")
     ax.plot(x, scale * friction, color="0", linewidth=2.5, label="made by friction")
-    names = {
-        "convected": "lost to the surroundings",
-        "held": "lost where temperature is held",
-        "stored": "gained by both bodies",
-        "debris": "carried off by debris",
-        "carried": "carried out by the strip",
-    }
-    assert names.keys() == HEAT_TERMS.keys() - {"friction"}
     threshold = 1e-6 * largest
-    for number, (name, text) in enumerate(names.items()):
+    for number, (name, text) in enumerate(WHERE_HEAT_GOES.items()):
         values = history[f"heat_{name}"]
         if float(np.abs(values).max()) > threshold:
             ax.plot(x, scale * values, label=text, **run_style(number))

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
-from fenwear.report import stick_maps
-from fenwear.report.course import temperature_unit
+from fenwear.report import stick_heat, stick_maps
 from fenwear.report.figures import FOLDER
 from fenwear.report.html_page import picture, render
 from fenwear.report.key_numbers import read_summary
@@ -60,7 +59,9 @@ LABELS = {
     "worn_volume_punch_mm3": ("volume worn off the punch", "mm³"),
     "largest_energy_balance_error": ("largest error of the energy balance, over its largest term", ""),
     "max_temperature_K": ("largest temperature of the contact in the last cycle", "K"),
+    "max_temperature_degC": ("largest temperature of the contact in the last cycle", "°C"),
     "largest_temperature_K": ("largest temperature of the contact", "K"),
+    "largest_temperature_degC": ("largest temperature of the contact", "°C"),
     "largest_heat_balance_error": ("largest error of the balance of heat, over its largest term", ""),
     "largest_jump_error": ("largest estimated error of a jump's depths", ""),
     "steps_per_half_cycle": ("time steps of a half-cycle", ""),
@@ -202,31 +203,27 @@ def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def temperatures(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
-    """Draw the temperatures of both surfaces at the end of chosen cycles, and the largest over the cycles."""
-    figure, (along, course) = panels(2, 2.2, share_x=False, look=look)
-    for colour, place in shades(chosen(history)):
-        cycle = history.isel(cycle=place)
-        along.plot(
-            history.x, cycle.temperature_punch.isel(step=-1), color=colour, label=cycle_name(history, place, look)
-        )
-        along.plot(history.x, cycle.temperature_strip.isel(step=-1), color=colour, linestyle=":")
-    unit = temperature_unit(history)
-    along.set_ylabel(f"temperature at the end\nof the cycle ({unit}):\npunch, dotted strip")
-    contact_axis(along)
-    legend_beside(along, look.of_one)
-    course.plot(course_axis(course, history, look), history.max_temperature, color=RED, marker=".", markersize=3)
-    course.set_ylabel(f"largest temperature\nin a cycle ({unit})")
-    return figure
+def _temperatures(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    return stick_heat.temperatures(history, chosen(history), look)
 
 
 def figures_of(history: xarray.Dataset) -> dict[str, tuple[Drawing, str, str]]:
     """Return the drawings of a run, with captions and what they show."""
-    found = IN_SOLIDS if model_of(history) == "solid" else FIGURES
+    solid = model_of(history) == "solid"
+    found = IN_SOLIDS if solid else FIGURES
     if "temperature_punch" not in history:
         return found
-    alt = "Of both surfaces along x, a line a cycle, and the largest one over the cycles."
-    return {**found, "temperatures": (temperatures, "Temperatures of the contact", alt)}
+    drawing: Drawing = stick_heat.temperature_maps
+    alt = "Of both surfaces at the end of the first and the last cycle."
+    if not solid:
+        drawing = _temperatures
+        alt = "Of both surfaces along x, a line a cycle."
+    course = "Largest temperature of the contact, and where the heat of a cycle goes, over the cycles."
+    return {
+        **found,
+        "temperatures": (drawing, "Temperatures of the contact", alt),
+        "heat": (stick_heat.heat_course, "Heat over the cycles", course),
+    }
 
 
 def _to_contact(ax: Any, history: xarray.Dataset) -> None:

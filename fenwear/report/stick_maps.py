@@ -103,7 +103,7 @@ def cuts(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
 def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the slip of each node in a cycle and its work of friction, in the first and the last cycle."""
     surface, places = surface_of(history), first_and_last(history)
-    figure, axes = _panels_of_maps(history, surface, 2, len(places), look)
+    figure, axes = panels_of_maps(history, surface, 2, len(places), look)
     cycles = history.isel(cycle=places)
     slid = np.hypot(cycles.slip, cycles.slip_across).where(cycles.pressure > 0, 0)
     work = -(cycles.traction * cycles.slip + cycles.traction_across * cycles.slip_across)
@@ -144,7 +144,7 @@ def scar(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the worn depth of both bodies before the last cycle."""
     bodies = ("punch", "strip")
     surfaces = [surface_of(history, body) for body in bodies]
-    figure, axes = _panels_of_maps(history, surfaces[0], 1, 2, look)
+    figure, axes = panels_of_maps(history, surfaces[0], 1, 2, look)
     for ax, body, surface, name in zip(axes[0], bodies, surfaces, ("wear", "wear_strip"), strict=True):
         values = 1e3 * history[name].isel(cycle=-1).values
         drawn = ax.tripcolor(*surface.drawn(values), shading="gouraud", cmap="YlOrBr", vmin=0,
@@ -157,7 +157,7 @@ def scar(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
 def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the largest stress along the sliding in the strip's surface over the first and the last cycle."""
     surface, places = surface_of(history), first_and_last(history)
-    figure, axes = _panels_of_maps(history, surface, 1, len(places), look)
+    figure, axes = panels_of_maps(history, surface, 1, len(places), look)
     most = history.surface_stress.isel(cycle=places).max("step").values
     size = float(np.abs(most).max()) or 1.0
     for ax, found, place in zip(axes[0], most, places, strict=True):
@@ -206,14 +206,14 @@ def _maps(
     history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int], look: Look
 ) -> tuple[Figure, Any]:
     """Return a figure with a row of maps for each cycle, one for each time step."""
-    figure, axes = _panels_of_maps(history, surface, len(places), len(steps), look)
+    figure, axes = panels_of_maps(history, surface, len(places), len(steps), look)
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
             name_panel(ax, f"{title(history, place, look)}, part {float(history.fraction[step]):.3g}")
     return figure, axes
 
 
-def _panels_of_maps(
+def panels_of_maps(
     history: xarray.Dataset, surface: Surface, rows: int, columns: int, look: Look
 ) -> tuple[Figure, Any]:
     """Return a figure of equal maps of the contact and a little more."""

@@ -42,7 +42,7 @@ def check_text(case: Case) -> str:
     )
 
 
-def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
+def final_of(case: Case, *, fresh: bool = False) -> tuple[FinalShape, dict[str, Any]]:
     """Return the final shape of a case's partial slip, and its key numbers; collective.
 
     Raises:
@@ -51,7 +51,7 @@ def final_of(case: Case) -> tuple[FinalShape, dict[str, Any]]:
     """
     if case.heat is not None:
         raise CaseError(InputError("heat", "expected none for `steady` of contact with stick: `run` and jumps take it"))
-    rig = make_rig(case)
+    rig = make_rig(case, fresh=fresh)
     check_touching(rig)
     found = final_shape(rig, stick_zone(rig))
     solid = case.model.kind == "solid"

@@ -215,8 +215,10 @@ class Rig:
             )
         return RigState(state, imposed, at.worn, (at.next_step + 1) % len(self.program.steps), warm, heating)
 
-    def _advance(self, at: RigState, imposed: Imposed, position: Position) -> StickState:
-        return advance(self.interface, at.contact, at.imposed, imposed, self.friction, position)
+    def _advance(
+        self, at: RigState, imposed: Imposed, position: Position, near: StickState | None = None
+    ) -> StickState:
+        return advance(self.interface, at.contact, at.imposed, imposed, self.friction, position, near)
 
     def _with_heat(
         self,
@@ -236,19 +238,29 @@ class Rig:
         pressure = float(at.contact.pressure.max())
         flux = float((self.friction * at.contact.pressure).max()) * self.reach / step.duration
         units = np.repeat([1 / max(flux, 1e-300), 1 / max(pressure, 1e-300)], n)
+        last, same = (
+            at.contact,
+            False,
+        )  # nodes conduct as in the last contact: mixed pressures of open ones are not zero
 
         def once(x: Array) -> tuple[Array, tuple[StickState, Imposed], bool]:
+            nonlocal last, same
             q, p = np.split(x / units, 2)
-            warm, _ = heat.step(number, warmth[0], q, heat.conductance(p))
+            conductance = heat.conductance(np.where(last.closed, np.maximum(p, 1e-300), 0.0))
+            warm = heat.step(number, warmth[0], q, conductance).values
             expanded = replace(imposed, loaded=heat.expanded(imposed.loaded, warm, step.offset))
-            state = self._advance(at, expanded, position)
+            state = self._advance(at, expanded, position, None if last is at.contact else last)
+            same, last = bool((state.closed == last.closed).all()), state
             made = state.heat / step.duration
             return units * np.concatenate([made, state.pressure]), (state, expanded), False
 
+        def close(change: Array, _: Array) -> bool:
+            return same and float(np.abs(change).max()) < CLOSE
+
         start = units * np.concatenate([warmth[1], at.contact.pressure])
-        state, expanded = fixed_point(once, start, lambda change, _: float(np.abs(change).max()) < CLOSE, APART)
+        state, expanded = fixed_point(once, start, close, APART)
         made = np.asarray(state.heat / step.duration)
-        warm, _ = heat.step(number, warmth[0], made, heat.conductance(state.pressure))
+        warm = heat.step(number, warmth[0], made, heat.conductance(state.pressure)).values
         return state, expanded, warm, made
 
     def half_cycle(self, at: RigState) -> tuple[RigState, Records]:
@@ -318,5 +330,5 @@ class Rig:
         if heat is None or at.temperature is None or after.temperature is None or after.heating is None:
             return none, np.zeros((2, 0)), none
         conductance = heat.conductance(after.contact.pressure)
-        _, terms = heat.step(at.next_step, at.temperature, after.heating, conductance)
-        return terms, heat.surfaces(after.temperature), conductance
+        made = heat.step(at.next_step, at.temperature, after.heating, conductance)
+        return made.terms, made.surfaces, conductance

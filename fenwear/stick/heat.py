@@ -12,9 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
+import scipy.spatial
+from scipy.sparse import coo_array, csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly import Bodies
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
@@ -23,6 +26,7 @@ from fenwear.heat.field import ReducedBasis
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.sliding.motion import make_motion
 from fenwear.stick.interface import Loaded, StickInterface
+from fenwear.stick.program import far_enough
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,15 @@ class Expansion:
         return self.at_lift + self.by_coordinates @ coordinates
 
 
+@dataclass(frozen=True)
+class HeatedStep:
+    """What a time step leads to: temperatures (dim,), terms of its balance (6,), mJ, and both surfaces (2, n), K."""
+
+    values: Array
+    terms: Array
+    surfaces: Array
+
+
 class StickHeat:
     """Temperatures of both bodies over the time steps of a cycle.
 
@@ -56,6 +69,7 @@ class StickHeat:
     ) -> None:
         self.exchange, self.expansions, self._interface = exchange, expansions, interface
         self._split = len(exchange.bases[0])
+        self._seen: dict[float, csr_array] = {}
 
     def initial(self) -> Array:
         """Return the temperatures at the start (dim,)."""
@@ -65,8 +79,8 @@ class StickHeat:
         """Return what each node conducts (n,), N/(mm s K); NaN for nothing."""
         return self.exchange.conductance(pressure)
 
-    def step(self, number: int, temperature: Array, heat: Array, conductance: Array) -> tuple[Array, Array]:
-        """Return the temperatures after a time step (dim,), and the terms of its balance, mJ.
+    def step(self, number: int, temperature: Array, heat: Array, conductance: Array) -> HeatedStep:
+        """Return what a time step leads to.
 
         Args:
             number: Of the time step in the cycle.
@@ -78,7 +92,7 @@ class StickHeat:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
         after, terms = self.exchange.half_cycle(self.exchange.at(temperature), number, heat, conductance)
-        return after.values, terms
+        return HeatedStep(after.values, terms, np.array(self.exchange.contact_temperatures(after)))
 
     def expanded(self, loaded: Loaded, temperature: Array, offset: float) -> Loaded:
         """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset."""
@@ -87,9 +101,10 @@ class StickHeat:
             for expansion, part in zip(self.expansions, np.split(temperature, [self._split]), strict=True)
         )
         if self._interface.moves and offset:  # the field stays under the punch, the material moves through it
-            x = self._interface.middle.pair.strip.trace[:, 0]
-            order = np.argsort(x)
-            strip = np.stack([np.interp(x + offset, x[order], column[order]) for column in strip.T], axis=1)
+            if offset not in self._seen:
+                surface = self._interface.middle.pair.strip
+                self._seen[offset] = read_at(surface, self._interface.field.placement(offset).points(surface.trace))
+            strip = self._seen[offset] @ strip
         return replace(loaded, on_punch=loaded.on_punch + punch, on_strip=loaded.on_strip + strip)
 
     def surfaces(self, temperature: Array) -> Array:
@@ -155,14 +170,12 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
     """Return the heat of a case with this many time steps in a half-cycle; None without heat; collective.
 
     Raises:
-        CaseError: half-cycles of unequal duration; a solid.
+        CaseError: half-cycles of unequal duration.
         HeatError: no basis gives temperatures that die out.
     """
     bodies = interface.bodies
     if case.heat is None or bodies.heat is None:
         return None
-    if interface.dim == 3:
-        raise CaseError(InputError("heat", "expected none in solids with contact.law = 'coulomb'"))
     middle = interface.middle.pair
     nothing = tuple(np.zeros((1, body.owned)) for body in bodies.heat)
     exchange = prepare_exchange(
@@ -175,9 +188,39 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
         np.ones(len(middle.weights)),
         case.model.thickness,
         reduced=True,
-        at_rest=case.stick.force is not None,
+        keep=interface.keep,
+        fresh=interface.fresh,
+        at_rest=case.stick.force is not None or not far_enough(case, interface.middle.pair.punch),
     )
     return StickHeat(heated_directly(exchange), expansions(interface, exchange, bodies, case.heat.initial), interface)
+
+
+def read_at(surface: ContactSurface, points: Array) -> csr_array:
+    """Return what takes values at the trace nodes of a surface to points near it (p, N): linear, beside it as its rim.
+
+    Args:
+        surface: Seen along the axis that is nearest to its mean normal.
+        points: (p, d), mm.
+    """
+    axis = int(np.argmax(np.abs(surface.weights @ surface.outward)))
+    nodes, seen = np.delete(surface.trace, axis, axis=1), np.delete(points, axis, axis=1)
+    if nodes.shape[1] == 1:
+        order = np.argsort(nodes[:, 0])
+        x = nodes[order, 0]
+        place = np.clip(np.searchsorted(x, seen[:, 0]) - 1, 0, len(x) - 2)
+        share = np.clip((seen[:, 0] - x[place]) / (x[place + 1] - x[place]), 0, 1)
+        corners, shares = order[np.stack([place, place + 1], axis=1)], np.stack([1 - share, share], axis=1)
+    else:
+        mesh = scipy.spatial.Delaunay(nodes)
+        found = mesh.find_simplex(seen)
+        flat = np.einsum("pij,pj->pi", mesh.transform[found, :2], seen - mesh.transform[found, 2])
+        shares = np.column_stack([flat, 1 - flat.sum(axis=1)])
+        corners = np.asarray(mesh.simplices[found])
+        beside = found < 0
+        corners[beside] = scipy.spatial.KDTree(nodes).query(seen[beside])[1][:, None]
+        shares[beside] = [1.0, 0.0, 0.0]
+    rows = np.repeat(np.arange(len(seen)), corners.shape[1])
+    return coo_array((shares.ravel(), (rows, corners.ravel())), shape=(len(seen), len(nodes))).tocsr()
 
 
 def heated_directly(exchange: HeatExchange) -> HeatExchange:

@@ -42,8 +42,9 @@ def heat_summary(history: xarray.Dataset) -> dict[str, Any]:
     """Return the key numbers of the heat at the end of a run; none without heat."""
     if "max_temperature" not in history:
         return {}
+    unit = history.max_temperature.attrs["units"]
     return {
-        "max_temperature_K": float(history.max_temperature[-1]),
-        "largest_temperature_K": float(history.max_temperature.max()),
+        f"max_temperature_{unit}": float(history.max_temperature[-1]),
+        f"largest_temperature_{unit}": float(history.max_temperature.max()),
         "largest_heat_balance_error": float(history.heat_balance_error.max()),
     }

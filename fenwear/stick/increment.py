@@ -25,10 +25,12 @@ def advance(
     end: Imposed,
     friction: Array,
     position: Position | None = None,
+    near: StickState | None = None,
 ) -> StickState:
     """Return the state after a time step.
 
-    Newton starts from the piece of the step before, then from full stick; where both fail the step is halved.
+    Newton starts from the piece of a state that is near, from that of the step before, then from full stick; where
+    all fail the step is halved.
 
     Args:
         interface: The bodies.
@@ -36,11 +38,18 @@ def advance(
         start, end: What is imposed at the start and at the end.
         friction: mu (n,).
         position: The place of the strip; by default its middle one.
+        near: After a step that is nearly the same; None where none is known.
 
     Raises:
         ConvergenceError: no way converged.
     """
     position = position or interface.middle
+    if near is not None:
+        step = Step(interface, position, before, end, friction)
+        try:
+            return _from(step, _piece(near, friction))
+        except ConvergenceError:
+            pass
     try:
         return _advance(interface, position, before, start, end, friction, HALVINGS)
     except ConvergenceError:
@@ -108,16 +117,9 @@ def _newton(step: Step) -> StickState:
     Raises:
         ConvergenceError: none does.
     """
-    before, mu = step.before, step.mu
-    closed = before.closed if before.closed.any() else np.ones_like(before.closed)
-    limit = mu * before.pressure
-    pushed = np.linalg.norm(before.trial, axis=1) > limit
-    none = np.zeros_like(closed)
-    starts = [
-        Guess(closed, pushed & closed, before.trial, limit),
-        Guess(closed, none, before.trial, limit),
-        Guess(np.ones_like(closed), none, before.trial, limit),
-    ]
+    first = _piece(step.before, step.mu)
+    none = np.zeros_like(first.closed)
+    starts = [first, first._replace(slipping=none), first._replace(closed=~none, slipping=none)]
     failure = ConvergenceError("the contact with stick did not converge")
     for guess in starts:
         try:
@@ -129,6 +131,13 @@ def _newton(step: Step) -> StickState:
         if found is not None:
             return _from(step, found)
     raise failure
+
+
+def _piece(state: StickState, friction: Array) -> Guess:
+    """Return the piece that a state lies in."""
+    closed = state.closed if state.closed.any() else np.ones_like(state.closed)
+    limit = friction * state.pressure
+    return Guess(closed, closed & (np.linalg.norm(state.trial, axis=1) > limit), state.trial, limit)
 
 
 def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:

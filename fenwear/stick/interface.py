@@ -21,7 +21,8 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Bodies, Sliding
-from fenwear.bodies.condensation import CondensedBody, condense, respond_to_load
+from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
+from fenwear.bodies.response import Request
 from fenwear.case import Case
 from fenwear.interface import ContactPair, RigidEquilibrium, check_distance, pair, rigid_equilibrium
 from fenwear.interface.placement import in_model
@@ -148,18 +149,30 @@ class StickInterface(OppositeBodies):
         case: Where it was made from one: gives the loads of each time.
         moves: Whether the strip's surface passes under the punch; otherwise the surfaces stay opposite each other,
             as for slip that is small against the contact.
+        keep: Whether the condensed bodies are kept on disk, and taken from there where they are.
+        fresh: Condense them whatever is kept.
     """
 
-    def __init__(self, bodies: Bodies, sliding: Sliding, case: Case | None = None, *, moves: bool = False) -> None:
+    def __init__(
+        self,
+        bodies: Bodies,
+        sliding: Sliding,
+        case: Case | None = None,
+        *,
+        moves: bool = False,
+        keep: bool = False,
+        fresh: bool = False,
+    ) -> None:
         self.bodies, self.sliding, self.case, self.moves = bodies, sliding, case, moves
+        self.keep, self.fresh = keep, fresh
         self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface)
         if bodies.followed is None:
             check_distance(middle)
-        self.punch = condense(bodies.punch, middle.punch.spread)
         onto = _identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
-        self.strip = condense(bodies.strip, onto)
+        wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
+        self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float, Loaded] = {}
 

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fenwear.case import Case, OneWay, Rotation, Stick
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.case import Case, OneWay, Oscillation, Rotation, Stick
 from fenwear.errors import CaseError, InputError
 from fenwear.sliding.motion import Motion, make_motion
+
+SPACINGS = 1.0  # contact nodes that the strip moves to each side before its place matters
 
 
 @dataclass(frozen=True)
@@ -120,3 +123,19 @@ def _bulk_strain(case: Case) -> float:
 def describe(settings: Stick) -> str:
     """Return in a few words what is imposed."""
     return "tangential force" if settings.force is not None else "displacement"
+
+
+def far_enough(case: Case, surface: ContactSurface) -> bool:
+    """Return whether the strip moves so far against the nodes of a contact surface that its place matters."""
+    motion = make_motion(case.motion.model_copy(update={"positions": 2}))
+    far = _largest(motion)
+    if isinstance(case.motion, Oscillation):
+        far *= float(np.linalg.norm(surface.x[:, :2] - np.array(case.motion.centre)[:2], axis=1).max())
+    return far > SPACINGS * spacing(surface)
+
+
+def spacing(surface: ContactSurface) -> float:
+    """Return how far contact nodes are apart, mm: the median."""
+    if surface.dim == 3:
+        return float(np.sqrt(np.median(surface.weights)))
+    return float(np.median(np.diff(np.unique(surface.x[:, 0].round(12)))))

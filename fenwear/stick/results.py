@@ -11,6 +11,7 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.surfaces import DIMENSIONS, Variable, columns_of_pair, on_mesh
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
@@ -129,15 +130,21 @@ def surface_stress(case: Case, records: Records) -> Array:
 
 def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
     """Return the kept cycles as a data set."""
-    solid = case.model.kind == "solid"
+    solid, degrees = case.model.kind == "solid", degrees_of(case)
     data = {}
     variables = {**VARIABLES, **(ACROSS if solid else {}), **({} if rig.heat is None else HEAT_VARIABLES)}
     for name, (dimensions, units, text) in variables.items():
         values = np.array([row.values[name] for row in rows])
-        new, unit, meaning = IN_SOLIDS.get(name, (name, units, text)) if solid else (name, units, text)
+        warm = units == KELVIN.unit
+        as_told = (name, degrees.unit if warm else units, text)
+        new, unit, meaning = IN_SOLIDS.get(name, as_told) if solid else as_told
         over = tuple(DIMENSIONS.get(d, d) for d in dimensions) if solid else dimensions
         place = on_mesh(over, 3) if solid else {}
-        data[new] = (over, values, {"units": _turned(unit, new, rig), "long_name": meaning, **place})
+        data[new] = (
+            over,
+            degrees.of(values) if warm else values,
+            {"units": _turned(unit, new, rig), "long_name": meaning, **place},
+        )
     steps = rig.program.steps
     coordinates: dict[str, Any] = {
         "cycle": ("cycle", [row.number for row in rows], {"units": "1", "long_name": "cycles done before"}),

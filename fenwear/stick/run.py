@@ -38,6 +38,7 @@ def run_stick(
     progress: How = "bar",
     comm: MPI.Comm = MPI.COMM_WORLD,
     last: bool = False,
+    fresh: bool = False,
 ) -> tuple[dict[str, Any], Path]:
     """Run a case with contact.law = "coulomb" and write its results; collective.
 
@@ -50,6 +51,7 @@ def run_stick(
         progress: A bar where standard error is a terminal, a line now and then, or none.
         comm: The ranks.
         last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Returns:
         The summary and the folder.
@@ -61,7 +63,7 @@ def run_stick(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     begin = time.perf_counter()
-    rig = make_rig(case, comm)
+    rig = make_rig(case, comm, fresh=fresh)
     if not resume:
         check_touching(rig)
     setup = time.perf_counter() - begin

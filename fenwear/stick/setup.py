@@ -14,19 +14,20 @@ from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Rig
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
-from fenwear.stick.program import make_program
+from fenwear.stick.program import far_enough, make_program
 from fenwear.stick.wear import local_wear
 
-SPACINGS = 1.0  # contact nodes that the strip moves to each side before its place matters
 
-
-def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None = None) -> Rig:
+def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None = None, fresh: bool = False) -> Rig:
     """Return the bodies of a case with what is done to them; collective.
+
+    The condensed bodies and the bases of their temperatures are kept on disk for the next time.
 
     Args:
         case: With contact.law = "coulomb".
         comm: The ranks.
         steps: Of a half-cycle, in place of the case's.
+        fresh: Condense the bodies again, even where they are kept.
 
     Raises:
         CaseError: it is a case of gross sliding, or what only the geometry can tell is wrong.
@@ -34,7 +35,8 @@ def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None =
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
     bodies, sliding = build_bodies(case, comm), make_sliding(case)
-    interface = StickInterface(bodies, sliding, case, moves=_moves(case, bodies.punch.surface))
+    moves = _moves(case, bodies.punch.surface)
+    interface = StickInterface(bodies, sliding, case, moves=moves, keep=True, fresh=fresh)
     middle = interface.middle
     wear = local_wear(sliding.wear, sliding.friction, middle.pair, middle.rigid.mean_pressure)
     mu = case.contact.friction
@@ -78,13 +80,4 @@ def _moves(case: Case, surface: ContactSurface) -> bool:
         return False
     if positions is not None:
         return True
-    reach = make_program(case, 2)
-    far = max(abs(step.displacement or 0.0) for step in reach.steps)
-    return case.wear.strip is not None and far > SPACINGS * spacing(surface)
-
-
-def spacing(surface: ContactSurface) -> float:
-    """Return how far contact nodes are apart, mm: the median."""
-    if surface.dim == 3:
-        return float(np.sqrt(np.median(surface.weights)))
-    return float(np.median(np.diff(np.unique(surface.x[:, 0].round(12)))))
+    return case.wear.strip is not None and far_enough(case, surface)

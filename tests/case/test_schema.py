@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,10 @@ def test_builtin_case_resolves_and_reads_back(name: str, tmp_path: Path) -> None
     file = tmp_path / "case.toml"
     file.write_text(case.to_toml(), "utf-8")
     assert load_case(file).resolved() == case.resolved()
+    if case.model.kind != "plane":
+        assert not {"thickness", "plane", "convecting_faces"} & set(
+            re.findall(r"^(\w+) =", case.to_toml(), re.MULTILINE)
+        )
 
 
 def test_example_1_holds_the_papers_data() -> None:

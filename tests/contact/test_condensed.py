@@ -41,6 +41,19 @@ def worn(system: Tribosystem) -> Array:
     return system.pair.initial_gap + 2e-2 * np.cos(system.pair.x / 7) ** 2
 
 
+@pytest.mark.parametrize("depth", [10.0, 1000.0])
+def test_wear_that_is_far_more_than_the_bodies_give(assembled: Callable[..., Tribosystem], depth: float) -> None:
+    """What a rigid motion takes up is no matter, however much it is beside the elastic gap of 0.2 µm."""
+    system = assembled("pin-on-disc", "geometry.degree=1")
+    contact, gap, modes = system.contact((1,)), system.pair.initial_gap, system.rigid.rigid_normal
+    reference = contact.solve(gap)
+    far = depth * np.array([0.345584, 0.821618, 0.330437]) / np.abs(modes).max(axis=0)
+    found = contact.solve(gap + modes @ far)
+    assert found.iterations <= reference.iterations + 1
+    np.testing.assert_allclose(found.pressure, reference.pressure, rtol=0, atol=1e-8 * reference.pressure.max())
+    np.testing.assert_allclose(found.rigid[0] + far, reference.rigid[0], rtol=0, atol=1e-12 * depth)
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 def test_balance_and_complementarity(system: Tribosystem, direction: int) -> None:
     """Verification 5 and 7: force and moment to round-off; p >= 0, gap >= 0, p gap = 0 exactly."""

@@ -160,6 +160,25 @@ def test_heat_may_be_lagged(assembled: Assemble, monkeypatch: pytest.MonkeyPatch
         np.testing.assert_allclose(temperatures(one), temperatures(other), rtol=0, atol=1e-6)
 
 
+def test_open_nodes_conduct_in_no_jump(assembled: Assemble, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each stage ends with the temperatures of the nodes that are closed in it: none that opens is left conducting."""
+    ends: list[float] = []
+    solve = coupled.Coupled.solve
+
+    def followed(self: Any, temperature: Any, cycles: float, *rest: Any, **settings: Any) -> Any:
+        contact, end = solve(self, temperature, cycles, *rest, **settings)
+        own = self.heat.jump(temperature, cycles, self.heat.conductances(contact.pressure))
+        ends.append(float(np.abs(own.state(self.mu * contact.pressure) - end).max()))
+        return contact, end
+
+    monkeypatch.setattr(coupled.Coupled, "solve", followed)
+    system = assembled("example1-heat", *COARSE, "heat.conductance=perfect", "heat.partition=0.5")
+    *_, last = jump(system, 300, tolerance=0.01)
+    assert (last.pressure[-1] == 0).any()
+    assert len(ends) > 50
+    assert max(ends) < 1e-5
+
+
 @pytest.mark.parametrize("coefficient", [4e-7, 4e-6])
 def test_march_tends_to_the_steady_state(assembled: Assemble, coefficient: float) -> None:
     """Where the feedback is stable a march and the direct solve agree, up to the wear between two half-cycles.

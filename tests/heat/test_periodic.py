@@ -81,3 +81,29 @@ def test_a_jump_is_an_implicit_step(heat: tuple[CycleHeat, Array, Array]) -> Non
         np.testing.assert_allclose(state - start, change, rtol=0, atol=1e-8 * np.abs(state).max())
         linear = end.gap + np.einsum("ikjl,jl->ik", end.coupling, pressure)
         np.testing.assert_allclose(linear, gaps, rtol=0, atol=1e-9 * np.abs(gaps).max())
+
+
+@pytest.mark.parametrize("updated", [0.0, 1.0], ids=["own factor", "factor of other nodes"])
+def test_many_nodes_take_the_same_way(
+    heat: tuple[CycleHeat, Array, Array], monkeypatch: pytest.MonkeyPatch, updated: float
+) -> None:
+    """By factors of the fluxes, or by those of other nodes and what they are changed by: the same maps of a cycle."""
+    cycles, pressure, conductances = heat
+    expected = cycles.cycle(conductances)
+    monkeypatch.setattr("fenwear.heat.exchange.FEW", 0)
+    monkeypatch.setattr("fenwear.heat.fluxes.UPDATED", updated)
+    exchange = cycles.exchange.varied(cycles.exchange.heat, cycles.exchange.friction)
+    many = CycleHeat(exchange)
+    before = conductances.copy()
+    before[:, 1], before[:, -2] = np.nan, before[0, -3]
+    many.cycle(before)
+    found = many.cycle(conductances)
+    for one, other in zip(found.maps, expected.maps, strict=True):
+        for name in ("propagator", "source", "response"):
+            size = np.abs(getattr(other, name)).max()
+            np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-11 * size)
+    state = cycles.initial() + 1.0
+    for one, other in zip(found.states(state, pressure), expected.states(state, pressure), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * np.abs(other).max())
+    after, _ = exchange.half_cycle(exchange.at(state), 0, pressure[0], conductances[0])
+    np.testing.assert_allclose(after.values, found.states(state, pressure)[0], rtol=0, atol=1e-11 * np.abs(state).max())

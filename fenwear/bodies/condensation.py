@@ -20,9 +20,11 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.bodies import kept
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import make_together, solve_together
+from fenwear.bodies.factor import entries, make_together, solve_together
 from fenwear.bodies.response import Request, respond_together
 from fenwear.bodies.substructure import make_substructures
+
+LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
 
 
 @dataclass(frozen=True)
@@ -130,9 +132,15 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
 
 
 def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
-    """Factor and solve; collective."""
+    """Factor and solve; collective.
+
+    One rank has nothing to do at once. A large factor beside a response to temperature is freed: what prepares the
+    heat takes as much memory, and none of it needs the factor.
+    """
     if not requests:
         return []
+    if len(requests) > 1 and requests[0].elastic.body.mesh.comm.size == 1:
+        return [_condensed([one])[0] for one in requests]
     _eliminate(requests)
     found = respond_together(requests)
     loads = _under_loads([one.elastic for one in requests])
@@ -142,6 +150,8 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
         whole = _symmetric(response.reshape(q, d, q, -1), along)
         by_load = one.patterns.T @ load
         condensed.append(CondensedBody(one.patterns, along, whole, by_load, by_temperature))
+        if by_temperature is not None and entries(one.elastic.size, d) > LARGE:
+            one.elastic.free_factor()
     return condensed
 
 

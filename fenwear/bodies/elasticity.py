@@ -209,6 +209,12 @@ class ElasticBody:
                     matrix.destroy()
         return self._factors[0]
 
+    def free_factor(self) -> None:
+        """Free its factor, of all bodies that differ by their loads; the next solution makes it again; collective."""
+        for factor in self._factors:
+            factor.free()
+        self._factors.clear()
+
     @cached_property
     def surface_dofs(self) -> NDArray[np.int64]:
         """Global numbers of the degrees of freedom of the contact surface's trace nodes (N d,)."""

@@ -66,7 +66,7 @@ def schur_complement(factor: PETSc.Mat, size: int) -> Array:
     _call("MatFactorCreateSchurComplement", factor.handle, ctypes.byref(matrix), ctypes.byref(status))
     values = ctypes.POINTER(ctypes.c_double)()
     _call("MatDenseGetArrayRead", matrix, ctypes.byref(values))
-    complement = np.array(np.ctypeslib.as_array(values, (size, size)))  # symmetric
+    complement = np.array(np.ctypeslib.as_array(values, (size, size))).T  # column by column
     _call("MatDenseRestoreArrayRead", matrix, ctypes.byref(values))
     _call("MatDestroy", ctypes.byref(matrix))
     return complement

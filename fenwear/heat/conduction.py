@@ -105,6 +105,7 @@ class HeatBody:
         self.face_loss = 2 * heat.convection / elastic.thickness if faces else 0.0
         self._measure = measure(body.mesh, self.kind)
         self._flows: dict[SlidingField, _Flow] = {}
+        self._conductivity_matrix: PETSc.Mat | None = None  # of material at rest
         self._tag_boundary(description)
 
     def _tag_boundary(self, description: Body) -> None:
@@ -170,12 +171,8 @@ class HeatBody:
         forms = flow.forms
         forms.rate.value = 0.0 if math.isinf(duration) else 1 / duration
         forms.speed.value, forms.renewed.value = speed, float(surroundings.renewed)
-        a, b, f, entering = (
-            assembled(forms.a),
-            assembled(forms.b),
-            assembled_vector(forms.f),
-            assembled_vector(forms.entering),
-        )
+        a, b = self._resting(forms) if speed == 0 else (assembled(forms.a), assembled(forms.b))
+        f, entering = assembled_vector(forms.f), assembled_vector(forms.entering)
         if surroundings.exposed is not None:
             loss = a.createVecLeft()
             loss.array[:] = self.heat.convection * surroundings.exposed
@@ -185,6 +182,18 @@ class HeatBody:
         carried = speed * flow.carried + entering
         brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.sum()))
         return HeatStep(self, a, b, f, carried, brought, entering, repeated=duration < np.inf and not at_once)
+
+    def _resting(self, forms: _StepForms) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """Return A and B of material at rest, M / dt + K and M / dt, without assembling them again; collective."""
+        rate = float(forms.rate.value)
+        if self._conductivity_matrix is None:
+            forms.rate.value = 0.0
+            self._conductivity_matrix = assembled(forms.a)
+            forms.rate.value = rate
+        a, b = self._conductivity_matrix.copy(), self._capacity_matrix.copy()
+        b.scale(rate)
+        a.axpy(1.0, b, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        return a, b
 
     def loses_heat(self, speed: float = 0.0, surroundings: Surroundings = ALONE) -> bool:
         """Return whether a heat sink exists: convection, a held temperature or new material; collective."""

@@ -292,22 +292,3 @@ class ReducedField:
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional; collective to make, not to call."""
         return Functional(self._sum(rows @ self.basis.columns), self._sum(rows @ self.basis.lift))
-
-
-def contact_responses(steps: Sequence[HeatStep], inflow: csc_array, contact_rows: csr_array) -> list[Array]:
-    """Return the contact temperature from unit fluxes (n, n) at the end of each full step; collective.
-
-    Args:
-        steps: Of a body. Their factors are made and freed one after the other.
-        inflow: Loads of unit fluxes at the interface nodes (owned, n), mm.
-        contact_rows: Temperature at the contact nodes (n, owned).
-    """
-    n, found = inflow.shape[1], []
-    for step in steps:
-        response: Array = np.empty((n, n))
-        for begin in range(0, n, CHUNK):
-            some = slice(begin, begin + CHUNK)
-            response[:, some] = contact_rows @ step.respond(inflow[:, some].toarray())
-        step.free_factor()
-        found.append(total(step.body.body.mesh.comm, response))
-    return found

@@ -12,8 +12,9 @@ from fenwear.arrays import Array
 from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
+from fenwear.heat.contact_response import contact_responses
 from fenwear.heat.exchange import HeatExchange, Side, StepPlan
-from fenwear.heat.field import FullField, ReducedField, contact_responses
+from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.reduction import ROUNDING, reduced_basis
 from fenwear.heat.track import TrackField

@@ -208,19 +208,26 @@ def _lasting_fluxes(
     """
     comm = body.body.mesh.comm
 
+    def lasting(fluxes: Array) -> Array:
+        """Return S times fluxes (n, k), S = (A^-1 B) A^-1 C: their fields a step later."""
+        return step.advance(step.respond(even @ fluxes), sources=False)
+
     def felt(fluxes: Array) -> Array:
-        """Return S^T M S times fluxes (n, k), S = (A^-1 B) A^-1 C their fields a step later: A, B are symmetric."""
-        fields = step.advance(step.respond(even @ fluxes), sources=False)
-        return total(comm, even.T @ step.advance(step.respond(body.store(fields)), sources=False))
+        """Return S^T M S times fluxes (n, k): A and B are symmetric."""
+        return total(comm, even.T @ step.advance(step.respond(body.store(lasting(fluxes))), sources=False))
 
     size, random = even.shape[1], np.random.default_rng(0)  # the same on every rank and in every run
-    space, images, least = np.zeros((size, 0)), np.zeros((size, 0)), 0.0
+    space, fields, least = np.zeros((size, 0)), np.zeros((body.owned, 0)), 0.0
+    gram: Array = np.zeros((0, 0))
     while True:
         fresh = felt(random.standard_normal((size, min(SOME, size - space.shape[1]))))
         for _ in range(2):  # once more: rounding
             fresh = np.linalg.qr(fresh - space @ (space.T @ fresh))[0]
-        space, images = np.hstack([space, fresh]), np.hstack([images, felt(fresh)])
-        squares, vectors = np.linalg.eigh(space.T @ images)
+        before, new = len(gram), lasting(fresh)
+        space, fields = np.hstack([space, fresh]), np.hstack([fields, new])
+        across = total(comm, fields.T @ body.store(new))
+        gram = np.block([[gram, across[:before]], [across[:before].T, across[before:]]])
+        squares, vectors = np.linalg.eigh(gram)
         values = np.sqrt(np.maximum(squares, 0.0))
         if not least:
             first = even @ (space @ vectors[:, -SOME // 4 :])

@@ -35,7 +35,8 @@ settings = [
     "geometry.degree=2",
     f"geometry.parameters.elements_along_contact={6 if COARSE else 16}",
     "heat.partition=0.2",
-    "output.fields_at=[]",  # no fields of the bodies here
+    "output.fields_at=[]",  # no fields of the bodies and
+    "output.report=false",  # no figures here
 ]
 temporary = tempfile.TemporaryDirectory()
 folder = Path(temporary.name)

@@ -67,6 +67,32 @@ volume = 5e-9 * (history.pressure * history.weight * history.r).sum("node") * 2 
 print(f"volume worn in the last turn {float(history.worn_volume[-1]):.6g} mm³, by hand {float(volume[-1]):.6g} mm³")
 
 # %% [markdown]
+# ## The same rings, hot
+#
+# Friction heats both, and their surfaces swell in the middle of their width: in the first turn they touch in a part of it
+# only. The heat spreads, wear takes off what has swollen, and the end is the same as without heat: $p r$ is uniform,
+# whatever the temperature.
+
+# %%
+settings = ["geometry.parameters.across=6", *(["geometry.degree=2"] if COARSE else [])]
+hot, _ = run("ring-on-ring-heat", f"run.half_cycles={20 if COARSE else 20000}", *settings)
+
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3.5), layout="constrained")
+turns = hot.half_cycle.values
+for n in sorted({int(np.searchsorted(turns, min(turn, turns[-1]))) for turn in (1, 100, 2000, 8000, 20000)}):
+    left.plot(hot.r, hot.pressure[n], label=f"after {int(turns[n]):,} turns")
+    right.plot(hot.r, hot.temperature_punch[n])
+even = 2000 / (2 * np.pi * 10 * hot.r)
+left.plot(hot.r, even, "k:", label="F / (2 pi (ro - ri) r)")
+left.set(xlabel="radius r (mm)", ylabel="pressure (MPa)")
+left.legend(frameon=False)
+right.set(xlabel="radius r (mm)", ylabel="temperature of the upper ring (K)")
+plt.show()
+last = hot.isel(half_cycle=-1)
+print(f"at the end {float(last.temperature_punch.min()):.1f} to {float(last.temperature_punch.max()):.1f} K; the pressure "
+      f"is {np.abs(last.pressure / even - 1).max():.1%} off that without heat")  # fmt: skip
+
+# %% [markdown]
 # ## A pin on a disc
 #
 # The pin is held at its top and may tilt: friction presses its leading edge, and the pin wears to a slope. A map shows

@@ -188,6 +188,12 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[TERMINAL] = os.dup(2)
 
 
+def pytest_collection_finish() -> None:
+    """Spare the collector what is loaded by now and stays: it looks at the rest after each test on several ranks."""
+    gc.collect()
+    gc.freeze()
+
+
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Show where each rank is, and end, if the ranks wait for one another for ever."""
     if MPI.COMM_WORLD.size > 1:

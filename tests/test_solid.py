@@ -9,7 +9,7 @@ import pytest
 
 from fenwear import CaseError, Tribosystem, load_case
 from fenwear.assembly import place_case
-from fenwear.cycle import steady
+from fenwear.cycle import march, steady
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
 
@@ -99,3 +99,7 @@ def test_heat_of_rings(assembled: Callable[..., Tribosystem]) -> None:
     np.testing.assert_allclose(pressure, 2000 / (2 * np.pi * 10 * system.pair.x), rtol=1e-6)
     assert state.heat is not None
     assert (state.heat.punch > 50).all()
+    *_, block = march(system, 3)  # where they touch in a part of their width only
+    assert (block.pressure == 0).any()
+    assert block.heat is not None
+    assert block.heat.balance_error.max() < 1e-9

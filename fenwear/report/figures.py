@@ -26,7 +26,7 @@ from fenwear.report.program import program_figure
 from fenwear.report.shapes import profile_figure, surfaces_of, wear_map_figure, worn_range
 from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, level_line, panels, shades
 from fenwear.results.history import HISTORY
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,12 +42,12 @@ def read_history(directory: Path) -> xarray.Dataset:
     Raises:
         CaseError: there is none, it cannot be read, or holds no half-cycle yet.
     """
-    with open_history(directory) as history:
-        if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
-            raise CaseError(InputError(str(directory / HISTORY), "no history of a run: it has other variables"))
-        if history.sizes["half_cycle"] == 0:
-            raise CaseError(InputError(str(directory / HISTORY), "holds no half-cycle yet"))
-        return history.load()
+    history = load_history(directory)
+    if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
+        raise CaseError(InputError(str(directory / HISTORY), "no history of a run: it has other variables"))
+    if history.sizes["half_cycle"] == 0:
+        raise CaseError(InputError(str(directory / HISTORY), "holds no half-cycle yet"))
+    return history
 
 
 def chosen_half_cycles(history: xarray.Dataset, wanted: Sequence[int] = ()) -> list[int]:

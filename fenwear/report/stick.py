@@ -30,7 +30,7 @@ from fenwear.report.style import (
 from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -279,8 +279,7 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look:
         CaseError: the folder holds no run, or the run has no such axis.
         OutputError: a figure or the page cannot be written.
     """
-    with open_history(directory) as opened:
-        history = opened.load()
+    history = load_history(directory)
     folder = directory / FOLDER
     paths, pictures, captions = [], [], []
     with writing(directory):

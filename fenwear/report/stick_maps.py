@@ -90,7 +90,7 @@ def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
 
 def cuts(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the traction along the sliding between its bounds, on a cut along it through the middle of the contact."""
-    surface, at = surface_of(history), _middle(history)
+    surface, at = surface_of(history), middle_of_contact(history)
     return traction_panels(
         history,
         [*_steps(history), history.sizes["step"] - 1],
@@ -124,7 +124,7 @@ def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
 def shapes(history: xarray.Dataset, chosen: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw worn depths and pressure on a cut along the sliding through the middle, for the chosen records."""
     figure, (depth, pressure) = panels(2, 2.4, look=look)
-    punch, strip, at = surface_of(history), surface_of(history, "strip"), _middle(history)
+    punch, strip, at = surface_of(history), surface_of(history, "strip"), middle_of_contact(history)
     for colour, place in shades(chosen):
         cycle = history.isel(cycle=place)
         x, worn = punch.cut(cycle.wear.values, at, along=True)
@@ -180,7 +180,7 @@ def _touched(history: xarray.Dataset) -> Array:
     return touched if touched.any() else np.ones_like(touched)
 
 
-def _middle(history: xarray.Dataset) -> Array:
+def middle_of_contact(history: xarray.Dataset) -> Array:
     """Return the places along and across the sliding of the middle of what touches (2,), mm."""
     touched = _touched(history)
     return np.array([np.average(history[name].values[touched], weights=history.weight.values[touched])

@@ -123,7 +123,7 @@ def coverage(problem: LeastSquares, repetitions: int) -> None:
 
 def test_twin_experiments_of_one_unknown(small: Callable[..., Case], profile: Callable[..., Path]) -> None:
     case = small("example2")
-    data = read_data(profile(case, 200, 0.0, lines=["# sigma = 0.1 um"]), case)
+    data = read_data(profile(case, 50, 0.0, lines=["# sigma = 0.03 um"]), case)
     coverage(LeastSquares(case, [data], [Unknown(K)]), 40)
 
 
@@ -133,8 +133,8 @@ def test_twin_experiments_of_three_unknowns(small: Callable[..., Case], profile:
     case = small("example2")
     data = []
     for name, load in (("one.csv", 10), ("two.csv", 40)):
-        lines = [f'# set punch.loads.0.force = ["0 N", "-{load} kN"]', "# sigma = 0.1 um"]
-        data.append(read_data(profile(case, 200, 0.0, name=name, lines=lines), case))
+        lines = [f'# set punch.loads.0.force = ["0 N", "-{load} kN"]', "# sigma = 0.03 um"]
+        data.append(read_data(profile(case, 50, 0.0, name=name, lines=lines), case))
     coverage(LeastSquares(case, data, [Unknown(K), Unknown(B), Unknown("contact.friction")]), 25)
 
 
@@ -186,7 +186,7 @@ def test_a_posterior_of_one_unknown_is_that_of_least_squares(small: Callable[...
     work = LOAD * 4 * AMPLITUDE * np.array([10.0, 20.0, 30.0])
     case, data = small("example2"), [volumes([10.0, 20.0, 30.0], BETA * work, 0.05 * BETA * work)]
     found = calibrate(case, data, [K])
-    sample = posterior(LeastSquares(case, data, [Unknown(K)]), found, 150).values[:, 0]
+    sample = posterior(LeastSquares(case, data, [Unknown(K)]), found, 100).values[:, 0]
     assert sample.mean() == pytest.approx(BETA, rel=0.015)
     assert sample.std() == pytest.approx(found.fitted[0].standard_error, rel=0.35)
 

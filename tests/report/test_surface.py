@@ -35,18 +35,26 @@ SETTINGS = {
 }  # fmt: skip
 
 
+class Folders(dict[str, Path]):
+    """The folder of a short run of each case, with its report: made when first asked for."""
+
+    def __init__(self, parent: Path) -> None:
+        super().__init__()
+        self.parent = parent
+
+    def __missing__(self, name: str) -> Path:
+        case = load_case(name, [*SETTINGS[name], f"title={json.dumps(EVIL)}"])
+        self[name] = run_case(case, "run", self.parent / name, lambda message: None)[1]
+        return self[name]
+
+
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Return the folder of a short run of each case, with its report."""
-    found = {}
-    for name, settings in SETTINGS.items():
-        case = load_case(name, [*settings, f"title={json.dumps(EVIL)}"])
-        found[name] = run_case(case, "run", tmp_path_factory.mktemp("report") / name, lambda message: None)[1]
-    return found
+def folders(tmp_path_factory: pytest.TempPathFactory) -> Folders:
+    return Folders(tmp_path_factory.mktemp("report"))
 
 
 @pytest.fixture(scope="module", params=sorted(SETTINGS))
-def folder(request: pytest.FixtureRequest, folders: dict[str, Path]) -> Path:
+def folder(request: pytest.FixtureRequest, folders: Folders) -> Path:
     return folders[request.param]
 
 

@@ -209,7 +209,7 @@ def _maps(
     figure, axes = panels_of_maps(history, surface, len(places), len(steps), look)
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
-            name_panel(ax, f"{title(history, place, look)}, part {float(history.fraction[step]):.3g}")
+            name_panel(ax, f"{title(history, place, look)}\npart {float(history.fraction[step]):.3g}")
     return figure, axes
 
 

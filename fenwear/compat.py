@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import dolfinx.io
+import dolfinx.mesh
 import numpy as np
 from dolfinx.fem import FunctionSpace
 from dolfinx.graph import adjacencylist
@@ -15,11 +16,12 @@ from numpy.typing import NDArray
 CORNERS = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8}
 
 
-def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags, MeshTags]:
+def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int, owner: int | None = None) -> tuple[Mesh, MeshTags, MeshTags]:
     """Distribute the gmsh model of rank 0: its mesh, cell tags and facet tags.
 
     Every rank gets as many cells, from left to right: always the same ones, unlike from a graph's
-    partitioner. dolfinx 0.9 has io.gmshio and returns three items, later versions io.gmsh and more.
+    partitioner; or one rank, the owner, gets all. dolfinx 0.9 has io.gmshio and returns three items,
+    later versions io.gmsh and more.
     """
     gmsh_io = getattr(dolfinx.io, "gmsh", None) or __import__("dolfinx.io.gmshio", fromlist=["gmshio"])
     x = gmsh_io.extract_geometry(model)[:, 0] if comm.rank == 0 else np.empty(0)
@@ -29,7 +31,7 @@ def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags
         corners = np.asarray(cells[0]).reshape(-1, CORNERS[kinds[0].name])
         ranks_of = np.empty(len(corners), dtype=np.int32)
         order = np.argsort(x[corners].mean(axis=1).round(9), kind="stable")
-        ranks_of[order] = np.arange(len(corners)) * ranks // max(len(corners), 1)
+        ranks_of[order] = np.arange(len(corners)) * ranks // max(len(corners), 1) if owner is None else owner
         links = adjacencylist(ranks_of)
         return getattr(links, "_cpp_object", links)  # wrapped from 0.10 on
 
@@ -60,6 +62,15 @@ def pattern_rows(pattern: Any) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     graph = pattern.graph
     columns, starts = graph if isinstance(graph, tuple) else (graph.array, graph.offsets)
     return np.asarray(columns), np.asarray(starts)
+
+
+def facet_nodes(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the geometry's nodes of facets (f, nodes), corners first; dolfinx 0.9 fails where there are none."""
+    if not len(facets):
+        order, cell = geometry_degree(mesh), mesh.basix_cell().name
+        nodes = {"tetrahedron": (order + 1) * (order + 2) // 2, "hexahedron": (order + 1) ** 2}.get(cell, order + 1)
+        return np.zeros((0, nodes), dtype=np.int32)
+    return np.asarray(dolfinx.mesh.entities_to_geometry(mesh, mesh.topology.dim - 1, facets))
 
 
 def geometry_degree(mesh: Mesh) -> int:

@@ -42,6 +42,7 @@ def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
     result = np.empty(partial.shape)
     comm.Reduce(np.ascontiguousarray(partial), result, op=MPI.SUM, root=0)
     comm.Bcast(result, root=0)
+    result += 0.0  # no -0.0, which another rank's zeros would have made positive
     return result
 
 

@@ -7,9 +7,10 @@ import subprocess
 from collections.abc import Callable
 
 import pytest
+from mpi4py import MPI
 
 from fenwear import CaseError, load_case
-from fenwear.assembly import elastic, needs_of, place_case, tribosystem
+from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem
 from fenwear.assembly import needs as module
 from fenwear.assembly.needs import GIB, BodyNeeds, Needs, free_memory, needs
 
@@ -98,3 +99,24 @@ def test_check_tells(fenwear: Callable[..., subprocess.CompletedProcess[str]]) -
     done = fenwear("check", "example1")
     assert done.returncode == 0, done.stderr
     assert done.stderr.startswith("4,810 and 12,506 unknowns, 65 contact nodes: the set-up takes about")
+
+
+@pytest.mark.parametrize(
+    ("way", "told"),
+    [
+        (
+            "substructures",
+            r"every rank eliminates its own cells .*\(17 columns\); rank 0: \d+ cells, ",
+        ),
+        ("elimination", r"rank 0 eliminates all \d+ cells down to the surface, 17 columns: "),
+        ("columns", r"rank 0 factors it and solves 17 columns: "),
+        ("multigrid", r"conjugate gradients on all ranks, 17 columns in blocks; no factor"),
+    ],
+)
+def test_what_each_rank_does(way: str, told: str) -> None:
+    """A line for each body, in the way that is chosen."""
+    small = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+    placed = place_case(load_case("example1", [*small, f"setup.way={way}"]), MPI.COMM_SELF)
+    lines = shares_text(placed, needs_of(placed))
+    assert [line.partition(":")[0] for line in lines] == ["punch", "strip"]
+    assert all(re.search(told, line) for line in lines)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -65,8 +66,10 @@ def test_on_root() -> None:
 
 
 FEW = """
+from pathlib import Path
 from mpi4py import MPI
 from fenwear import assemble, load_case
+from fenwear.run import run_case
 
 changes = ("elements_along_contact=2", "growth=8")
 case = load_case("example1", ["geometry.degree=2", *(f"geometry.parameters.{change}" for change in changes)])
@@ -76,11 +79,17 @@ assert cells.size_global < together.comm.size
 assert 0 in together.comm.allgather(cells.size_local)
 found, expected = (s.contact((1,)).solve(s.pair.initial_gap).pressure for s in (together, alone))
 assert abs(found - expected).max() <= 1e-9 * expected.max()
+
+settings = ["geometry.degree=2", *(f"geometry.parameters.{change}" for change in changes), "output.report=false"]
+for half_cycles in (4, 6):  # fields and checkpoints of ranks without cells, written and read
+    warm = load_case("example1-heat", [*settings, f"run.half_cycles={half_cycles}"])
+    summary, _ = run_case(warm, "few", Path("few"), lambda _: None, resume=half_cycles == 6, progress="none")
+assert summary["half_cycles"] == 6 and summary["largest_heat_balance_error"] < 1e-8
 """
 
 
 @pytest.mark.slow
-def test_more_ranks_than_cells(run_python: Callable[..., subprocess.CompletedProcess[str]]) -> None:
-    """Some have none, and all have the same pressures as one alone."""
-    done = run_python("-m", "mpi4py", "-c", FEW, ranks=5)
+def test_more_ranks_than_cells(run_python: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path) -> None:
+    """Some have none, and all have the same pressures as one alone; runs with heat are written, and go on."""
+    done = run_python("-m", "mpi4py", "-c", FEW, ranks=5, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -13,6 +13,7 @@ takes again what a changed case makes necessary, and keeps the rest.
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
 from fenwear.assembly.placed import Clock, Placed, place
+from fenwear.assembly.shares import shares_text
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
     Condensed,
@@ -54,6 +55,7 @@ __all__ = [
     "preparation",
     "property_change",
     "set_up_by",
+    "shares_text",
     "steady_exchange",
     "taken_at",
     "vary",

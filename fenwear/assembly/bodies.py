@@ -95,7 +95,7 @@ def build_bodies(
         MeshQualityError: an element does not survive the motion.
     """
     release(comm)  # what earlier systems have left
-    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law)
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, _owners(case, comm))
     moved = None if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (
@@ -109,6 +109,14 @@ def build_bodies(
     )
     heat = build_conduction(case, punch, strip, warmed)
     return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip), warmed)
+
+
+def _owners(case: Case, comm: MPI.Comm) -> tuple[int, int] | None:
+    """Return the ranks that have the whole punch and the whole strip; None where all share both.
+
+    Sums within a body are then those of one rank.
+    """
+    return (1 % comm.size, 0) if case.setup.reproducible else None
 
 
 def build_conduction(
@@ -157,7 +165,7 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
         at = nodal_function(mesh, case.geometry.degree, theta)
         law = isotropic(mesh, regions, case.materials, kind, at)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
-    return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness)
+    return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
 
 
 def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Worn:

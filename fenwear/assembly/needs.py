@@ -11,7 +11,7 @@ a half. Of many nodes as many fluxes last on any mesh, so that the time grows wi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +100,12 @@ class BodyNeeds:
         nodes = self.patterns if self.patterns <= MANY else LASTING
         return HEATING * self.temperatures * nodes
 
+    @property
+    def alone(self) -> tuple[float, float]:
+        """Time of one core and bytes of its stiffness and factor, without columns and the surface."""
+        part = replace(self, columns=0.0, patterns=0.0, surface=0.0)
+        return part.seconds, part.memory
+
 
 @dataclass(frozen=True)
 class Needs:
@@ -141,11 +147,11 @@ class Needs:
 
     def text(self) -> str:
         """Say it in a line."""
-        heat = f", {_duration(self.heating)} of it for heat," if self.heating else ""
+        heat = f", {duration(self.heating)} of it for heat," if self.heating else ""
         unknowns = " and ".join(f"{body.unknowns:,.0f}" for body in (self.punch, self.strip))
         return (
-            f"{unknowns} unknowns, {self.nodes:,.0f} contact nodes: the set-up takes about {_duration(self.seconds)} "
-            f"of one core{heat} and {_size(self.memory)}, by an estimate"
+            f"{unknowns} unknowns, {self.nodes:,.0f} contact nodes: the set-up takes about {duration(self.seconds)} "
+            f"of one core{heat} and {memory_size(self.memory)}, by an estimate"
         )
 
     def fitting(self, memory: float) -> tuple[float, Needs] | None:
@@ -190,7 +196,7 @@ def check_memory(placed: Placed, wanted: Needs) -> None:
     free = on_root(placed.comm, free_memory)
     if free is None or wanted.memory <= max(free, SMALL):
         return
-    message = f"{wanted.text()}, but {_size(free)} are free"
+    message = f"{wanted.text()}, but {memory_size(free)} are free"
     found = wanted.fitting(0.9 * free)
     if found is not None:
         times, less = found
@@ -214,11 +220,13 @@ def free_memory() -> float | None:
     return min(found) if found else None
 
 
-def _size(memory: float) -> str:
+def memory_size(memory: float) -> str:
+    """Say so many bytes."""
     return f"{memory / GIB:.1f} GiB" if memory > 0.1 * GIB else f"{memory / 2**20:.0f} MiB"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """Say how long, roughly."""
     if seconds < 90:
         return f"{seconds:.1g} s" if seconds < 10 else f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} minutes" if seconds < 5400 else f"{seconds / 3600:.1f} hours"

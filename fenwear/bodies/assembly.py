@@ -47,7 +47,7 @@ def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: b
     part.sort_indices()
     sizes = ((shape[0], maps[0].size_global * blocks[0]), (maps[1].size_local * blocks[1], shape[1]))
     csr = (part.indptr.astype(PETSc.IntType), part.indices.astype(PETSc.IntType), part.data)
-    matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=lasting(form.mesh.comm))
+    matrix = PETSc.Mat().createAIJ(sizes, bsize=tuple(blocks), csr=csr, comm=lasting(form.mesh.comm))
     matrix.assemble()
     return matrix
 

@@ -22,12 +22,14 @@ from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.bodies.multigrid import Multigrid
 from fenwear.bodies.substructure import Boundary, Substructures
-from fenwear.case import Body, Kind, Load, Support
+from fenwear.case import Body, Kind, Load, Setup, Support
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
 PREFIX = "fenwear_elasticity_"
+BY_SIZE = Setup()
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
 SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about z: hold it against turning"
@@ -61,9 +63,18 @@ class ElasticBody:
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
+        setup: How it is condensed.
     """
 
-    def __init__(self, body: BodyMesh, description: Body, law: ElasticLaw, degree: int, thickness: float = 1.0) -> None:
+    def __init__(
+        self,
+        body: BodyMesh,
+        description: Body,
+        law: ElasticLaw,
+        degree: int,
+        thickness: float = 1.0,
+        setup: Setup = BY_SIZE,
+    ) -> None:
         """Assemble the stiffness of `body`; collective.
 
         Args:
@@ -72,11 +83,12 @@ class ElasticBody:
             law: Its material.
             degree: Of the displacement.
             thickness: Of a plane model, mm; 1 for whole rings and solids.
+            setup: How it is condensed; by default as its size says.
 
         Raises:
             CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
         """
-        self.body, self.law, self.thickness = body, law, thickness
+        self.body, self.law, self.thickness, self.setup = body, law, thickness, setup
         mesh = body.mesh
         dim = mesh.geometry.dim
         self.dim = dim
@@ -201,6 +213,10 @@ class ElasticBody:
             matrix = self.stiffness
             surface = self.surface_dofs if with_surface else None
             comm = self.body.mesh.comm
+            if self.setup.way == "multigrid":
+                self._factors.append(Multigrid(matrix, self._rigid_basis(), PREFIX, comm))
+                del self.stiffness
+                return self._factors[0]
             factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface)
             self._factors.append(factor)
             if not kept:  # all that needs it has it now

@@ -71,14 +71,16 @@ class Factor:
             comm: Its ranks: PETSc frees its own communicator with the last of its objects.
             dim: Number of space dimensions, for its size.
             repeated: Whether it solves thousands of times.
-            owner: The rank that has it, unless it is spread.
+            owner: The rank that has it, unless it is spread, or one rank has the whole matrix.
             surface: Rows whose Schur complement is kept (m,).
         """
         self.comm, self._sizes = comm, matrix.getSizes()[0]
         self._rows: NDArray[np.int64] = np.asarray(matrix.getOwnershipRanges(), dtype=np.int64)
-        self.owner, self._prefix, self._kind = owner % self.comm.size, prefix, kind
+        holders = np.flatnonzero(np.diff(self._rows))
+        whole = len(holders) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
+        self.owner, self._prefix, self._kind = int(holders[0]) if whole else owner % self.comm.size, prefix, kind
         needed = 8 * entries(self._sizes[1], dim) * (2 if kind == "lu" else 1)
-        self.is_spread = self.comm.size > 1 and needed > SPREAD
+        self.is_spread = self.comm.size > 1 and not whole and needed > SPREAD
         self._repeated = repeated and not self.is_spread
         self._surface = None if self.is_spread else surface
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False
@@ -256,7 +258,7 @@ def solved(factor: PETSc.Mat, right: Array, sizes: tuple[int, int] | None = None
 
 def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[Array]:
     """Return the solutions of each factor for its right-hand sides (owned,) or (owned, k), at once; collective."""
-    columns = [right.reshape(len(right), -1) for right in rights]
+    columns = [right.reshape(len(right), math.prod(right.shape[1:])) for right in rights]
     whole = [factor.gather(one) for factor, one in zip(factors, columns, strict=True)]
     found = [factor.solve_here(one) for factor, one in zip(factors, whole, strict=True)]
     return [
@@ -274,6 +276,8 @@ def moved(matrix: PETSc.Mat, owner: int) -> PETSc.Mat | None:
         PETSc.IS().createGeneral(np.arange(size if here else 0, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
         for size in matrix.getSize()
     )
+    for chosen, block in zip((rows, columns), matrix.getBlockSizes(), strict=True):
+        chosen.setBlockSize(block)  # MUMPS orders by blocks
     (whole,) = matrix.createSubMatrices([rows], [columns])
     if here:
         return whole

@@ -127,7 +127,11 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
 
 
 def build_meshes(
-    geometry: Geometry, folder: Path | None, comm: MPI.Comm, kind: Kind = "stress"
+    geometry: Geometry,
+    folder: Path | None,
+    comm: MPI.Comm,
+    kind: Kind = "stress",
+    owners: tuple[int, int] | None = None,
 ) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
 
@@ -136,18 +140,20 @@ def build_meshes(
         folder: Where its path starts.
         comm: The ranks.
         kind: Of the model: solids are meshed in volumes.
+        owners: The ranks that have the whole punch and the whole strip; by default all have parts of both.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
     """
     on_root(comm, lambda: find_geometry(geometry, folder))
+    owned = owners or (None, None)
     if comm.rank == 0:
         with _gmsh() as gmsh:
             on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind))
-            punch, strip = (_distribute(gmsh, name, comm, _dim(kind)) for name in BODIES)
+            punch, strip = (_distribute(gmsh, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     else:
         on_root(comm, lambda: None)
-        punch, strip = (_distribute(None, name, comm, _dim(kind)) for name in BODIES)
+        punch, strip = (_distribute(None, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     return punch, strip
 
 
@@ -297,22 +303,23 @@ def _solid_types(gmsh: Any) -> list[str]:
     return problems
 
 
-def _distribute(gmsh: Any, body: str, comm: MPI.Comm, whole: int) -> BodyMesh:
-    """Distribute one body's part of rank 0's gmsh model, of dimension `whole`; collective."""
-    groups: list[dict[str, int]] = [{} for _ in range(whole + 1)]
+def _distribute(gmsh: Any, body: str, owner: int | None, comm: MPI.Comm, kind: Kind) -> BodyMesh:
+    """Distribute one body's part of rank 0's gmsh model over the ranks, or the whole to its owner; collective."""
+    top = _dim(kind)
+    groups: list[dict[str, int]] = [{} for _ in range(top + 1)]
     points: dict[str, NDArray[np.float64]] = {}
     model = None
     if gmsh is not None:
         model = gmsh.model
-        for dim in range(whole + 1):
+        for dim in range(top + 1):
             groups[dim] = {n: t for n, t in _groups(gmsh, dim).items() if n.startswith(f"{body}_")}
         for name, tag in groups[0].items():
-            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :whole]
+            points[name] = np.asarray(model.mesh.getNodesForPhysicalGroup(0, tag)[1]).reshape(-1, 3)[:, :top]
         both = model.getCurrent()
         _isolate(gmsh, body, groups)
     *_, curves, regions = comm.bcast(groups)
     points = comm.bcast(points)
-    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, gdim=whole)
+    mesh, cell_tags, facet_tags = compat.model_to_mesh(model, comm, top, owner)
     if gmsh is not None:
         gmsh.model.remove()
         gmsh.model.setCurrent(both)

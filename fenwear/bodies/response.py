@@ -61,7 +61,8 @@ class Request:
         """Return all that the answer follows from, on this rank."""
         patterns, coupling = csr_array(self.patterns), self.thermal_coupling
         values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
-        return [*self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
+        setup = self.elastic.setup
+        return [setup, *self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
 
     def forces(self, columns: NDArray[np.int64]) -> Array:
         """Return the forces on the trace nodes of some columns (N, d, k): column l a is pattern l along direction a."""
@@ -81,16 +82,20 @@ class Request:
 
         The response to temperature needs the whole body's displacements.
         """
-        surface = self.elastic.surface_dofs.size
+        way, surface = self.elastic.setup.way, self.elastic.surface_dofs.size
         small = surface**2 * SURFACE_SHARE <= entries(self.elastic.size, self.elastic.dim)
-        return self.thermal_coupling is None and small and available()
+        chosen = way in ("substructures", "elimination") or (way == "automatic" and small)
+        return self.thermal_coupling is None and chosen and available()
 
     @property
     def in_substructures(self) -> bool:
         """Whether all ranks eliminate the body together: where what they share is small; collective at first use."""
         elastic = self.elastic
-        cost = elastic.boundary.largest**3
-        return self.by_surface and cost <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
+        if elastic.setup.reproducible or not self.by_surface:
+            return False
+        if elastic.setup.way != "automatic":
+            return elastic.setup.way == "substructures"
+        return elastic.boundary.largest**3 <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
 
 
 def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | None]]:

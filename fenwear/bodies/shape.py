@@ -18,7 +18,7 @@ import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import entities_to_geometry, exterior_facet_indices
+from dolfinx.mesh import exterior_facet_indices
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -30,7 +30,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import measure
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Kind
-from fenwear.compat import geometry_degree, geometry_dofmap, interpolation_points
+from fenwear.compat import facet_nodes, geometry_degree, geometry_dofmap, interpolation_points
 from fenwear.errors import MeshQualityError
 
 LEAST = 0.2  # of an element's volume that the motion may leave anywhere in it
@@ -132,7 +132,7 @@ def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArr
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = exterior_facet_indices(mesh.topology)
     facets = np.setdiff1d(facets, body.facet_tags.find(contact_tag(body))).astype(np.int32)
-    corners = mesh.geometry.x[entities_to_geometry(mesh, dim - 1, facets)][:, :, : mesh.geometry.dim]
+    corners = mesh.geometry.x[facet_nodes(mesh, facets)][:, :, : mesh.geometry.dim]
     sides = corners[:, 1:dim] - corners[:, :1]  # one of a line, two of a triangle or quadrilateral
     across = np.cross(sides[:, 0], sides[:, 1]) if dim == 3 else sides[:, 0, ::-1] * [1.0, -1.0]
     bent = np.abs(across @ normal) > ACROSS * np.linalg.norm(across, axis=1)

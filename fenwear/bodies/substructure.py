@@ -12,6 +12,7 @@ arrive. A solution goes the same way up with right-hand sides, and down again wi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -278,7 +279,7 @@ class Substructures:
 
     def solve(self, right: Array) -> Array:
         """Return the solutions for right-hand sides on this rank's own rows, (owned,) or (owned, k); collective."""
-        local = self._local(right.reshape(len(right), -1))
+        local = self._local(right.reshape(len(right), math.prod(right.shape[1:])))
         if self._is_whole:
             return self._inside(local).reshape(right.shape)
         forces = self._brought(local)

@@ -10,6 +10,7 @@ from fenwear.case.plausible import doubts
 from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
 from fenwear.case.schema import Case
+from fenwear.case.setup import Setup, Way
 from fenwear.case.thermal import Heat, Track
 
 __all__ = [
@@ -31,10 +32,12 @@ __all__ = [
     "Reciprocating",
     "Rotation",
     "Run",
+    "Setup",
     "Stick",
     "Support",
     "Tabulated",
     "Track",
+    "Way",
     "Wear",
     "WearLaw",
     "builtin_cases",

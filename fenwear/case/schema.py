@@ -20,6 +20,7 @@ from fenwear.case.laws import Contact, Dependence, Stick, Wear
 from fenwear.case.materials import Material
 from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
 from fenwear.case.quantities import Part
+from fenwear.case.setup import Setup
 from fenwear.case.thermal import Heat
 
 OFFSET = re.compile(r"deg(?:ree)?s?_?(?:C|F|c|f)|celsius|fahrenheit|°\s*[CF]", re.IGNORECASE)
@@ -53,6 +54,7 @@ class Case(Part):
     motion: Annotated[Motions, Field(discriminator="kind")] = Field(description="of the strip under the punch")
     heat: Heat | None = Field(default=None, description="without this table there is no temperature")
     program: Program | None = Field(default=None, description="loads, motion and ambient temperature that change")
+    setup: Setup = Field(default=Setup(), description="how the bodies are condensed, and by which ranks")
     run: Run = Field(description="how far, and how")
     output: Output = Field(default=Output(), description="what is kept")
 
@@ -84,6 +86,7 @@ class Case(Part):
             problems += self._thermal_problems(self.heat)
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
+        problems += self.setup.problems(None if self.heat is None else self.heat.operator, self.contact.solver)
         problems += [*self._kind_problems(), *self._sliding_problems()]
         problems += [*self._program_problems(), *self._stick_problems()]
         problems += [

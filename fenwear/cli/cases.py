@@ -67,7 +67,7 @@ def run(
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import elastic, needs_of, place_case
+    from fenwear.assembly import elastic, needs_of, place_case, shares_text
     from fenwear.cycle import stability_number
     from fenwear.law import with_law
     from fenwear.run import position_warnings
@@ -84,7 +84,9 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         log(text)
         return
     placed = place_case(loaded)
-    log(needs_of(placed).text())
+    wanted = needs_of(placed)
+    for line in (wanted.text(), *shares_text(placed, wanted)):
+        log(line)
     system = elastic(placed)
     number = stability_number(system)
     system.check_touching()

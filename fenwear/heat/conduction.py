@@ -416,8 +416,9 @@ class HeatStep:
         indicator[body.held] = 1.0
         self.held_by_end, self.held_by_start = (transposed_times(m, indicator) for m in (a, b))
         self.held_source = float(body.body.mesh.comm.allreduce(f[body.held].sum()))
-        a.zeroRows(rows, diag=1.0)
-        b.zeroRows(rows, diag=0.0)
+        for matrix, diagonal in ((a, 1.0), (b, 0.0)):
+            matrix.setOption(PETSc.Mat.Option.KEEP_NONZERO_PATTERN, True)  # on one rank it would not, else it would
+            matrix.zeroRows(rows, diag=diagonal)
         self.source = f
         self.source[body.held] = body.held_values
         self.a, self.b = a, b

@@ -12,6 +12,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.interface.equilibrium import RigidEquilibrium
 from fenwear.interface.pair import ContactPair
+from fenwear.interface.placement import ZERO
 
 
 @dataclass(frozen=True)
@@ -74,10 +75,11 @@ def join(rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, *,
     pair = rigid.pair
     reading = pair.transfer if strip_moves else None
     on_strip = strip.normal_response(pair.normal_on_strip, reading)
-    turned = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
+    if pair.placement.turn != ZERO:
+        on_strip = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
     by_load = strip.by_load if reading is None else reading @ strip.by_load
     load_gap = _along(pair.normal, punch.by_load) - _along(pair.normal_on_strip, by_load)
-    return Interface(rigid, punch.normal_response(pair.normal) + turned, load_gap)
+    return Interface(rigid, punch.normal_response(pair.normal) + on_strip, load_gap)
 
 
 def _along(normal: Array, vectors: Array) -> Array:

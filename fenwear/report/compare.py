@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
+from fenwear.report.compare_stick import has_stick, stick_comparison
 from fenwear.report.compare_surfaces import surface_comparison
 from fenwear.report.course import directions_present, mark_few
 from fenwear.report.figures import read_history
@@ -29,6 +30,7 @@ from fenwear.report.style import (
 from fenwear.report.surface import model_of
 from fenwear.results.degrees import in_kelvin
 from fenwear.results.disk import writing
+from fenwear.results.reading import open_history
 from fenwear.results.sheet import BODIES, LINES, shown
 
 if TYPE_CHECKING:
@@ -98,7 +100,7 @@ class Comparison:
 
 def at_same_places(histories: Sequence[xarray.Dataset]) -> dict[str, list[Any]]:
     """Return depths and pressures at the end of plane runs at places that all of them have, by names with units."""
-    if any(model_of(history) != "plane" for history in histories):
+    if any(model_of(history) != "plane" or has_stick(history) for history in histories):
         return {}
     low, high = (pick(float(end(history.x)) for history in histories) for pick, end in ((max, np.min), (min, np.max)))
     if high <= low:
@@ -142,11 +144,13 @@ def compare(directories: Sequence[Path]) -> Comparison:
     read = []
     for directory in directories:
         try:
-            read.append((in_kelvin(read_history(directory)), read_summary(directory), read_case(directory)))
+            read.append((in_kelvin(_read(directory)), read_summary(directory), read_case(directory)))
         except CaseError as error:
             problems += error.problems
     if problems:
         raise CaseError(problems)
+    if len({has_stick(history) for history, _, _ in read}) > 1:
+        raise CaseError(InputError("DIR", "expected runs with stick, or runs in gross sliding, not both"))
     summaries = [summary for _, summary, _ in read]
     shown = [{k: v for k, v in s.items() if k not in ("versions", "warnings", "title")} for s in summaries]
     return Comparison(
@@ -158,10 +162,28 @@ def compare(directories: Sequence[Path]) -> Comparison:
     )
 
 
+def _read(directory: Path) -> xarray.Dataset:
+    """Return the history of a run, in memory.
+
+    Raises:
+        CaseError: there is none, or it holds nothing yet.
+    """
+    with open_history(directory) as history:
+        if has_stick(history) and history.sizes["cycle"]:
+            return history.load()
+    return read_history(directory)
+
+
 def comparison_figure(comparison: Comparison) -> Figure:
+    """Draw shape and pressures at the end of each run, and what it comes to over its cycles."""
+    for kind, draw in ((has_stick, stick_comparison), (_no_plane, surface_comparison)):
+        if any(kind(history) for history in comparison.histories):
+            return draw(comparison.names, comparison.histories)
+    return _plane_comparison(comparison)
+
+
+def _plane_comparison(comparison: Comparison) -> Figure:
     """Draw shape and pressures at the end of each run, its largest pressure and temperature over the half-cycles."""
-    if any(model_of(history) != "plane" for history in comparison.histories):
-        return surface_comparison(comparison.names, comparison.histories)
     runs = list(zip(comparison.names, comparison.histories, strict=True))
     present = [d for d in DIRECTIONS if any(d in directions_present(h) for h in comparison.histories)]
     hot = [h for h in comparison.histories if "max_temperature" in h]
@@ -241,6 +263,10 @@ def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
 
 def _differing(rows: dict[str, list[Any]]) -> dict[str, list[Any]]:
     return {key: row for key, row in rows.items() if any(value != row[0] for value in row)}
+
+
+def _no_plane(history: xarray.Dataset) -> bool:
+    return model_of(history) != "plane"
 
 
 def _larger_of_cycle(history: xarray.Dataset, name: str) -> xarray.DataArray:

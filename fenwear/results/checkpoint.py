@@ -29,6 +29,7 @@ from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
+from fenwear.results import gathered
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
 
@@ -45,7 +46,7 @@ BULK = "bulk"  # temperature of a closed track, NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
 # A run may go on farther than it was meant to, and keep other things.
-FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "title")
+FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "setup.", "title")
 
 
 def save(directory: Path, system: Tribosystem, state: RunState) -> None:
@@ -85,11 +86,15 @@ def write_temperatures(folder: Path, comm: MPI.Comm, state: HeatState) -> None:
 
 def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function) -> None:
     """Write a temperature; collective."""
-    path = new / f"{name}.bp"
+    lacks = gathered.lacks_cells(function.function_space)
+    path = new / f"{name}.{'npz' if lacks else 'bp'}"
     size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
     on_root(comm, partial(check_room, new, size))
     with writing_together(comm, path):
-        adios4dolfinx.write_function_on_input_mesh(path, function)
+        if lacks:
+            gathered.write(path, function)
+        else:
+            adios4dolfinx.write_function_on_input_mesh(path, function)
 
 
 def _begin(new: Path, system: Tribosystem, state: RunState) -> None:
@@ -151,7 +156,9 @@ def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
     """
     comm, bodies = system.comm, system.bodies.heat
     folder = on_root(comm, lambda: find(directory))
-    if bodies is None or not on_root(comm, (folder / f"{WARMED}_punch.bp").exists):
+    if bodies is None or not on_root(
+        comm, lambda: any((folder / f"{WARMED}_punch.{kind}").exists() for kind in ("bp", "npz"))
+    ):
         return None
     punch, strip = (read_temperature(folder, body, WARMED) for body in bodies)
     return punch, strip
@@ -202,10 +209,13 @@ def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") ->
         CaseError: they cannot be read.
     """
     comm, function = body.body.mesh.comm, body.function(body.initial())
-    readable = True
+    readable, whole = True, folder / f"{name}_{body.body.name}.npz"
     try:
-        adios4dolfinx.read_function(folder / f"{name}_{body.body.name}.bp", function)
-    except (KeyError, OSError, RuntimeError, ValueError):  # ADIOS2 has no type of its own
+        if on_root(comm, whole.is_file):
+            function.x.array[: body.owned] = gathered.read(whole, body.space)
+        else:
+            adios4dolfinx.read_function(whole.with_suffix(".bp"), function)
+    except (KeyError, OSError, RuntimeError, ValueError, zipfile.BadZipFile):  # ADIOS2 has no type of its own
         readable = False
     values = function.x.array[: body.owned].copy()
     if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):

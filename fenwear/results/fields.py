@@ -24,7 +24,7 @@ from fenwear.assembly import Tribosystem
 from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
 from fenwear.bodies.assembly import times
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.compat import interpolation_points
+from fenwear.compat import facet_nodes, interpolation_points
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
@@ -327,7 +327,7 @@ def _gathered(name: str, elastic: ElasticBody, functions: list[fem.Function]) ->
     linear = index_map.local_to_global(cells[:, corners].reshape(-1).astype(np.int32)).reshape(-1, corners.shape[1])
     x = space.tabulate_dof_coordinates()[: index_map.size_local, :dim]
     parts = comm.gather((x, linear))
-    gathered = [(f.name, comm.gather(_on_nodes(f, elastic).reshape(index_map.size_local, -1))) for f in functions]
+    gathered = [(f.name, comm.gather(_on_nodes(f, elastic))) for f in functions]
     if comm.rank != 0:
         return {}
     point, cell = f"{name}_point", f"{name}_cell"
@@ -357,7 +357,7 @@ def _groups(elastic: ElasticBody) -> dict[str, Any]:
     own = mesh.topology.index_map(1).size_local
     for group, tag in sorted(body.curves.items()):
         facets = body.facet_tags.find(tag)
-        ends = dolfinx.mesh.entities_to_geometry(mesh, 1, facets[facets < own])[:, :2]
+        ends = facet_nodes(mesh, facets[facets < own])[:, :2]
         lines = np.concatenate(mesh.comm.allgather(mesh.geometry.x[ends][:, :, :2]))
         name = f"{body.name}_group_{group}"
         data[name] = ((f"{name}_line", "end", "axis"), lines, {"units": "mm"})

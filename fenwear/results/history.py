@@ -29,6 +29,7 @@ from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
 SECONDS_BETWEEN_WRITES = 2.0
+SHARE = 20  # of the time between two writes over that of copying the file, which grows with it
 CHUNK = 256  # rows that a variable's storage grows by, at most
 CHUNK_VALUES = 2**18  # that it grows by at most
 INDEX = 16384  # bytes of HDF5's index of chunks and of the variable's header, generously
@@ -184,6 +185,11 @@ def free_directory(stem: Path) -> Path:
     return path
 
 
+def next_write(copying: float = 0.0) -> float:
+    """Return when a history is written again, s of the monotonic clock, after one whose copy took so many seconds."""
+    return time.monotonic() + max(SECONDS_BETWEEN_WRITES, SHARE * copying)
+
+
 class HistoryWriter:
     """Writes blocks of half-cycles to history.nc, every few seconds; for one rank.
 
@@ -207,7 +213,7 @@ class HistoryWriter:
         self._every = 1 if system.case.run.integration == "jump" else system.case.output.every
         self._pending: list[dict[str, NDArray[Any]]] = []
         self._last: dict[str, NDArray[Any]] | None = None
-        self._due = time.monotonic() + SECONDS_BETWEEN_WRITES
+        self._due = next_write()
         self._seconds_of_copying = 0.0
         self.rows = self._twin_rows = 0
         with writing(self.path):
@@ -319,8 +325,7 @@ class HistoryWriter:
                     self._twin.unlink(missing_ok=True)
                     raise
         self._pending = []
-        # A copy grows with the file: let it cost a small share of the time only.
-        self._due = time.monotonic() + max(SECONDS_BETWEEN_WRITES, 20 * self._seconds_of_copying)
+        self._due = next_write(self._seconds_of_copying)
 
     def _write(self, values: dict[str, NDArray[Any]]) -> None:
         count = self.rows + len(values["half_cycle"])

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from fenwear.case import Case
-from fenwear.errors import CaseError, InputError
+from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
-from fenwear.stick.final import FinalShape, final_shape, stick_zone
+from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import fine_enough
 from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
@@ -49,11 +49,9 @@ def final_of(case: Case, *, fresh: bool = False) -> tuple[FinalShape, dict[str, 
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
-    if case.heat is not None:
-        raise CaseError(InputError("heat", "expected none for `steady` of contact with stick: `run` and jumps take it"))
     rig = make_rig(case, fresh=fresh)
     check_touching(rig)
-    found = final_shape(rig, stick_zone(rig))
+    found = final_shape(rig)
     solid = case.model.kind == "solid"
     pair, weights = rig.interface.middle.pair, rig.weights
     x = sliding_chart(rig.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
@@ -71,6 +69,10 @@ def final_of(case: Case, *, fresh: bool = False) -> tuple[FinalShape, dict[str, 
         "pressure": found.pressure.tolist(),
         "depth": found.depth.tolist(),
     }
+    if found.temperature is not None:
+        degrees = degrees_of(case)
+        for body, values in zip(("punch", "strip"), degrees.of(found.temperature), strict=True):
+            numbers[f"temperature_{body}_{degrees.unit}"] = values.tolist()
     return found, numbers
 
 
@@ -87,5 +89,17 @@ def final_text(numbers: dict[str, Any]) -> str:
         f"  the stick zone, {stick}, carries all of the load in the end\n"
         f"  {scar}, {1e3 * numbers['largest_depth_mm']:.4g} µm deep in both bodies together, {worn}\n"
         f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone: as high as nodes "
-        "are near to them"
+        "are near to them" + _warm_text(numbers)
     )
+
+
+def _warm_text(numbers: dict[str, Any]) -> str:
+    """Return what is to be said of the temperatures, if there are any."""
+    for unit in (KELVIN, CELSIUS):
+        warmest = [max(numbers.get(f"temperature_{body}_{unit.unit}", [-np.inf])) for body in ("punch", "strip")]
+        if np.isfinite(warmest[0]):
+            return (
+                f"\n  nothing that slips carries pressure, so that friction makes no heat: the punch's contact is at "
+                f"{warmest[0]:.4g} {unit.shown} at most, the strip's at {warmest[1]:.4g} {unit.shown}"
+            )
+    return ""

@@ -9,18 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from fenwear.arrays import Array, Mask
-from fenwear.cycle.fixed_point import fixed_point
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
+from fenwear.stick.heated import Moment, together
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import OppositeBodies, Position
+from fenwear.stick.interface import Loaded, OppositeBodies, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.stick.wear import LocalWear
-
-CLOSE = 1e-9  # change of heat and pressure over their largest that ends the iterations of a step
-APART = "contact with stick and heat did not come together: expected more stick.steps, or less friction heat; tried"
 
 
 @dataclass(frozen=True)
@@ -109,6 +106,9 @@ class RigState:
         next_step: Its number in the cycle.
         temperature: Of both bodies, on the bases of the rig's heat (dim,); None without heat.
         heating: Heat of friction of the nodes in the last step (n,), mW/mm²; None without heat.
+        conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts; None without heat.
+        pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
+            was not: zones come back from cycle to cycle, so that Newton starts there. None before the first cycle.
     """
 
     contact: StickState
@@ -117,6 +117,24 @@ class RigState:
     next_step: int = 0
     temperature: Array | None = None
     heating: Array | None = None
+    conductance: Array | None = None
+    pressures: Array | None = None
+    trials: Array | None = None
+
+    @property
+    def near(self) -> tuple[Array, Array] | None:
+        """Pressure and trial of the next time step a cycle ago; None where there was none."""
+        if self.pressures is None or self.trials is None or np.isnan(self.pressures[self.next_step, 0]):
+            return None
+        return self.pressures[self.next_step], self.trials[self.next_step]
+
+    def then(self, state: StickState) -> tuple[Array | None, Array | None]:
+        """Return pressures and trials of the time steps with those of the next one."""
+        if self.pressures is None or self.trials is None:
+            return None, None
+        pressures, trials = self.pressures.copy(), self.trials.copy()
+        pressures[self.next_step], trials[self.next_step] = state.pressure, state.trial
+        return pressures, trials
 
 
 class Rig:
@@ -129,6 +147,7 @@ class Rig:
         friction: mu (n,).
         heat: Of friction; None without.
         watch: Called before every time step: may raise InterruptedRunError.
+        expanded: What loads do with a thermal expansion that stays as it is, at an offset of the strip.
     """
 
     def __init__(
@@ -139,14 +158,24 @@ class Rig:
         friction: Array,
         watch: Callable[[], None] = lambda: None,
         heat: StickHeat | None = None,
+        expanded: Callable[[Loaded, float], Loaded] = lambda loaded, _: loaded,
     ) -> None:
+        self.expanded = expanded
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
 
     def watched(self, watch: Callable[[], None]) -> Rig:
         """Return the same, watched."""
-        return Rig(self.interface, self.program, self.wear, self.friction, watch, self.heat)
+        return Rig(self.interface, self.program, self.wear, self.friction, watch, self.heat, self.expanded)
+
+    def kept_at(self, heat: StickHeat, temperature: Array) -> Rig:
+        """Return the same at a temperature (dim,) that stays as it is."""
+
+        def expanded(loaded: Loaded, offset: float) -> Loaded:
+            return heat.expanded(loaded, temperature, offset)
+
+        return Rig(self.interface, self.program, self.wear, self.friction, self.watch, None, expanded)
 
     def driven(self, program: Program) -> Rig:
         """Return the same in other time steps, without heat."""
@@ -173,7 +202,7 @@ class Rig:
             ConvergenceError: a step did not converge.
         """
         interface, program, worn = self.interface, self.program, shape or self.unworn()
-        loaded = interface.loaded(None if program.steps[-1].fraction is None else 0.0)
+        loaded = self.expanded(interface.loaded(None if program.steps[-1].fraction is None else 0.0), 0.0)
         opening = self.opening(interface.middle, worn)
         state, before = untouched(interface), Imposed(loaded.times(0), opening)
         for k in range(1, program.pressing + 1):
@@ -184,9 +213,11 @@ class Rig:
         at = RigState(state, before, worn)
         for step in program.lead_in:
             at = self._stepped(at, step)
+        steps, (n, m) = len(program.steps), state.trial.shape
+        at = replace(at, next_step=0, pressures=np.full((steps, n), np.nan), trials=np.full((steps, n, m), np.nan))
         if self.heat is None:
-            return replace(at, next_step=0)
-        return replace(at, next_step=0, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
+            return at
+        return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
 
     def opening(self, position: Position, worn: Worn) -> Array:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
@@ -196,7 +227,7 @@ class Rig:
         """Return the place of the strip in a time step, and what is imposed at its end; collective."""
         interface = self.interface
         position = interface.position(step.offset)
-        loaded = interface.loaded(step.fraction if step.fraction is not None else 0.0)
+        loaded = self.expanded(interface.loaded(step.fraction if step.fraction is not None else 0.0), step.offset)
         return position, Imposed(loaded, self.opening(position, worn), step.displacement, step.force, step.strain)
 
     def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
@@ -208,60 +239,23 @@ class Rig:
         self.watch()
         position, imposed = self.imposed(step, at.worn)
         if self.heat is None or at.temperature is None or at.heating is None:
-            state, warm, heating = self._advance(at, imposed, position), None, None
-        else:
-            state, imposed, warm, heating = self._with_heat(
-                self.heat, (at.temperature, at.heating), at, step, imposed, position
-            )
-        return RigState(state, imposed, at.worn, (at.next_step + 1) % len(self.program.steps), warm, heating)
+            state = advance(self.interface, at.contact, at.imposed, imposed, self.friction, position, at.near)
+            return self._after(at, state, imposed)
 
-    def _advance(
-        self, at: RigState, imposed: Imposed, position: Position, near: StickState | None = None
-    ) -> StickState:
-        return advance(self.interface, at.contact, at.imposed, imposed, self.friction, position, near)
+        def solved(loaded: Loaded, near: tuple[Array, Array] | None) -> StickState:
+            end = replace(imposed, loaded=loaded)
+            return advance(self.interface, at.contact, at.imposed, end, self.friction, position, near or at.near)
 
-    def _with_heat(
-        self,
-        heat: StickHeat,
-        warmth: tuple[Array, Array],
-        at: RigState,
-        step: TimeStep,
-        imposed: Imposed,
-        position: Position,
-    ) -> tuple[StickState, Imposed, Array, Array]:
-        """Return contact, what is imposed, temperature and heat of friction of a step in which they belong together.
-
-        Raises:
-            ConvergenceError: they do not come together.
-        """
-        number, n = at.next_step, len(self.weights)
-        pressure = float(at.contact.pressure.max())
         flux = float((self.friction * at.contact.pressure).max()) * self.reach / step.duration
-        units = np.repeat([1 / max(flux, 1e-300), 1 / max(pressure, 1e-300)], n)
-        last, same = (
-            at.contact,
-            False,
-        )  # nodes conduct as in the last contact: mixed pressures of open ones are not zero
+        moment = Moment(at.next_step, step.duration, step.offset, at.temperature, at.heating)
+        found = together(self.heat, solved, imposed.loaded, at.contact, moment, flux)
+        after = self._after(at, found.state, replace(imposed, loaded=found.loaded))
+        return replace(after, temperature=found.temperature, heating=found.heating, conductance=found.conductance)
 
-        def once(x: Array) -> tuple[Array, tuple[StickState, Imposed], bool]:
-            nonlocal last, same
-            q, p = np.split(x / units, 2)
-            conductance = heat.conductance(np.where(last.closed, np.maximum(p, 1e-300), 0.0))
-            warm = heat.step(number, warmth[0], q, conductance).values
-            expanded = replace(imposed, loaded=heat.expanded(imposed.loaded, warm, step.offset))
-            state = self._advance(at, expanded, position, None if last is at.contact else last)
-            same, last = bool((state.closed == last.closed).all()), state
-            made = state.heat / step.duration
-            return units * np.concatenate([made, state.pressure]), (state, expanded), False
-
-        def close(change: Array, _: Array) -> bool:
-            return same and float(np.abs(change).max()) < CLOSE
-
-        start = units * np.concatenate([warmth[1], at.contact.pressure])
-        state, expanded = fixed_point(once, start, close, APART)
-        made = np.asarray(state.heat / step.duration)
-        warm = heat.step(number, warmth[0], made, heat.conductance(state.pressure)).values
-        return state, expanded, warm, made
+    def _after(self, at: RigState, state: StickState, imposed: Imposed) -> RigState:
+        pressures, trials = at.then(state)
+        following = (at.next_step + 1) % len(self.program.steps)
+        return RigState(state, imposed, at.worn, following, pressures=pressures, trials=trials)
 
     def half_cycle(self, at: RigState) -> tuple[RigState, Records]:
         """Return the state at the end of the half-cycle that comes next, and its records; the shape stays."""
@@ -327,8 +321,8 @@ class Rig:
     def _heat_record(self, at: RigState, after: RigState) -> tuple[Array, Array, Array]:
         """Return the terms of the heat, the contact temperatures, and the conductances; empty without heat."""
         heat, none = self.heat, np.zeros(0)
-        if heat is None or at.temperature is None or after.temperature is None or after.heating is None:
+        conductance = after.conductance
+        if heat is None or at.temperature is None or after.heating is None or conductance is None:
             return none, np.zeros((2, 0)), none
-        conductance = heat.conductance(after.contact.pressure)
         made = heat.step(at.next_step, at.temperature, after.heating, conductance)
         return made.terms, made.surfaces, conductance

@@ -86,8 +86,10 @@ class Step:
     def jumps(self, found: Found) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
         position = self.position
-        j = position.compliance @ found.f + position.modes @ found.rigid - position.drive * found.displacement
-        j += self.free
+        # C W^-1 is symmetric: rows of the few nodes that carry something, which lie together in memory.
+        loaded, weights = np.flatnonzero(found.f), position.weights
+        j = (weights[loaded] * found.f[loaded]) @ position.compliance[loaded] / weights
+        j += position.modes @ found.rigid - position.drive * found.displacement + self.free
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
     def solve(self, guess: Guess) -> Found:
@@ -109,8 +111,9 @@ class Step:
             A[rows, :k] = matrix[:, columns]
             A[rows, : len(closed)][:, tied] += matrix[:, n + closed[tied]] * ratio
 
-        unit = 1 / self.scale.ravel()[columns][:, None]
-        fill(slice(0, k), self.position.compliance[columns] * unit)
+        unit, C = 1 / self.scale.ravel()[columns][:, None], self.position.compliance
+        A[:k, :k] = C[columns[:, None], columns] * unit
+        A[:k, : len(closed)][:, tied] += C[columns[:, None], n + closed[tied]] * unit * ratio
         A[:k, k : k + r] = self.position.modes[columns] * (unit * self.units)
         b[:k] = -unit[:, 0] * self.free[columns]
         if loose:
@@ -180,12 +183,18 @@ class Step:
             found.rigid,
             found.displacement,
             float(position.pull @ f),
-            self.free_punch + np.tensordot(interface.punch.response, force, 2),
-            self.free_strip - np.tensordot(interface.strip.response, back, 2),
+            self.free_punch + _displaced(interface.punch.response, force),
+            self.free_strip - _displaced(interface.strip.response, back),
             guess.trial,
             iterations,
             unique,
         )
+
+
+def _displaced(response: Array, force: Array) -> Array:
+    """Return the displacement (q, d) by forces (q, d), few of which are not zero: the response is symmetric."""
+    loaded = np.flatnonzero(force.any(axis=1))
+    return np.asarray(np.tensordot(force[loaded], response[loaded], 2))
 
 
 def _solved(A: Array, b: Array) -> tuple[Array, int]:

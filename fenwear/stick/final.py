@@ -7,11 +7,14 @@ overlap at any time of the cycle (M. Ciavarella and D. A. Hills, J. Strain Anal.
 the stick zone only,
 
     p >= 0, gap >= 0, p gap = 0 in the stick zone;    p = 0, depth = max(0, -gap) outside of it.
+
+Where nothing slips under pressure friction makes no heat. So in the end both bodies are as warm as held temperatures
+and surroundings make them, and the shape is that of bodies of these temperatures.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,8 +22,10 @@ from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.heat import Course
 
 FAR = 1e3  # times the largest gap: never closes
+MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,8 @@ class FinalShape:
         depth: Worn off both bodies together (n,), mm.
         gap: Beside the scar (n,), mm.
         worn: The depth shared between the bodies by their wear rates.
+        pressures: In each time step of a cycle (k, n), MPa.
+        temperature: Of the contact surfaces of punch and strip (2, n), K; None without heat.
     """
 
     stick: Mask
@@ -40,6 +47,8 @@ class FinalShape:
     depth: Array
     gap: Array
     worn: Worn
+    pressures: Array
+    temperature: Array | None = None
 
 
 def stick_zone(rig: Rig) -> Mask:
@@ -56,7 +65,7 @@ def stick_zone(rig: Rig) -> Mask:
 
 
 def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
-    """Return the shape to which partial slip wears; collective.
+    """Return the shape to which partial slip wears; collective. With heat it and its temperatures go together.
 
     Args:
         rig: The bodies and what is done to them.
@@ -64,7 +73,26 @@ def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
 
     Raises:
         ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
+        CaseError: the bodies lose no heat.
     """
+    heat = rig.heat
+    if heat is None:
+        return _final_shape(rig, stick)
+    pressures = rig.beginning().contact.pressure[None].repeat(len(rig.program.steps), axis=0)
+    before: Array = np.zeros((2, len(rig.weights)))
+    for _ in range(MOST_TIMES):
+        conductance = np.array([heat.conductance(pressure) for pressure in pressures])
+        course = Course(list(range(len(pressures))), np.zeros_like(pressures), conductance)
+        warm = heat.through(course).at_rest()
+        found, now = _final_shape(rig.kept_at(heat, warm), stick), heat.surfaces(warm)
+        if np.abs(now - before).max() <= SAME * max(float(np.abs(now).max()), 1e-300):
+            return replace(found, temperature=now)
+        pressures, before = found.pressures, now
+    raise ConvergenceError(f"contact and temperatures of the end did not come together in {MOST_TIMES} times")
+
+
+def _final_shape(rig: Rig, stick: Mask | None) -> FinalShape:
+    """Return the shape of bodies whose temperatures stay."""
     zone = stick_zone(rig) if stick is None else stick
     if not zone.any():
         raise ConvergenceError(
@@ -81,4 +109,5 @@ def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
     rates = [0.0 if law is None else float(law.rate.mean()) for law in (rig.wear.punch, rig.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
     strip = rig.interface.middle.pair.deposit @ ((1 - share) * depth)
-    return FinalShape(zone, records.pressure[-1], depth, np.maximum(found, 0.0), Worn(share * depth, strip))
+    worn = Worn(share * depth, strip)
+    return FinalShape(zone, records.pressure[-1], depth, np.maximum(found, 0.0), worn, records.pressure)

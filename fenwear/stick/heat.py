@@ -28,6 +28,8 @@ from fenwear.sliding.motion import make_motion
 from fenwear.stick.interface import Loaded, StickInterface
 from fenwear.stick.program import far_enough
 
+NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die out
+
 
 @dataclass(frozen=True)
 class Expansion:
@@ -138,6 +140,20 @@ class CycleMap:
     def after(self, temperature: Array, cycles: float) -> Array:
         """Return the temperatures after so many cycles in one implicit Euler step: (I + N (I - P)) s' = s + N b."""
         return np.asarray(scipy.linalg.solve(self._matrix(cycles), temperature + cycles * self.source))
+
+    def at_rest(self) -> Array:
+        """Return the temperatures that cycles lead to in the end (dim,): (I - P) s = b.
+
+        Raises:
+            CaseError: they go on for ever, as neither body loses heat.
+        """
+        if np.abs(scipy.linalg.eigvals(self.through)).max() > 1 - NEUTRAL:
+            message = (
+                "the bodies lose no heat: their temperature in the end depends on the way there, which `run` follows; "
+                "expected a held temperature or convection for `steady`"
+            )
+            raise CaseError(InputError("heat", message))
+        return np.asarray(scipy.linalg.solve(np.eye(len(self.source)) - self.through, self.source))
 
     def error(self, before: Array, after: Array, rate: Array, cycles: float) -> Array:
         """Return about the error of such a step (dim,), by the trapezoidal rule with the rate of change before it."""

@@ -14,6 +14,7 @@ from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.state import Imposed, StickState
 
 MOST = 60  # Newton steps
+FEW = 8  # from where it should take one or two
 CLOSE = 1e-10  # residual of the laws over the largest pressure
 HALVINGS = 6  # of a step that does not converge
 
@@ -25,7 +26,7 @@ def advance(
     end: Imposed,
     friction: Array,
     position: Position | None = None,
-    near: StickState | None = None,
+    near: tuple[Array, Array] | None = None,
 ) -> StickState:
     """Return the state after a time step.
 
@@ -38,7 +39,7 @@ def advance(
         start, end: What is imposed at the start and at the end.
         friction: mu (n,).
         position: The place of the strip; by default its middle one.
-        near: After a step that is nearly the same; None where none is known.
+        near: Pressure (n,) and trial (n, m) after a step that is nearly the same; None where none is known.
 
     Raises:
         ConvergenceError: no way converged.
@@ -47,7 +48,7 @@ def advance(
     if near is not None:
         step = Step(interface, position, before, end, friction)
         try:
-            return _from(step, _piece(near, friction))
+            return _from(step, _piece(*near, friction), FEW)
         except ConvergenceError:
             pass
     try:
@@ -117,7 +118,7 @@ def _newton(step: Step) -> StickState:
     Raises:
         ConvergenceError: none does.
     """
-    first = _piece(step.before, step.mu)
+    first = _piece(step.before.pressure, step.before.trial, step.mu)
     none = np.zeros_like(first.closed)
     starts = [first, first._replace(slipping=none), first._replace(closed=~none, slipping=none)]
     failure = ConvergenceError("the contact with stick did not converge")
@@ -133,11 +134,12 @@ def _newton(step: Step) -> StickState:
     raise failure
 
 
-def _piece(state: StickState, friction: Array) -> Guess:
-    """Return the piece that a state lies in."""
-    closed = state.closed if state.closed.any() else np.ones_like(state.closed)
-    limit = friction * state.pressure
-    return Guess(closed, closed & (np.linalg.norm(state.trial, axis=1) > limit), state.trial, limit)
+def _piece(pressure: Array, trial: Array, friction: Array) -> Guess:
+    """Return the piece that a state of this pressure (n,) and trial (n, m) lies in."""
+    closed = pressure > 0
+    closed = closed if closed.any() else ~closed
+    limit = friction * pressure
+    return Guess(closed, closed & (np.linalg.norm(trial, axis=1) > limit), trial, limit)
 
 
 def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
@@ -167,19 +169,19 @@ def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
     return None
 
 
-def _from(step: Step, guess: Guess) -> StickState:
-    """Return the state after a step, by Newton's method from a piece.
+def _from(step: Step, guess: Guess, most: int = MOST) -> StickState:
+    """Return the state after a step, by Newton's method from a piece, in at most so many steps.
 
     Raises:
         ConvergenceError: it does not converge.
     """
-    found, iterations, unique = _iterate(step, guess)
+    found, iterations, unique = _iterate(step, guess, most)
     return step.state(found, iterations, unique=unique)
 
 
-def _iterate(step: Step, guess: Guess) -> tuple[Found, int, bool]:
+def _iterate(step: Step, guess: Guess, most: int = MOST) -> tuple[Found, int, bool]:
     wrong = np.inf
-    for iteration in range(1, MOST + 1):
+    for iteration in range(1, most + 1):
         found = _solve(step, guess)
         guess, wrong = step.look(found)
         if wrong < CLOSE:
@@ -187,7 +189,7 @@ def _iterate(step: Step, guess: Guess) -> tuple[Found, int, bool]:
         if not guess.closed.any():
             guess = guess._replace(closed=np.ones_like(guess.closed))
     raise ConvergenceError(
-        f"the contact with stick did not converge in {MOST} Newton steps, residual {wrong:.3g} of the largest "
+        f"the contact with stick did not converge in {most} Newton steps, residual {wrong:.3g} of the largest "
         "pressure: take more steps, or less friction"
     )
 

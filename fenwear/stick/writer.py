@@ -14,10 +14,9 @@ import xarray
 
 from fenwear.errors import CaseError, InputError
 from fenwear.results.disk import check_room, claim, writing
-from fenwear.results.history import HISTORY, SECONDS_BETWEEN_WRITES
+from fenwear.results.history import HISTORY, next_write
 
 CYCLE = "cycle"
-SHARE = 20  # of the time between two writes over the time of the last one: writing copies the file
 
 
 class CycleWriter:
@@ -37,7 +36,7 @@ class CycleWriter:
         self.path, self._part = directory / HISTORY, directory / "history.part"
         self._pending: list[xarray.Dataset] = []
         self._last: Callable[[], xarray.Dataset] | None = None
-        self._due = time.monotonic() + SECONDS_BETWEEN_WRITES
+        self._due = next_write()
         if resumed_after is not None and self.path.exists():
             self._cut(resumed_after, every)
 
@@ -106,8 +105,7 @@ class CycleWriter:
                 self._part.unlink(missing_ok=True)
                 raise
         self._pending = []
-        now = time.monotonic()
-        self._due = now + max(SECONDS_BETWEEN_WRITES, SHARE * (now - begin))
+        self._due = next_write(time.monotonic() - begin)
 
     def _write(self, new: xarray.Dataset) -> None:
         if not self.path.exists():

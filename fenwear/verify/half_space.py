@@ -177,6 +177,7 @@ def _warmed(case: Case) -> Array:
     "love",
     "Uniform pressure and uniform heat on a disc and on a square of a half-space",
     "Love: u E* / p L = 1.1221997 and 0.5610999 on a unit square, 2 and 4/pi on a disc; T = q L / K times half of that",
+    slow=True,
 )
 def love() -> Result:
     """In the middle, where the finite body of steel shows, and how much less it is at the edge or corner."""

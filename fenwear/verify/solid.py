@@ -212,6 +212,7 @@ def hertz(x: Array, axes: tuple[float, float], peak: float) -> Array:
     "solid-hertz",
     "Hertz: a rigid sphere and a rigid ellipsoid on steel",
     "K. L. Johnson, Contact Mechanics, 1985, sections 4.2(a) and (c)",
+    slow=True,
 )
 def sphere() -> Result:
     """The sphere R = 10: p0³ = 6 P E*² / (pi³ R²); radii 10 and 5: half-axes 0.20800, 0.13116 at P = 200 N.

@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from dolfinx.mesh import entities_to_geometry, exterior_facet_indices
+from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.mesh import BodyMesh
+from fenwear.compat import facet_nodes
 from fenwear.sliding.wear import Worn
 from fenwear.watch.ends import SMOOTH
 from fenwear.watch.rim import rim_edges
@@ -100,7 +101,7 @@ def _at_ends(body: BodyMesh, normal: Array) -> Array:
     mesh = body.mesh
     mesh.topology.create_connectivity(1, 2)
     facets = exterior_facet_indices(mesh.topology)
-    corners = entities_to_geometry(mesh, 1, facets)[:, :2]
+    corners = facet_nodes(mesh, facets)[:, :2]
     own = (mesh.geometry.x[corners][:, :, :2], np.isin(facets, body.facet_tags.find(contact_tag(body))))
     x, contact = (np.concatenate(part) for part in zip(*mesh.comm.allgather(own), strict=True))
     directions: Array = np.zeros((2, 2, 2))  # into the contact, and beyond

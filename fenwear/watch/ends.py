@@ -18,11 +18,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from dolfinx.mesh import entities_to_geometry, exterior_facet_indices
+from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
 from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 
+from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.mesh import BodyMesh
@@ -158,7 +159,7 @@ def _outline(body: BodyMesh) -> _Outline | None:
         return None
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = exterior_facet_indices(mesh.topology)
-    nodes = entities_to_geometry(mesh, dim - 1, facets)[:, :2]  # corners come first
+    nodes = compat.facet_nodes(mesh, facets)[:, :2]  # corners come first
     touching = np.isin(facets, body.facet_tags.find(body.curves[f"{body.name}_contact"]))
     numbers = mesh.geometry.index_map().local_to_global(nodes.ravel().astype(np.int32)).reshape(-1, 2)
     own = (numbers, mesh.geometry.x[nodes][:, :, :2], touching)

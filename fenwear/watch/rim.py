@@ -18,10 +18,11 @@ from functools import lru_cache
 
 import basix
 import numpy as np
-from dolfinx.mesh import entities_to_geometry, exterior_facet_indices
+from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface, contact_tag
@@ -158,7 +159,7 @@ def _beyond(elastic: ElasticBody, edges: _Ints) -> tuple[Array, Mask]:
     mesh, dim = body.mesh, body.mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = np.setdiff1d(exterior_facet_indices(mesh.topology), body.facet_tags.find(contact_tag(body)))
-    corners = mesh.geometry.x[entities_to_geometry(mesh, dim - 1, facets.astype(np.int32))]
+    corners = mesh.geometry.x[compat.facet_nodes(mesh, facets.astype(np.int32))]
     rim = np.unique(edges[:, :2])
     tree = cKDTree(surface.trace[rim])
     far, found = tree.query(corners.reshape(-1, 3), distance_upper_bound=NEAR * surface.extent())

@@ -16,6 +16,7 @@ import xarray
 
 from fenwear import CaseError, load_case
 from fenwear.errors import InterruptedRunError
+from fenwear.report.compare import compare, comparison_figure
 from fenwear.report.page import write_report
 from fenwear.report.stick import key_numbers_text
 from fenwear.run import run_case
@@ -133,3 +134,15 @@ def test_a_kill_between_checkpoints_costs_what_came_after(tmp_path: Path) -> Non
         file.truncate(5000)
     with pytest.raises(CaseError, match=r"--resume: the checkpoint in .* is damaged"):
         run(tmp_path / "one", [*how, "run.half_cycles=20"], resume=True)
+
+
+def test_runs_are_compared(ran: tuple[dict, Path], tmp_path: Path) -> None:
+    """Loops, shapes and work of both in one figure, their numbers in one table; not with runs in gross sliding."""
+    _, folder = ran
+    run(tmp_path / "short", ["run.half_cycles=4"])
+    found = compare([folder, tmp_path / "short"])
+    assert found.cases["run.half_cycles"] == [4000, 4]
+    assert "energy ratio" in found.text()
+    titles = [ax.get_title(loc="left") for ax in comparison_figure(found).axes]
+    assert titles[0] == "Loop of the last cycle"
+    assert "Work of friction in a cycle" in titles

@@ -83,7 +83,7 @@ def test_long_strokes_are_as_warm_as_in_gross_sliding() -> None:
 @pytest.mark.slow
 def test_jumps_get_as_warm_as_the_march() -> None:
     """The error of the temperatures falls with the tolerance of the jumps."""
-    warm, cycles = rig(FAST), 30
+    warm, cycles = rig(FAST, "geometry.parameters.elements_along_contact=10", "stick.steps=4"), 30
     marched = list(march(warm, cycles + 1))[-1].records.temperature[-1, 0].max()
     errors = []
     for tolerance in (0.1, 5e-4):
@@ -112,10 +112,26 @@ def test_a_resumed_run_goes_on_as_warm(tmp_path: Path) -> None:
         assert float(difference.max()) < 1e-9 * float(expected.max())
 
 
+def test_the_end_is_without_heat_of_friction() -> None:
+    """As without the table heat where all is at the initial temperature; else as warm as held boundaries make it."""
+    cold = [setting for setting in SMALL if not setting.startswith(("heat", "strip.temperatures"))]
+    exact, _ = final_of(load_case("fretting-partial-slip", cold))
+    same, numbers = final_of(load_case("fretting-partial-slip", list(SMALL)))
+    assert same.depth == pytest.approx(exact.depth, abs=1e-12 * exact.depth.max())
+    assert max(numbers["temperature_punch_K"]) == pytest.approx(0.0, abs=1e-12)
+    held = "strip.temperatures=[{on='strip_bottom', temperature='50 K'}]"
+    end, _ = final_of(load_case("fretting-partial-slip", [*SMALL, held]))
+    assert end.temperature is not None
+    assert 40 < end.temperature.min() < end.temperature.max() < 50
+    zone = end.stick
+    assert end.temperature[0, zone] == pytest.approx(end.temperature[1, zone], abs=1e-9), "where it touches"
+    assert (end.temperature[0, ~zone] < end.temperature[1, ~zone]).all(), "beside it the colder punch stands apart"
+
+
 def test_what_does_not_go_with_heat_is_told() -> None:
-    """The end by wear, a full operator, the split."""
-    with pytest.raises(CaseError, match=r"heat: expected none for `steady`"):
-        final_of(load_case("fretting-partial-slip", list(SMALL)))
+    """The end of bodies that lose no heat, a full operator, the split."""
+    with pytest.raises(CaseError, match=r"heat: the bodies lose no heat"):
+        final_of(load_case("fretting-partial-slip", [*SMALL, "strip.temperatures=[]", "heat.convection=0"]))
     for setting, message in (("operator='full'", "heat.operator"), ("coupling='split'", "heat.coupling")):
         with pytest.raises(CaseError, match=f"{message}: expected"):
             load_case("fretting-partial-slip", [*SMALL, f"heat.{setting}"])

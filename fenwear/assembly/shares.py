@@ -1,0 +1,57 @@
+"""Which rank does what as bodies are condensed, and what it takes: told by `check` before it is spent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fenwear.assembly.needs import BodyNeeds, Needs, duration, memory_size
+from fenwear.assembly.placed import Placed
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.factor import SPREAD, entries
+from fenwear.bodies.response import Request
+
+DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular solutions of dense matrices
+
+
+def shares_text(placed: Placed, wanted: Needs) -> list[str]:
+    """Return a line for each body: how it is condensed, which ranks do it, and what each takes; collective.
+
+    Args:
+        placed: The bodies.
+        wanted: What they need in all.
+    """
+    bodies = (placed.bodies.punch, placed.bodies.strip)
+    own = (wanted.punch, wanted.strip)
+    return [_text(body, need, 1 - number, heat=placed.heat is not None) for number, (body, need) in
+            enumerate(zip(bodies, own, strict=True))]  # fmt: skip
+
+
+def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> str:
+    comm, name = elastic.body.mesh.comm, elastic.body.name
+    topology = elastic.body.mesh.topology
+    cells: Sequence[int] = comm.allgather(topology.index_map(topology.dim).size_local)
+    request, columns = Request(elastic, elastic.surface.spread), f"{need.columns:,.0f} columns"
+    if not heat and request.in_substructures:
+        boundary = comm.allgather(len(elastic.boundary.numbers))
+        shared = []
+        for rank, (n, edge) in enumerate(zip(cells, boundary, strict=True)):
+            share = n / sum(cells)
+            part = replace(need, unknowns=need.unknowns * share, matrix=need.matrix * share)
+            shared.append(f"rank {rank}: {n:,} cells, {edge:,} unknowns at their edge, {_taken(part, edge)}")
+        return f"{name}: every rank eliminates its own cells down to the surface ({columns}); {'; '.join(shared)}"
+    if elastic.setup.way == "multigrid":
+        return f"{name}: conjugate gradients on all ranks, {columns} in blocks; no factor"
+    whole = [rank for rank, n in enumerate(cells) if n] if elastic.setup.reproducible else [owner % comm.size]
+    taken = f"{duration(need.seconds)} and {memory_size(need.memory)}"
+    if not heat and request.by_surface:
+        return f"{name}: rank {whole[0]} eliminates all {sum(cells):,} cells down to the surface, {columns}: {taken}"
+    if comm.size > 1 and not elastic.setup.reproducible and 8 * entries(elastic.size, elastic.dim) > SPREAD:
+        return f"{name}: a factor over {comm.size} ranks, {columns} solved by all: {taken} in all"
+    return f"{name}: rank {whole[0]} factors it and solves {columns}: {taken}"
+
+
+def _taken(part: BodyNeeds, edge: int) -> str:
+    """Return what a rank's own cells take, with an edge that is joined."""
+    seconds, memory = part.alone
+    return f"{duration(seconds + edge**3 / DENSE)}, {memory_size(memory + 8.0 * edge**2)}"

@@ -35,7 +35,7 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 
 
 # %% [markdown]
-# `Tribosystem` makes the meshes and factors the two bodies. That is the costly part, done once by `prepare`.
+# `assemble` makes the meshes and factors the two bodies: that is the costly part, done once.
 
 # %%
 system = assemble(load_case("example1", settings))
@@ -231,5 +231,6 @@ except ImportError:
 # ## What stays open
 #
 # - The steady state is what wear tends to without heat. With heat it may be unstable (notebook 3).
-# - Only the punch wears. Where the strip wears too, its worn track moves with it; this is not modelled.
+# - Only the punch wears here. Where the strip wears too, its worn track moves with it: `run` follows that, and a steady
+#   state exists where the track keeps its shape (the page Two worn bodies).
 # - The heights of the hinges of Example 2 are not in the paper. They do not matter there: that punch cannot tilt.

@@ -42,7 +42,7 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 # %% [markdown]
 # The case is Example 1 of Páczelt and Mróz with heat, as `example1-heat-unstable` reads it: the two faces of the thin
 # punch lose heat to the air, and all friction heat goes into the bodies. (`example1-heat`, with insulated faces and half
-# of the heat in the debris, is the calm one; notebook 6 compares the readings.) `prepare` factors the bodies and prepares
+# of the heat in the debris, is the calm one; notebook 6 compares the readings.) `assemble` factors the bodies and prepares
 # the steps of heat conduction: some seconds. Everything after it shares that work, because $\kappa$ leaves it as it is.
 
 # %%
@@ -230,7 +230,8 @@ plt.show()
 # - What follows an instability depends on small things. On a mesh twice as fine the later peaks are within 3 %; at the
 #   end, where contact opens and closes, pressures at single points are less certain. Check the mesh before you rely on
 #   a number there.
-# - Material values do not depend on temperature, and only the punch wears.
+# - Material values are constants here, and only the punch wears. Both may be otherwise: properties that depend on the
+#   temperature, and wear of the strip, have their pages in the documentation.
 #
 # ## Your turn
 #

@@ -288,9 +288,9 @@ print(case.to_toml()[:600], "...")
 #
 # ## What to mind
 #
-# - The contact may be gently curved, but the gap at the start must stay below 1 % of the contact's length, and the
-#   punch's contact must lie within the strip's.
-# - Wear does not move the mesh: the worn depth must stay small against the elements at the contact.
+# - The contact may be curved, but its smallest gap at the start is at most 1 % of its length, and the punch's contact
+#   must lie within the strip's.
+# - Wear is an offset of the gap until it reaches `geometry.follow_wear` of the elements' height; then the meshes follow it.
 # - One region may have several surfaces, but all of one element type: triangles or quadrilaterals.
 # - A corner of the lining at the contact makes the first pressures depend on the mesh. They wear off.
 

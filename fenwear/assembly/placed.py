@@ -142,7 +142,7 @@ class Placed:
     @cached_property
     def slid(self) -> Array:
         """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
-        return np.array([self.sliding.field.rate(pair.punch.x, pair.normal) for pair in self.pairs])
+        return np.array([self.sliding.field.rate(pair.opposite, pair.normal) for pair in self.pairs])
 
     @cached_property
     def wear(self) -> Wear:
@@ -258,7 +258,7 @@ class Placed:
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
         if phase is None:
-            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
+            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.opposite, self.pair.normal)
         else:
             speed = self.motion.phases[phase].speed * self.slid[phase]
         pair, slid = (self.pair, self.slid[0]) if phase is None else (self.pairs[phase], self.slid[phase])
@@ -317,7 +317,7 @@ class Placed:
         Raises:
             CaseError: a node of the contact lies on the axis of rotation.
         """
-        slides = self.sliding.field.rate(self.pair.punch.x, self.pair.normal)
+        slides = self.sliding.field.rate(self.pair.opposite, self.pair.normal)
         if not (slides > ROUNDING * slides.max()).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))

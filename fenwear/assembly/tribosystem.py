@@ -282,4 +282,4 @@ def heating_friction(system: Placed, mu: Array | None = None) -> Array:
         mu: (n,); by default at the mean pressure and speed.
     """
     mu = system.friction.values(system.conditions(None)) if mu is None else mu
-    return mu * system.sliding.field.rate(system.pair.punch.x, system.pair.normal)
+    return mu * system.sliding.field.rate(system.pair.opposite, system.pair.normal)

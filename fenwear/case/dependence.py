@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
@@ -46,6 +47,8 @@ KNOWN = f"numbers, {', '.join(VARIABLES)}, + - * / **, {', '.join(FUNCTIONS)}"
 
 State = Mapping[str, Array]
 Function = Callable[[State], Any]
+FIRST, SLOW = 3, 0.02  # calls of a law that are timed, and seconds of each that are told
+_CALLS: dict[str, list[float]] = {}  # CPU seconds of the first ones, by the law's name
 _LAWS: dict[str, tuple[Function, frozenset[str]]] = {}  # by their names, with their variables: those of this process
 
 
@@ -72,6 +75,7 @@ def register_law(name: str, function: Function, of: Sequence[str] = ("T", "p", "
         message = f"expected a list of some of {', '.join(VARIABLES)}, got {unknown[0] if unknown else of!r}"
         raise CaseError(InputError(f"law {name!r}", message))
     _LAWS[name] = function, frozenset(of)
+    _CALLS.pop(name, None)
 
 
 def variables_of_law(name: str) -> frozenset[str]:
@@ -93,6 +97,20 @@ def check_law(name: str) -> None:
         )
 
 
+def _tell_slow(name: str, seconds: float, nodes: int) -> None:
+    """Warn once of a law whose fastest of its first calls takes long: it is called some ten times in a half-cycle."""
+    calls = _CALLS.setdefault(name, [])
+    if len(calls) >= FIRST:
+        return
+    calls.append(seconds)
+    if len(calls) == FIRST and min(calls) > SLOW:
+        warnings.warn(
+            f"the law {name!r} takes {min(calls):.2g} s for {nodes} nodes, and a half-cycle calls it some ten times: "
+            "make it faster, with arrays of numpy in place of loops",
+            stacklevel=2,
+        )
+
+
 def evaluate_law(name: str, state: State, shape: tuple[int, ...]) -> Array:
     """Return the values (shape) of a registered law.
 
@@ -102,10 +120,18 @@ def evaluate_law(name: str, state: State, shape: tuple[int, ...]) -> Array:
     check_law(name)
     function, variables = _LAWS[name]
     given = {key: np.array(np.broadcast_to(state[key], shape)) for key in variables}
+    begin = time.thread_time()
     try:
-        values = np.asarray(function(given), dtype=float)
+        found = np.asarray(function(given))
+        if np.iscomplexobj(found):
+            raise ValueError("it gives complex numbers")
+        values = found.astype(float)
+    except KeyError as error:
+        asked = f"asks for {error}, but is of {', '.join(sorted(variables))}"
+        raise ValueError(f"the law {name!r} {asked}: expected it among what `of` names") from error
     except Exception as error:  # a user's own code may raise anything
         raise ValueError(f"the law {name!r} fails: {error}") from error
+    _tell_slow(name, time.thread_time() - begin, shape[0] if shape else 1)
     if values.shape not in ((), shape):
         raise ValueError(f"the law {name!r} gives {values.shape} values; expected one for each of {shape[0]} nodes")
     return np.broadcast_to(values, shape).copy()

@@ -3,7 +3,7 @@
 In a phase in which the strip moves by ds, mm or rad, its material moves by v_i ds at node i, and along the contact
 by r_i ds: v_i = 1 in a translation, and r_i = v_i where the surface is not inclined to the motion.
 
-    sliding distance    s = integral of <v> ds,         <v> the mean over the nominal contact;
+    sliding distance    s = integral of <v> ds,         <v> = sum w_i p_i v_i / sum w_i p_i, the mean over the load;
     load path           integral of sum w_i p_i r_i ds, N mm: load times s in a translation, along scars too;
     work of friction    integral of sum w_i mu p_i r_i ds, N mm = mJ;
     energy per area     integral of mu p_i r_i ds, mJ/mm²;
@@ -75,8 +75,8 @@ class PhaseMeter:
         areas = system.bodies.punch.thickness * pair.weights
         path = system.motion.phases[phase].distance * slid
         self._energy = mu * path
-        speed = np.linalg.norm(system.sliding.field.velocity(pair.punch.x), axis=1)
-        self._distance = system.motion.phases[phase].distance * float(speed @ pair.weights / pair.weights.sum())
+        speed = np.linalg.norm(system.sliding.field.velocity(pair.opposite), axis=1)
+        self._weights, self._speed = pair.weights, system.motion.phases[phase].distance * speed
         self._rows = np.zeros((len(SUMS), len(areas)))
         self._rows[SUMS.index("load_path")] = areas * path
         self._rows[SUMS.index("work")] = areas * self._energy
@@ -96,7 +96,8 @@ class PhaseMeter:
     def __call__(self, pressure: Array) -> Totals:
         """Return what the phase adds at a pressure (n,)."""
         sums = self._rows @ pressure
-        sums[0] = self._distance
+        carried = self._weights * pressure if pressure.any() else self._weights
+        sums[0] = float(self._speed @ carried) / float(carried.sum())
         for rows, weigh, body in self._curved:
             sums[rows] = weigh @ body.depth(pressure[None])[0]
         return Totals(sums, self._energy * pressure)

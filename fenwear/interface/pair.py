@@ -58,6 +58,15 @@ class ContactPair:
         return self.punch.x[:, 0]
 
     @cached_property
+    def opposite(self) -> Array:
+        """Where the strip's surface is opposite each node, before any deformation and wear (n, d), mm.
+
+        What the strip's material slides there is what slides: a flat block's ends are farther from a ring's axis
+        than the ring is.
+        """
+        return self.punch.x - self.initial_gap[:, None] * self.normal
+
+    @cached_property
     def normal_on_strip(self) -> Array:
         """e_n in the strip's own, unmoved frame (n, d)."""
         return self.placement.back(self.normal)

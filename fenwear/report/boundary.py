@@ -9,7 +9,7 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.report.course import shown_unit
-from fenwear.report.style import BLUE, GREY, RED, panels
+from fenwear.report.style import BLUE, GREY, RED, STANDARD, Look, panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,9 +37,9 @@ def outline(cells: NDArray[np.int64]) -> NDArray[np.int64]:
         path.append(following)
 
 
-def boundary_figure(fields: xarray.Dataset) -> Figure:
+def boundary_figure(fields: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the temperature round the punch from the middle of its contact on, and along the strip's upper surface."""
-    figure, (around, along) = panels(2, 3.2, share_x=False)
+    figure, (around, along) = panels(2, 3.2, share_x=False, look=look)
     points = outline(fields.punch_cells.values)
     x, z = fields.punch_x.values[points], fields.punch_z.values[points]
     middle = int(np.argmin(np.abs(x - (x.max() + x.min()) / 2) + 1e3 * (z - z.min())))
@@ -55,9 +55,9 @@ def boundary_figure(fields: xarray.Dataset) -> Figure:
     for corner in corners:
         around.axvline(distance[corner], color="0.5", linewidth=0.8, linestyle=":")
         name = f"({closed[0][corner]:g}, {closed[1][corner]:g})"
-        around.annotate(name, (distance[corner], 1), xycoords=("data", "axes fraction"), xytext=(2, -10),
-                        textcoords="offset points", color=GREY, fontsize="small")  # fmt: skip
-    around.set_xlabel("distance along the boundary from the middle of the contact, to the right and round (mm)")
+        around.annotate(name, (distance[corner], 1), xycoords=("data", "axes fraction"), xytext=(2, -2), va="top",
+                        textcoords="offset points", color=GREY, fontsize="small", rotation=90)  # fmt: skip
+    around.set_xlabel("distance along the boundary from the middle\nof the contact, to the right and round (mm)")
     x, z = fields.strip_x.values, fields.strip_z.values
     top = np.flatnonzero(z > z.max() - 1e-6 * np.ptp(z))
     top = top[np.argsort(x[top])]

@@ -39,9 +39,10 @@ OF_SURFACES = {  # of solids and rings
     "shape": "Worn depth of the punch, and of the strip where it wears, in micrometres along the "
     "contact, a line for each chosen half-cycle.",
     "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, a "
-    "line for each chosen half-cycle.",
+    "line for each chosen half-cycle. First states far beyond all later ones have the last panel.",
     "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
-    "peaks": "Largest pressure, width in contact and, with heat, largest temperature over the half-cycles.",
+    "peaks": "Largest pressure, area in contact, largest worn depth, size of the scar along and across the sliding "
+    "and, with heat, largest temperature of the contact surfaces at the end of a half-cycle, over the run.",
     "program": "Load, sliding speed and ambient temperature over the run, where they change.",
     "convergence": "Change of pressure against one cycle ago, and distance to the optimal pressure, over the "
     "half-cycles.",
@@ -49,14 +50,17 @@ OF_SURFACES = {  # of solids and rings
     "chosen half-cycle.",
     "boundary_temperature": "Temperature round the punch from the middle of its contact on, and along the strip's "
     "upper surface, at the last half-cycle with fields.",
-    "pressure_map": "Maps of the contact pressure in megapascals, one for each chosen half-cycle.",
+    "pressure_map": "Maps of the contact pressure in megapascals, one for each chosen half-cycle, with the way of the "
+    "strip, the border of contact and the largest value. Colours end where late states do.",
     "wear_map": "Maps of the worn depth of the punch over its largest, one for each chosen half-cycle.",
     "wear_strip_map": "Maps of the worn depth of the strip over its largest, one for each chosen half-cycle.",
     "temperature_map": "Maps of the temperature of the punch's contact surface, one for each chosen half-cycle.",
     "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch, one for each chosen "
     "half-cycle.",
-    "cuts_along": "Pressure, worn depths and temperatures along the sliding, a line for each chosen half-cycle.",
-    "cuts_across": "Pressure, worn depths and temperatures across the sliding, a line for each chosen half-cycle.",
+    "cuts_along": "Pressure, worn depths and temperatures along the sliding, a line for each chosen half-cycle. "
+    "First pressures far beyond all later ones have the last panel.",
+    "cuts_across": "Pressure, worn depths and temperatures across the sliding, a line for each chosen half-cycle. "
+    "First pressures far beyond all later ones have the last panel.",
     "heat_balance": "Heat of each half-cycle: made by friction, lost, and gained by the bodies, over the half-cycles.",
 }
 

@@ -35,7 +35,7 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDAR
         if "punch_stress_xx" in fields:
             drawn["surface_stress"] = stress_figure(fields, look)
         if "punch_temperature" in fields:
-            drawn["boundary_temperature"] = boundary_figure(fields)
+            drawn["boundary_temperature"] = boundary_figure(fields, look)
     return drawn
 
 

@@ -10,8 +10,8 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.report.course import temperature_unit
-from fenwear.report.figures import pressure_top
-from fenwear.report.style import GREY, WIDTH, legend_beside, panels, shades
+from fenwear.report.figures import early_half_cycles, pressure_top
+from fenwear.report.style import GREY, NARROW, STANDARD, Look, legend_beside, name_panel, panels, shades
 from fenwear.report.surface import Surface, centre_of_wear, surface_of
 
 if TYPE_CHECKING:
@@ -31,26 +31,43 @@ class Quantity(NamedTuple):
     unit: str
     factor: float
     colours: str
+    short: str
 
 
 def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
     """Return what there are maps of, by the figure's name."""
     warm = temperature_unit(history)
     found = {
-        "pressure_map": Quantity("pressure", "punch", "Contact pressure", "MPa", 1.0, "YlGnBu"),
-        "wear_map": Quantity("wear", "punch", "Worn depth of the punch", "µm", 1e3, "YlOrBr"),
-        "wear_strip_map": Quantity("wear_strip", "strip", "Worn depth of the strip", "µm", 1e3, "YlOrBr"),
+        "pressure_map": Quantity("pressure", "punch", "Contact pressure", "MPa", 1.0, "YlGnBu", "pressure"),
+        "wear_map": Quantity("wear", "punch", "Worn depth of the punch", "µm", 1e3, "YlOrBr", "punch:\nworn depth"),
+        "wear_strip_map": Quantity(
+            "wear_strip", "strip", "Worn depth of the strip", "µm", 1e3, "YlOrBr", "strip:\nworn depth"
+        ),
         "temperature_map": Quantity(
-            "temperature_punch", "punch", "Temperature of the punch's contact surface", warm, 1.0, "YlOrRd"
+            "temperature_punch",
+            "punch",
+            "Temperature of the punch's contact surface",
+            warm,
+            1.0,
+            "YlOrRd",
+            "punch:\ntemperature",
         ),
         "temperature_strip_map": Quantity(
-            "temperature_strip", "punch", "Temperature of the strip's surface below the punch", warm, 1.0, "YlOrRd"
+            "temperature_strip",
+            "punch",
+            "Temperature of the strip's surface below the punch",
+            warm,
+            1.0,
+            "YlOrRd",
+            "strip:\ntemperature",
         ),
     }
     return {name: q for name, q in found.items() if q.variable in history}
 
 
-def map_figure(history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int]) -> Figure:
+def map_figure(
+    history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int], look: Look = STANDARD
+) -> Figure:
     """Draw a quantity on its surface at each chosen half-cycle.
 
     All have the same colours, but worn depths, which are shown over the largest one of each half-cycle.
@@ -66,28 +83,26 @@ def map_figure(history: xarray.Dataset, quantity: Quantity, half_cycles: Sequenc
         levels, extend = np.linspace(0, 1, 11), "neither"
     else:
         levels, extend = _levels(history, quantity, values, half_cycles)
-    figure, axes = _map_panels(surface, len(half_cycles))
+    figure, axes = _map_panels(surface, len(half_cycles), look)
     drawn: Any = None
     for number, (n, ax) in enumerate(zip(half_cycles, axes, strict=True)):
         found, most = values[number], float(largest[number])
         triangles, shown = surface.drawn(np.clip(found, levels[0], None))
         drawn = ax.tricontourf(triangles, shown, levels=levels, cmap=colormaps[quantity.colours], extend=extend)
-        title = f"n = {n:,}"
+        title = f"{look.of_one if look.axis == 'cycles' else ''} {look.name(history, n)} {look.of_unit}".strip()
         if quantity.variable == "pressure":
             _contact_edge(ax, surface, found)
             title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
         size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
-        ax.set_title(f"{title}\n≤ {size} {quantity.unit}", loc="left")
+        name_panel(ax, f"{title}\n≤ {size} {quantity.unit}")
     every: Any = axes
     bar = figure.colorbar(drawn, ax=every, shrink=min(1.0, 3.5 / figure.get_figheight()), aspect=25)
     name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
-    bar.set_label("depth over the largest of its half-cycle" if relative else f"{name} ({quantity.unit})")
-    arrow = ", with the strip's way" if quantity.variable == "pressure" else ""
-    figure.suptitle(f"{quantity.title} in half-cycle n{arrow}", x=0.01, ha="left", fontsize="medium")
+    bar.set_label(f"{name}\nover the largest one" if relative else f"{name} ({quantity.unit})")
     return figure
 
 
-def _map_panels(surface: Surface, count: int) -> tuple[Figure, list[Any]]:
+def _map_panels(surface: Surface, count: int, look: Look) -> tuple[Figure, list[Any]]:
     """Return a figure of equal maps with the surface's border on each."""
     from matplotlib import rc_context
     from matplotlib.collections import LineCollection
@@ -96,10 +111,12 @@ def _map_panels(surface: Surface, count: int) -> tuple[Figure, list[Any]]:
 
     size = np.ptp(surface.map, axis=0)
     columns = min(count, 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3)
+    narrow = look.width < NARROW
+    columns = min(columns, 2) if narrow else columns
     rows = -(-count // columns)
-    height = rows * (min(max((WIDTH - 1.6) / columns * size[1] / size[0], 0.9), 4.5) + 0.55) + 0.8
-    with rc_context({"axes.titlesize": "small"}):
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    height = rows * (min(max((look.width - 1.6) / columns * size[1] / size[0], 0.9), 4.5) + 0.55) + 0.8
+    with rc_context({"axes.titlesize": "small", "font.size": 8.0 if narrow else 10.0}):
+        figure = Figure(figsize=(look.width, height), layout="constrained")
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for ax in axes.ravel()[count:]:
         ax.set_visible(False)
@@ -140,27 +157,29 @@ def _contact_edge(ax: Any, surface: Surface, pressure: Array) -> None:
         ax.tricontour(*surface.drawn(pressure), levels=[level], colors="black", linewidths=1.0)
 
 
-def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], *, along: bool) -> Figure:
+def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD, *, along: bool) -> Figure:
     """Draw pressure, worn depths and temperatures along or across the sliding through the middle of the wear."""
     drawn = list(quantities(history).values())
-    figure, axes = panels(len(drawn), 2.3, share_x=False)
+    early = early_half_cycles(history, half_cycles)
+    # What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
+    late = [n for n in half_cycles if n not in early]
+    rows = [(q, late if q.variable == "pressure" else half_cycles) for q in drawn]
+    rows += [(q, early) for q in drawn if early and q.variable == "pressure"]
+    figure, axes = panels(len(rows), 2.3, share_x=False, look=look)
     at = centre_of_wear(history)
-    for ax, quantity in zip(axes, drawn, strict=True):
+    for ax, (quantity, shown) in zip(axes, rows, strict=True):
         surface = surface_of(history, quantity.body)
         for colour, n in shades(half_cycles):
-            values = quantity.factor * history[quantity.variable].sel(half_cycle=n).values
-            ax.plot(*surface.cut(values, at, along=along), color=colour, label=f"{n:,}")
-        ax.set_title(quantity.title, loc="left")
-        ax.set_ylabel(f"{'p' if quantity.variable == 'pressure' else 'w' if 'wear' in quantity.variable else 'T'} "
-                      f"({quantity.unit})")  # fmt: skip
-        if quantity.variable == "pressure":
-            ax.set_ylim(0, pressure_top(history, half_cycles))
-        elif "wear" in quantity.variable:
+            if n in shown:
+                values = quantity.factor * history[quantity.variable].sel(half_cycle=n).values
+                ax.plot(*surface.cut(values, at, along=along), color=colour, label=look.name(history, n))
+        ax.set_ylabel(f"{quantity.short} ({quantity.unit})")
+        if not quantity.variable.startswith("temperature"):
             ax.set_ylim(bottom=0)
         ax.margins(x=0.01)
-        legend_beside(ax, "half-cycle")
+        legend_beside(ax, look.of_one)
     place, other = (float(at[1]), "across") if along else (float(at[0]), "along")
     grain = 1e-4 * float(np.ptp(surface_of(history).sliding, axis=0).max())
     place = round(place / grain) * grain
-    axes[-1].set_xlabel(f"place {'along' if along else 'across'} the sliding (mm), at {place:.4g} mm {other} it")
+    axes[-1].set_xlabel(f"place {'along' if along else 'across'} the sliding (mm),\nat {place:.4g} mm {other} it")
     return figure

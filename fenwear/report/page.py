@@ -63,7 +63,7 @@ def _write_report(
 ) -> list[Path]:
     case = read_case(directory)
     if case.get("contact", {}).get("law") == "coulomb":
-        return write_stick_report(directory, formats)
+        return write_stick_report(directory, formats, look)
     paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()), look, formats)
     if complete:
         from fenwear.report.animation import draw_animation

@@ -15,6 +15,7 @@ from fenwear.report.style import (
     BLUE,
     GREEN,
     GREY,
+    NARROW,
     RED,
     STANDARD,
     Look,
@@ -106,6 +107,8 @@ def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
     middle, half = (punch.max() + punch.min()) / 2, max(SHOWN_WIDE * high / 2, 0.75 * np.ptp(punch))
     supports = case.get("strip", {}).get("supports", ())
     bottom = float(fields.strip_z.values.min())
+    figure: Any = ax.figure
+    narrow = figure.get_size_inches()[0] < NARROW
     for sign, end in ((-1, float(strip.min())), (1, float(strip.max()))):
         edge = middle + sign * half
         if sign * (end - edge) <= 0.1 * half:
@@ -113,13 +116,15 @@ def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
         ax.set_xlim(**{"left" if sign < 0 else "right": edge})
         groups = [(support["fix"], _group(fields, "strip", support)) for support in supports]
         held = [", ".join(f"u{a}" for a in fix) for fix, lines in groups if _all_beyond(lines, middle, half, sign)]
-        text = f"to x = {end:.4g} mm" + (f"\nheld there: {'; '.join(held)}" if held else "")
+        held_there = "\nheld there:\n" if narrow else "\nheld there: "
+        text = f"to x =\n{end:.4g} mm" if narrow else f"to x = {end:.4g} mm"
+        text += held_there + "; ".join(held) if held else ""
         ax.annotate(text, (edge, bottom), (0, -6), textcoords="offset points", ha="left" if sign < 0 else "right",
                     va="top", color=GREY, fontsize="small", zorder=6, bbox=PLATE)  # fmt: skip
         ax.annotate("", (edge, (bottom + float(fields.strip_z.values.max())) / 2), (-18 * sign, 0),
                     textcoords="offset points", arrowprops={"arrowstyle": "-|>", "color": GREY}, zorder=6)  # fmt: skip
     if ax.get_xlim()[1] - ax.get_xlim()[0] <= 2.2 * half:
-        ax.set_ylim(bottom - 0.2 * high)
+        ax.set_ylim(bottom - (0.4 if narrow else 0.2) * high)
 
 
 def _all_beyond(lines: list[Array], middle: float, half: float, sign: int) -> bool:

@@ -14,7 +14,19 @@ from fenwear.report import stick_heat, stick_maps
 from fenwear.report.figures import FOLDER
 from fenwear.report.html_page import picture, render
 from fenwear.report.key_numbers import read_summary
-from fenwear.report.style import BLUE, GREY, RED, contact_axis, further, legend_beside, panels, reference_line, shades
+from fenwear.report.stick_course import course_axis, cycle_name, first_and_last, title, traction_panels
+from fenwear.report.style import (
+    BLUE,
+    RED,
+    STANDARD,
+    Look,
+    contact_axis,
+    further,
+    legend_beside,
+    level_line,
+    panels,
+    shades,
+)
 from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
@@ -24,6 +36,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REPORT = "report.html"
+CAPTIONS = "captions.txt"
+Drawing = Callable[[xarray.Dataset, Look], "Figure"]
 GROSS = 0.2  # energy ratio above which sliding is called gross (Fouvry)
 LABELS = {
     "cycles": ("cycles done", ""),
@@ -69,9 +83,9 @@ def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
     return sorted({int(np.abs(course - target).argmin()) for target in np.linspace(course[0], course[-1], count)})
 
 
-def loops(history: xarray.Dataset) -> Figure:
+def loops(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the fretting loops: tangential force over displacement, and over what is more than full stick's."""
-    figure, (whole, beyond) = panels(2, 3.0, share_x=False)
+    figure, (whole, beyond) = panels(2, 3.0, share_x=False, look=look)
     first = history.isel(cycle=0)
     slopes = np.diff(first.tangential_force) / np.where(
         np.diff(first.displacement) == 0, np.inf, np.diff(first.displacement)
@@ -81,39 +95,37 @@ def loops(history: xarray.Dataset) -> Figure:
         cycle = history.isel(cycle=place)
         closed = np.arange(cycle.sizes["step"] + 1) % cycle.sizes["step"]
         x, y = 1e3 * cycle.displacement.values[closed], cycle.tangential_force.values[closed]
-        whole.plot(x, y, color=colour, label=f"{int(cycle.cycle):,}")
+        whole.plot(x, y, color=colour, label=cycle_name(history, place, look))
         beyond.plot(x - 1e3 * y / stiffness, y, color=colour)
     whole.set_xlabel("displacement of the strip (µm)")
-    beyond.set_xlabel("displacement less that of full stick at the same force (µm)")
+    beyond.set_xlabel("displacement less that of full stick\nat the same force (µm)")
     for ax in (whole, beyond):
         ax.set_ylabel(f"tangential force ({history.tangential_force.units.replace(' ', ' ')})")
-    legend_beside(whole, "cycle")
+    legend_beside(whole, look.of_one)
     return figure
 
 
-def energy(history: xarray.Dataset) -> Figure:
+def energy(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw friction's work and the energy ratio over the cycles."""
-    figure, (upper, lower) = panels(2, 2.2)
-    cycles = np.maximum(history.cycle.values, 1)
-    upper.plot(cycles, 1e3 * history.dissipated_energy, color=BLUE, marker=".", markersize=3)
+    figure, (upper, lower) = panels(2, 2.2, look=look)
+    x = course_axis(lower, history, look)
+    upper.plot(x, 1e3 * history.dissipated_energy, color=BLUE, marker=".", markersize=3)
     upper.set_ylabel("work of friction\nin a cycle (µJ)")
-    lower.plot(cycles, history.energy_ratio, color=RED, marker=".", markersize=3)
-    reference_line(lower, GROSS, "gross sliding above, partial slip below")
+    upper.set_ylim(bottom=0)
+    lower.plot(x, history.energy_ratio, color=RED, marker=".", markersize=3, label="energy ratio")
+    level_line(lower, GROSS, "gross sliding above,\npartial slip below")
     lower.set_ylabel("energy ratio")
     lower.set_ylim(0, max(0.3, 1.1 * float(history.energy_ratio.max())))
-    lower.set_xlabel("cycle")
-    if cycles[-1] > 20:
-        lower.set_xscale("log")
+    legend_beside(lower, "")
     return figure
 
 
-def zones(history: xarray.Dataset) -> Figure:
+def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw where the surfaces stick, slip and are open over the first and the last cycle."""
     from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
 
-    places = sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = panels(len(places), 2.4)
+    places = first_and_last(history)
+    figure, axes = panels(len(places), 2.4, look=look)
     colours = ("white", RED, BLUE)
     x = history.x.values
     for ax, place in zip(axes, places, strict=True):
@@ -121,14 +133,10 @@ def zones(history: xarray.Dataset) -> Figure:
         state = np.where(cycle.stick.values == 1, 2, np.where(cycle.pressure.values > 0, 1, 0))
         steps = np.arange(1, cycle.sizes["step"] + 1)
         ax.pcolormesh(x, steps, state, cmap=ListedColormap(colours), vmin=0, vmax=2, shading="nearest", rasterized=True)
-        ax.set_ylabel("time step")
-        ax.set_title(f"cycle {int(cycle.cycle):,}")
-        ax.legend(
-            handles=[Patch(color=BLUE, label="stick"), Patch(color=RED, label="slip")],
-            loc="center left",
-            bbox_to_anchor=(1.0, 0.5),
-            frameon=False,
-        )
+        ax.set_ylabel(f"{title(history, place, look)}:\ntime step")
+        for colour, name in ((BLUE, "stick"), (RED, "slip")):
+            ax.plot([], [], marker="s", linestyle="", color=colour, label=name)
+        legend_beside(ax, "")
     touched = x[(history.pressure.values > 0).any(axis=(0, 1))]
     if len(touched):
         margin = 0.15 * float(np.ptp(touched)) + 1e-9
@@ -137,81 +145,79 @@ def zones(history: xarray.Dataset) -> Figure:
     return figure
 
 
-def tractions(history: xarray.Dataset) -> Figure:
+def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the tangential traction between its bounds in the first and the last cycle."""
-    places = sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = panels(len(places), 2.8)
-    mu = float(history.attrs["friction"])
-    for ax, place in zip(axes, places, strict=True):
-        cycle = history.isel(cycle=place)
-        steps = cycle.sizes["step"]
-        half = int((history.half_cycle_of_step == 1).sum())
-        for colour, step in shades([half // 4 - 1, half // 2 - 1, 3 * half // 4 - 1, half - 1, steps - 1]):
-            now = cycle.isel(step=max(step, 0))
-            ax.plot(history.x, now.traction, color=colour, label=f"{float(now.fraction):.3g}")
-        bound = mu * cycle.pressure.max("step")
-        ax.fill_between(history.x, -bound, bound, color=GREY, alpha=0.15, linewidth=0, label="µ p")
-        ax.set_ylabel("traction (MPa)")
-        ax.set_title(f"cycle {int(cycle.cycle):,}")
-        legend_beside(ax, "part of the cycle")
-    _to_contact(axes[-1], history)
-    return figure
+    half = int((history.half_cycle_of_step == 1).sum())
+    steps = [half // 4 - 1, half // 2 - 1, 3 * half // 4 - 1, half - 1, history.sizes["step"] - 1]
+    x = history.x.values
+    return traction_panels(
+        history,
+        [max(step, 0) for step in steps],
+        lambda values: (x, values),
+        lambda ax: _to_contact(ax, history),
+        look,
+    )
 
 
-def stresses(history: xarray.Dataset) -> Figure:
+def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the stress along x in the strip's surface, its range over the cycle."""
-    figure, (ax,) = panels(1, 3.0)
+    figure, (ax,) = panels(1, 3.0, look=look)
     for colour, place in shades(chosen(history, 3)):
         cycle = history.isel(cycle=place)
         low, high = cycle.surface_stress.min("step"), cycle.surface_stress.max("step")
-        ax.plot(history.x, high, color=colour, label=f"{int(cycle.cycle):,}")
+        ax.plot(history.x, high, color=colour, label=cycle_name(history, place, look))
         ax.plot(history.x, low, color=colour, linestyle=":")
-    ax.set_ylabel("stress along x in the strip's surface:\nlargest, and dotted smallest (MPa)")
-    legend_beside(ax, "cycle")
+    ax.set_ylabel("stress σ xx in the\nstrip's surface (MPa):\nlargest, dotted smallest")
+    legend_beside(ax, look.of_one)
     _to_contact(ax, history)
     return figure
 
 
-def shapes(history: xarray.Dataset) -> Figure:
+def shapes(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the worn depths and the pressure of chosen cycles."""
-    figure, (depth, pressure) = panels(2, 2.4)
+    figure, (depth, pressure) = panels(2, 2.4, look=look)
     for colour, place in shades(chosen(history)):
         cycle = history.isel(cycle=place)
-        depth.plot(history.x, -1e3 * cycle.wear, color=colour, label=f"{int(cycle.cycle):,}")
+        depth.plot(history.x, -1e3 * cycle.wear, color=colour, label=cycle_name(history, place, look))
         depth.plot(history.x_strip, -1e3 * cycle.wear_strip, color=colour, linestyle=":")
-        pressure.plot(history.x, cycle.pressure.isel(step=-1), color=colour, label=f"{int(cycle.cycle):,}")
+        pressure.plot(history.x, cycle.pressure.isel(step=-1), color=colour, label=cycle_name(history, place, look))
     depth.set_ylabel("worn depth (µm):\npunch, dotted strip")
     pressure.set_ylabel("pressure at the end\nof the cycle (MPa)")
-    legend_beside(depth, "cycle")
+    legend_beside(depth, look.of_one)
     _to_contact(pressure, history)
     return figure
 
 
-def sliding_map(history: xarray.Dataset) -> Figure:
+def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw where each node slips: its slip in a cycle and its share of friction's work."""
-    figure, (slip, work) = panels(2, 2.2)
+    figure, (slip, work) = panels(2, 2.2, look=look)
     for colour, place in shades(chosen(history, 3)):
         cycle = history.isel(cycle=place)
-        slid, label = np.abs(cycle.slip), f"{int(cycle.cycle):,}"
+        slid, label = np.abs(cycle.slip), cycle_name(history, place, look)
         slip.plot(history.x, 1e3 * slid.where(cycle.pressure > 0, 0).sum("step"), color=colour, label=label)
         work.plot(history.x, 1e3 * (np.abs(cycle.traction) * slid).sum("step"), color=colour, label=label)
     slip.set_ylabel("slip in a cycle (µm)")
     work.set_ylabel("work of friction\nin a cycle (µJ/mm²)")
-    legend_beside(slip, "cycle")
+    legend_beside(slip, look.of_one)
     _to_contact(work, history)
     return figure
 
 
-def figures_of(history: xarray.Dataset) -> dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]]:
+def _temperatures(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    return stick_heat.temperatures(history, chosen(history), look)
+
+
+def figures_of(history: xarray.Dataset) -> dict[str, tuple[Drawing, str, str]]:
     """Return the drawings of a run, with captions and what they show."""
     solid = model_of(history) == "solid"
     found = IN_SOLIDS if solid else FIGURES
     if "temperature_punch" not in history:
         return found
-    drawing: Callable[[xarray.Dataset], Any] = stick_heat.temperature_maps
+    drawing: Drawing = stick_heat.temperature_maps
     alt = "Of both surfaces at the end of the first and the last cycle."
     if not solid:
-        drawing, alt = (lambda h: stick_heat.temperatures(h, chosen(h))), "Of both surfaces along x, a line a cycle."
+        drawing = _temperatures
+        alt = "Of both surfaces along x, a line a cycle."
     course = "Largest temperature of the contact, and where the heat of a cycle goes, over the cycles."
     return {
         **found,
@@ -230,7 +236,7 @@ def _to_contact(ax: Any, history: xarray.Dataset) -> None:
 
 
 # name: (drawing, caption, what it shows)
-FIGURES: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
+FIGURES: dict[str, tuple[Drawing, str, str]] = {
     "loops": (loops, "Fretting loops", "Tangential force over the displacement of the strip, a loop for each cycle."),
     "zones": (zones, "Stick and slip over the cycle", "Where nodes stick and slip, along x and over the time steps."),
     "tractions": (tractions, "Tangential traction", "Traction along x at five times, between plus and minus mu p."),
@@ -240,7 +246,7 @@ FIGURES: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
     "shape": (shapes, "Worn depth and pressure", "Worn depths of both bodies and pressure along x, a line a cycle."),
 }
 
-IN_SOLIDS: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
+IN_SOLIDS: dict[str, tuple[Drawing, str, str]] = {
     "loops": FIGURES["loops"],
     "zones": (stick_maps.zones, "Stick and slip over the cycle", "Where nodes stick and slip at four times."),
     "tractions": (stick_maps.tractions, "Tangential traction", "Its size and direction at four times."),
@@ -254,34 +260,41 @@ IN_SOLIDS: dict[str, tuple[Callable[[xarray.Dataset], Any], str, str]] = {
     "surface_stress": (stick_maps.stresses, "Stress in the strip's surface", "Its largest value in a cycle."),
     "scar": (stick_maps.scar, "Worn depth", "Worn depth of both bodies at the end."),
     "shape": (
-        lambda history: stick_maps.shapes(history, chosen(history)),
+        lambda history, look: stick_maps.shapes(history, chosen(history), look),
         "Worn depth and pressure along the sliding",
         "Worn depths of both bodies and pressure on a cut through the middle, a line a cycle.",
     ),
 }
 
 
-def write_stick_report(directory: Path, formats: Sequence[str] = ("png",)) -> list[Path]:
-    """Draw the figures of a run with stick and write its report.html; return the files.
+def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look: Look = STANDARD) -> list[Path]:
+    """Draw the figures of a run with stick, with captions, and write its report.html; return the files.
+
+    Args:
+        directory: The folder of the run.
+        formats: Of the figures.
+        look: Their width and axis.
 
     Raises:
-        CaseError: the folder holds no run.
+        CaseError: the folder holds no run, or the run has no such axis.
         OutputError: a figure or the page cannot be written.
     """
     history = load_history(directory)
     folder = directory / FOLDER
-    paths, pictures = [], []
+    paths, pictures, captions = [], [], []
     with writing(directory):
         folder.mkdir(exist_ok=True)
         for name, (draw, caption, alt) in figures_of(history).items():
             path = folder / f"{name}.png"
-            figure = draw(history)
+            figure = draw(history, look)
             figure.savefig(path, dpi=150)
             paths += [path, *further(figure, path, formats)]
             pictures.append(picture(path.read_bytes(), "png", caption, alt))
+            captions.append(f"{name}: {caption}. {alt}\n\n")
+    write_text(folder / CAPTIONS, "".join(captions))
     report = directory / REPORT
     write_text(report, _page(directory, history, pictures))
-    return [*paths, report]
+    return [*paths, folder / CAPTIONS, report]
 
 
 def _page(directory: Path, history: xarray.Dataset, pictures: list[Any]) -> str:

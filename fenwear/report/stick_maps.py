@@ -10,7 +10,8 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.report.style import BLUE, GREY, RED, WIDTH, legend_beside, panels, shades
+from fenwear.report.stick_course import cycle_name, first_and_last, title, traction_panels
+from fenwear.report.style import BLUE, NARROW, RED, STANDARD, Look, legend_beside, name_panel, panels, shades
 from fenwear.report.surface import Surface, surface_of
 
 if TYPE_CHECKING:
@@ -37,14 +38,14 @@ def node_cells(surface: Surface) -> tuple[Array, NDArray[np.int64]]:
     return parts.reshape(-1, 4, 2), surface.cells.ravel()
 
 
-def zones(history: xarray.Dataset) -> Figure:
+def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw where the surfaces stick and slip at four times of a half-cycle, in the first and the last cycle."""
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Patch
 
     surface, steps = surface_of(history), _steps(history)
-    places = sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = _maps(history, surface, places, steps)
+    places = first_and_last(history)
+    figure, axes = _maps(history, surface, places, steps, look)
     polygons, owner = node_cells(surface)
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
@@ -61,11 +62,11 @@ def zones(history: xarray.Dataset) -> Figure:
     return figure
 
 
-def tractions(history: xarray.Dataset) -> Figure:
+def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw size and direction of the tangential traction at the same times."""
     surface, steps = surface_of(history), _steps(history)
-    places = sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = _maps(history, surface, places, steps)
+    places = first_and_last(history)
+    figure, axes = _maps(history, surface, places, steps, look)
     chosen = history.isel(cycle=places, step=steps)
     size = np.hypot(chosen.traction, chosen.traction_across).values
     top = float(size.max()) or 1.0
@@ -87,30 +88,22 @@ def tractions(history: xarray.Dataset) -> Figure:
     return figure
 
 
-def cuts(history: xarray.Dataset) -> Figure:
+def cuts(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the traction along the sliding between its bounds, on a cut along it through the middle of the contact."""
-    surface, places = surface_of(history), sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = panels(len(places), 2.8)
-    mu, at = float(history.attrs["friction"]), middle_of_contact(history)
-    for ax, place in zip(axes, places, strict=True):
-        cycle = history.isel(cycle=place)
-        for colour, step in shades([*_steps(history), history.sizes["step"] - 1]):
-            now = cycle.isel(step=step)
-            x, values = surface.cut(now.traction.values, at, along=True)
-            ax.plot(x, values, color=colour, label=f"{float(now.fraction):.3g}")
-        x, bound = surface.cut(mu * cycle.pressure.max("step").values, at, along=True)
-        ax.fill_between(x, -bound, bound, color=GREY, alpha=0.15, linewidth=0, label="µ p")
-        ax.set_ylabel("traction (MPa)")
-        ax.set_title(f"cycle {int(cycle.cycle):,}")
-        legend_beside(ax, "part of the cycle")
-    _to_contact(axes[-1], history)
-    return figure
+    surface, at = surface_of(history), middle_of_contact(history)
+    return traction_panels(
+        history,
+        [*_steps(history), history.sizes["step"] - 1],
+        lambda values: surface.cut(values, at, along=True),
+        lambda ax: _to_contact(ax, history),
+        look,
+    )
 
 
-def sliding_map(history: xarray.Dataset) -> Figure:
+def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the slip of each node in a cycle and its work of friction, in the first and the last cycle."""
-    surface, places = surface_of(history), sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = panels_of_maps(history, surface, 2, len(places))
+    surface, places = surface_of(history), first_and_last(history)
+    figure, axes = panels_of_maps(history, surface, 2, len(places), look)
     cycles = history.isel(cycle=places)
     slid = np.hypot(cycles.slip, cycles.slip_across).where(cycles.pressure > 0, 0)
     work = -(cycles.traction * cycles.slip + cycles.traction_across * cycles.slip_across)
@@ -123,54 +116,54 @@ def sliding_map(history: xarray.Dataset) -> Figure:
             for ax, found in zip(axes[row], shown, strict=True)
         ]  # fmt: skip
         figure.colorbar(drawn[-1], ax=list(axes[row]), aspect=15).set_label(text)
-    for ax, number in zip(axes[0], cycles.cycle.values, strict=True):
-        ax.set_title(f"cycle {int(number):,}", loc="left")
+    for ax, place in zip(axes[0], places, strict=True):
+        name_panel(ax, title(history, place, look))
     return figure
 
 
-def shapes(history: xarray.Dataset, chosen: Sequence[int]) -> Figure:
+def shapes(history: xarray.Dataset, chosen: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw worn depths and pressure on a cut along the sliding through the middle, for the chosen records."""
-    figure, (depth, pressure) = panels(2, 2.4)
+    figure, (depth, pressure) = panels(2, 2.4, look=look)
     punch, strip, at = surface_of(history), surface_of(history, "strip"), middle_of_contact(history)
     for colour, place in shades(chosen):
         cycle = history.isel(cycle=place)
         x, worn = punch.cut(cycle.wear.values, at, along=True)
-        depth.plot(x, -1e3 * worn, color=colour, label=f"{int(cycle.cycle):,}")
+        depth.plot(x, -1e3 * worn, color=colour, label=cycle_name(history, place, look))
         x, worn = strip.cut(cycle.wear_strip.values, at, along=True)
         depth.plot(x, -1e3 * worn, color=colour, linestyle=":")
         x, p = punch.cut(cycle.pressure.isel(step=-1).values, at, along=True)
-        pressure.plot(x, p, color=colour, label=f"{int(cycle.cycle):,}")
+        pressure.plot(x, p, color=colour, label=cycle_name(history, place, look))
     depth.set_ylabel("worn depth (µm):\npunch, dotted strip")
     pressure.set_ylabel("pressure at the end\nof the cycle (MPa)")
-    legend_beside(depth, "cycle")
+    legend_beside(depth, look.of_one)
     _to_contact(pressure, history)
     return figure
 
 
-def scar(history: xarray.Dataset) -> Figure:
+def scar(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the worn depth of both bodies before the last cycle."""
     bodies = ("punch", "strip")
     surfaces = [surface_of(history, body) for body in bodies]
-    figure, axes = panels_of_maps(history, surfaces[0], 1, 2)
+    figure, axes = panels_of_maps(history, surfaces[0], 1, 2, look)
     for ax, body, surface, name in zip(axes[0], bodies, surfaces, ("wear", "wear_strip"), strict=True):
         values = 1e3 * history[name].isel(cycle=-1).values
         drawn = ax.tripcolor(*surface.drawn(values), shading="gouraud", cmap="YlOrBr", vmin=0,
                              vmax=float(values.max()) or 1.0, rasterized=True)  # fmt: skip
-        ax.set_title(f"{body}, before cycle {int(history.cycle[-1]):,}", loc="left")
+        name_panel(ax, f"{body}, {title(history, -1, look)}")
         figure.colorbar(drawn, ax=ax, location="bottom", shrink=0.8, aspect=25).set_label("worn depth (µm)")
     return figure
 
 
-def stresses(history: xarray.Dataset) -> Figure:
+def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the largest stress along the sliding in the strip's surface over the first and the last cycle."""
-    surface, places = surface_of(history), sorted({0, history.sizes["cycle"] - 1})
-    figure, axes = panels_of_maps(history, surface, 1, len(places))
+    surface, places = surface_of(history), first_and_last(history)
+    figure, axes = panels_of_maps(history, surface, 1, len(places), look)
     most = history.surface_stress.isel(cycle=places).max("step").values
     size = float(np.abs(most).max()) or 1.0
     for ax, found, place in zip(axes[0], most, places, strict=True):
         drawn = ax.tripcolor(*surface.drawn(found), shading="gouraud", cmap="RdBu_r", vmin=-size, vmax=size,
                              rasterized=True)  # fmt: skip
-        ax.set_title(f"cycle {int(history.cycle[place]):,}", loc="left")
+        name_panel(ax, title(history, place, look))
     bar = figure.colorbar(drawn, ax=axes, location="bottom", shrink=0.6, aspect=35)
     bar.set_label("largest stress along the sliding in the strip's surface (MPa)")
     return figure
@@ -209,16 +202,20 @@ def _few(surface: Surface, history: xarray.Dataset) -> Array:
     return touched[order[np.unique(which.ravel()[order], return_index=True)[1]]]
 
 
-def _maps(history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int]) -> tuple[Figure, Any]:
+def _maps(
+    history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int], look: Look
+) -> tuple[Figure, Any]:
     """Return a figure with a row of maps for each cycle, one for each time step."""
-    figure, axes = panels_of_maps(history, surface, len(places), len(steps))
+    figure, axes = panels_of_maps(history, surface, len(places), len(steps), look)
     for row, place in enumerate(places):
         for ax, step in zip(axes[row], steps, strict=True):
-            ax.set_title(f"cycle {int(history.cycle[place]):,}\n+ {float(history.fraction[step]):.3g}", loc="left")
+            name_panel(ax, f"{title(history, place, look)}\npart {float(history.fraction[step]):.3g}")
     return figure, axes
 
 
-def panels_of_maps(history: xarray.Dataset, surface: Surface, rows: int, columns: int) -> tuple[Figure, Any]:
+def panels_of_maps(
+    history: xarray.Dataset, surface: Surface, rows: int, columns: int, look: Look
+) -> tuple[Figure, Any]:
     """Return a figure of equal maps of the contact and a little more."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
@@ -228,9 +225,9 @@ def panels_of_maps(history: xarray.Dataset, surface: Surface, rows: int, columns
     low, high = touched.min(axis=0), touched.max(axis=0)
     room = MARGIN * float((high - low).max()) + 1e-9
     wide, tall = high - low + 2 * room
-    height = rows * (min((WIDTH - 1.0) / columns * tall / wide, 3.5) + 0.5) + 1.4
-    with rc_context({"axes.titlesize": "small", "font.size": 9.0}):
-        figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    height = rows * (min((look.width - 1.0) / columns * tall / wide, 3.5) + 0.5) + 1.4
+    with rc_context({"axes.titlesize": "small", "font.size": 9.0 if look.width >= NARROW else 7.0}):
+        figure = Figure(figsize=(look.width, height), layout="constrained")
         axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for ax in axes.ravel():
         ax.set_facecolor("0.93")

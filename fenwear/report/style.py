@@ -63,6 +63,11 @@ class Look:
         """What a single value of it is called."""
         return AXES[self.axis][1]
 
+    @property
+    def of_unit(self) -> str:
+        """Unit of a single value of it."""
+        return {"cycles": "", "distance": "m", "time": "s"}[self.axis]
+
     def name(self, history: xarray.Dataset, half_cycle: int) -> str:
         """Return a half-cycle in words of the axis, such as its cycle."""
         row = int(np.flatnonzero(history.half_cycle.values == half_cycle)[0])
@@ -133,6 +138,12 @@ def legend_beside(ax: Axes, title: str) -> None:
         columns = min(3, max(1, ROW // (longest + 8)))  # a sample of the line takes the width of some letters, too
         ax.legend(title=title or None, loc="lower center", bbox_to_anchor=(0.5, 1.02), frameon=False, ncols=columns,
                   fontsize="small", title_fontsize="small", handlelength=1.5, columnspacing=1.0)  # fmt: skip
+
+
+def name_panel(ax: Axes, text: str) -> None:
+    """Write what a panel shows above its left end, in letters that fit the figure's width."""
+    figure: Any = ax.figure
+    ax.set_title(text, loc="left", fontsize=8.5 if figure.get_size_inches()[0] >= NARROW else 6.5)
 
 
 def level_line(ax: Axes, height: float, name: str) -> None:

@@ -20,16 +20,15 @@ from fenwear.report.course import (
     run_axis,
     temperature_unit,
 )
-from fenwear.report.figures import chosen_half_cycles, nearest_half_cycles, pressure_top
+from fenwear.report.figures import chosen_half_cycles, early_half_cycles, nearest_half_cycles
 from fenwear.report.maps import cuts_figure, map_figure, quantities
 from fenwear.report.program import program_figure
 from fenwear.report.style import (
     STANDARD,
     Look,
-    direction_style,
     legend_beside,
+    level_line,
     panels,
-    reference_line,
     run_style,
     shades,
     strip_moves,
@@ -48,13 +47,16 @@ def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: L
     chosen = chosen_half_cycles(history, wanted)
     if model_of(history) == "solid":
         shown = chosen[-MAPS:]
-        drawn = {name: map_figure(history, quantity, shown) for name, quantity in quantities(history).items()}
-        drawn["cuts_along"] = cuts_figure(history, chosen, along=True)
-        drawn["cuts_across"] = cuts_figure(history, chosen, along=False)
+        drawn = {name: map_figure(history, quantity, shown, look) for name, quantity in quantities(history).items()}
+        drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)
+        drawn["cuts_across"] = cuts_figure(history, chosen, look, along=False)
     else:
-        drawn = {"shape": ring_shape_figure(history, chosen), "pressure": ring_pressure_figure(history, chosen)}
+        drawn = {
+            "shape": ring_shape_figure(history, chosen, look),
+            "pressure": ring_pressure_figure(history, chosen, look),
+        }
         if "max_temperature" in history:
-            drawn["temperature"] = ring_temperature_figure(history, chosen)
+            drawn["temperature"] = ring_temperature_figure(history, chosen, look)
     drawn["peaks"] = series_figure(history, look)
     if "load_factor" in history:
         drawn["program"] = program_figure(history, look)
@@ -71,32 +73,27 @@ def series_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     figure, axes = panels(4 + hot, 2.3, look=look)
     pressure, area, depth, size, *rest = axes
     by_direction(pressure, history, "max_pressure", look)
-    pressure.set_title("Largest contact pressure", loc="left")
-    pressure.set_ylabel("pressure (MPa)")
+    pressure.set_ylabel("largest\npressure (MPa)")
     if is_conforming(history):
         mean = mean_pressure(history)
-        reference_line(pressure, mean, f"mean {mean:.2f}")
+        level_line(pressure, mean, f"mean {mean:.4g}")
     by_direction(area, history, "contact_area", look)
-    area.set_title("Area in contact", loc="left")
-    area.set_ylabel("area (mm²)")
+    area.set_ylabel("area in\ncontact (mm²)")
     if is_conforming(history):
         nominal = nominal_width(history)
-        reference_line(area, nominal, f"nominal area {nominal:.4g}")
+        level_line(area, nominal, f"nominal {nominal:.4g}")
         area.set_ylim(top=1.15 * nominal)
     _of_bodies(depth, history, {"max_wear": "worn depth"}, 1e3, look)
-    depth.set_title("Largest worn depth", loc="left")
-    depth.set_ylabel("depth (µm)")
+    depth.set_ylabel("largest worn\ndepth (µm)")
     _of_bodies(size, history, {name: name.removeprefix("scar_") for name in sizes}, 1.0, look)
-    size.set_title("Size of the scars along and across the sliding" if len(sizes) > 1 else "Width of the scars",
-                   loc="left")  # fmt: skip
-    size.set_ylabel("size (mm)")
+    size.set_ylabel("size of the\nscar (mm)")
     for ax in rest:
         by_direction(ax, history, "max_temperature", look)
-        ax.set_title("Largest temperature of the contact surfaces, at the end of each half-cycle", loc="left")
-        ax.set_ylabel(f"temperature ({temperature_unit(history)})")
+        ax.set_ylabel(f"largest temper-\nature ({temperature_unit(history)})")
     for ax in axes[:4]:
         ax.set_ylim(bottom=0)
-    legend_beside(pressure, strip_moves(history))
+    for ax in (pressure, area, *rest):
+        legend_beside(ax, strip_moves(history))
     run_axis(axes[-1], history, look)
     return figure
 
@@ -113,55 +110,55 @@ def _of_bodies(ax: Axes, history: xarray.Dataset, names: dict[str, str], factor:
     legend_beside(ax, "")
 
 
-def ring_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+def ring_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw the pressure over the radius in both directions, at each chosen half-cycle and the one beside it."""
     present = directions_present(history)
-    figure, axes = panels(len(present), 3.2, share_y=True)
+    rows = {d: history.isel(half_cycle=np.flatnonzero(history.direction.values == d)) for d in present}
+    chosen = {d: nearest_half_cycles(own, half_cycles) for d, own in rows.items()}
+    early = {d: early_half_cycles(own, chosen[d]) for d, own in rows.items()}
+    figure, axes = panels(len(present) + any(early.values()), 3.0, look=look)
     x, label = radial(history)
-    for ax, d in zip(axes, present, strict=True):
-        one_way = history.isel(half_cycle=np.flatnonzero(history.direction.values == d))
-        for colour, n in shades(nearest_half_cycles(one_way, half_cycles)):
-            ax.plot(x, one_way.pressure.sel(half_cycle=n), color=colour, label=f"{n:,}")
-        name, *_ = direction_style(history, d)
-        ax.set_title(f"Contact pressure while the {strip_moves(history)} {name}", loc="left")
-        ax.set_ylabel("contact pressure p (MPa)")
-        ax.set_ylim(0, pressure_top(history, half_cycles))
+    for ax, d in zip(axes, present, strict=False):
+        for colour, n in shades(chosen[d]):
+            drawn = axes[-1] if n in early[d] else ax  # what lies far beyond all later ones: nothing is cut off
+            drawn.plot(x, rows[d].pressure.sel(half_cycle=n), color=colour, label=look.name(history, n))
         if is_conforming(history):  # named in the legend: lines that wear evenly run along it
             mean = mean_pressure(history)
-            ax.axhline(mean, color="0.5", linewidth=0.8, linestyle=":", label=f"mean {mean:.2f}")
-        legend_beside(ax, "half-cycle")
+            level_line(ax, mean, f"mean {mean:.4g}")
+    for ax in axes:
+        ax.set_ylabel("contact pressure p (MPa)")
+        ax.set_ylim(bottom=0)
+        legend_beside(ax, look.of_one)
         ax.margins(x=0.01)
     axes[-1].set_xlabel(label)
     return figure
 
 
-def ring_shape_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+def ring_shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw what is worn off both rings over the radius at the chosen half-cycles."""
     bodies = [("punch", "")] + ([("strip", "_strip")] if "wear_strip" in history else [])
-    figure, axes = panels(len(bodies), 3.2)
+    figure, axes = panels(len(bodies), 3.0, look=look)
     for ax, (body, end) in zip(axes, bodies, strict=True):
         x, label = radial(history, end)
         for colour, n in shades(half_cycles):
-            ax.plot(x, 1e3 * history[f"wear{end}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
-        ax.set_title(f"Worn shape: depth off the {body}", loc="left")
-        ax.set_ylabel("worn depth w (µm)")
+            ax.plot(x, 1e3 * history[f"wear{end}"].sel(half_cycle=n), color=colour, label=look.name(history, n))
+        ax.set_ylabel(f"worn depth of the {body} (µm)")
         ax.set_ylim(bottom=0)
         ax.margins(x=0.01)
-        legend_beside(ax, "after half-cycle")
+        legend_beside(ax, look.of_one)
     axes[-1].set_xlabel(label)
     return figure
 
 
-def ring_temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> Figure:
+def ring_temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw the temperature of both contact surfaces over the radius at the chosen half-cycles."""
-    figure, axes = panels(2, 3.0)
+    figure, axes = panels(2, 3.0, look=look)
     x, label = radial(history)
     for ax, body in zip(axes, ("punch", "strip"), strict=True):
         for colour, n in shades(half_cycles):
-            ax.plot(x, history[f"temperature_{body}"].sel(half_cycle=n), color=colour, label=f"{n:,}")
-        ax.set_title(f"Temperature of the {body}'s contact surface", loc="left")
-        ax.set_ylabel(f"temperature ({temperature_unit(history)})")
+            ax.plot(x, history[f"temperature_{body}"].sel(half_cycle=n), color=colour, label=look.name(history, n))
+        ax.set_ylabel(f"temperature of the {body} ({temperature_unit(history)})")
         ax.margins(x=0.01)
-        legend_beside(ax, "after half-cycle")
+        legend_beside(ax, look.of_one)
     axes[-1].set_xlabel(label)
     return figure

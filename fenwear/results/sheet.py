@@ -30,7 +30,7 @@ PLACES = 9  # of a place in mm: the middle is 0, not what rounding of a mesh lea
 
 SLIDING: dict[str, Variable] = {
     "cycles": (("half_cycle",), "1", "cycles done"),
-    "sliding_distance": (("half_cycle",), "mm", "sliding distance from the start, mean over the nominal contact"),
+    "sliding_distance": (("half_cycle",), "mm", "sliding distance from the start, mean over the load"),
     "normal_force": (("half_cycle",), "N", "normal force of the contact in the middle of the half-cycle"),
     "friction_force": (("half_cycle",), "N", "friction force, mean over the half-cycle"),
     "friction_work": (("half_cycle",), "mJ", "work of friction from the start"),
@@ -128,8 +128,8 @@ def values(block: Block) -> dict[str, Array]:
 def _level(system: Placed) -> Array:
     """Return the cosine of the slope of the contact surface against the sliding (n,); 1 where nothing slides."""
     pair, field = system.pair, system.sliding.field
-    speed = np.linalg.norm(field.velocity(pair.punch.x), axis=1)
-    return _over(field.rate(pair.punch.x, pair.normal), speed, 1.0)
+    speed = np.linalg.norm(field.velocity(pair.opposite), axis=1)
+    return _over(field.rate(pair.opposite, pair.normal), speed, 1.0)
 
 
 def _over(above: Array, below: Array, otherwise: float = np.nan) -> Array:

@@ -110,6 +110,6 @@ class Friction:
             mu: (n,).
             pair: The contact nodes.
         """
-        along = self.field.direction(pair.punch.x, pair.normal)
+        along = self.field.direction(pair.opposite, pair.normal)
         across = np.cross(in_space(pair.normal), along)
         return direction * mu[:, None] * along - self.contact.transverse_friction * across

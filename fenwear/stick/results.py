@@ -157,6 +157,7 @@ def dataset(rig: Rig, case: Case, rows: Sequence[Row]) -> xarray.Dataset:
         "law": "coulomb",
         "friction": float(rig.friction[0]),
         "model": case.model.kind,
+        "period": rig.program.period,  # s
     }
     return xarray.Dataset(data, coordinates, attributes)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from mpi4py import MPI
 
-from fenwear import Case, CaseError, load_case
+from fenwear import Case, CaseError, ConvergenceError, load_case
 from fenwear.life import Model, evaluate, parse_quantity, sensitivity
 
 ONE_WORN = ("contact.friction", "punch.loads.0.force.1", "materials.composite.young", "wear.punch.pressure_exponent",
@@ -145,6 +145,21 @@ def test_laws_that_vary(small: Callable[..., Case], law: str, keys: tuple[str, .
         assert row.method == method
         expected = central(case, "steady pressure at 12 mm", row.key, row.key_value)
         assert row.derivative == pytest.approx(expected, rel=1e-3, abs=1e-5 * abs(found.value / row.key_value))
+
+
+def test_threshold(small: Callable[..., Case]) -> None:
+    """Where all presses beyond it V = k s (F - p_0 A), so dV/dp_0 = -k s A; a steady state is refused, and says why."""
+    k, p0, cycles = 1e-7, 0.5, 20
+    case = small("example2", "contact.friction=0.05", f"wear.punch={{coefficient={k}, pressure_threshold={p0}}}")
+    keys = ["wear.punch.pressure_threshold", "wear.punch.coefficient"]
+    found = sensitivity(case, [f"volume after {cycles} cycles"], keys, spread=0, comm=MPI.COMM_SELF)[0]
+    slid, area = cycles * 6.0, 600.0
+    assert found.value == pytest.approx(k * slid * (1e4 - p0 * area), rel=1e-9)
+    by_threshold, by_coefficient = found.derivatives
+    assert by_threshold.derivative == pytest.approx(-k * slid * area, rel=1e-6)
+    assert by_coefficient.derivative == pytest.approx(found.value / k, rel=1e-6)
+    with pytest.raises(ConvergenceError, match="with a pressure_threshold: below it any pressure stays"):
+        sensitivity(case, ["steady pressure at 0 mm"], ["contact.friction"], spread=0, comm=MPI.COMM_SELF)
 
 
 @pytest.mark.parametrize("of", ["depth", "s"])

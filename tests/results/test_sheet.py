@@ -131,19 +131,23 @@ def test_what_is_jumped_over_is_counted(assembled: Assemble) -> None:
 
 
 def test_turning_strip(assembled: Assemble) -> None:
-    """A disc under a pin: the arc at the pin's mean radius is slid, and beta~ times the load path worn."""
+    """A disc under a pin: the arc at the load's mean radius is slid, and k F s worn, to rounding."""
     system = assembled("pin-on-disc", "geometry.degree=1", "geometry.order=1")
     (block,) = march(system, 3)
     found, case, pair = values(block), system.case, system.pair
     radius = np.linalg.norm(pair.punch.x[:, :2], axis=1)
     angle = sum(phase.distance for phase in system.motion.phases) * 3 / len(system.motion.phases)
-    mean = (radius @ pair.weights) / pair.weights.sum()
-    assert found["sliding_distance"][-1] == pytest.approx(angle * mean, rel=1e-12)
+    force = block.pressure * pair.weights
+    slid = angle / 3 * (force @ radius) / force.sum(axis=1)
+    np.testing.assert_allclose(found["sliding_distance"], np.cumsum(slid), rtol=1e-12)
     path = angle / 3 * (block.pressure @ (pair.weights * radius)).sum()
     law, mu = case.wear.punch, case.contact.friction
     assert law is not None
     assert isinstance(law.coefficient, float)
     assert found["total_volume"][-1] == pytest.approx(law.coefficient * path, rel=1e-12)
+    by_hand = law.coefficient * found["normal_force"][-1] * found["sliding_distance"][-1]
+    assert found["total_volume"][-1] == pytest.approx(by_hand, rel=1e-12)
+    np.testing.assert_allclose(found["friction_force"], mu * found["normal_force"], rtol=1e-12)
     assert found["friction_work"][-1] == pytest.approx(mu * path, rel=1e-12)
     assert "total_area" not in variables(system)
     assert {"scar_width", "scar_length_5", "max_wear_y"} <= set(variables(system))
@@ -196,3 +200,14 @@ def test_sheet_for_people(assembled: Assemble) -> None:
     assert "mass" not in text
     assert "punch" in text
     assert "strip" in text
+
+
+def test_a_ring_slides_its_own_circumference(assembled: Assemble) -> None:
+    """Under a flat block, however much of it is meshed: omega R t, which the ends of the block are beyond."""
+    for width in (1, 4):
+        settings = (f"geometry.parameters.contact_width={width}", "geometry.parameters.elements_along_contact=24")
+        system = assembled("block-on-ring", *settings)
+        (block,) = march(system, 2)
+        angle = sum(phase.distance for phase in system.motion.phases) * 2 / len(system.motion.phases)
+        radius = float(np.linalg.norm(system.pair.strip.x, axis=1).min())
+        assert values(block)["sliding_distance"][-1] == pytest.approx(angle * radius, rel=1e-5)

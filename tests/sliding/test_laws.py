@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import fenwear
 from fenwear import Tribosystem, assemble, jump, load_case, make_case, march, steady
 from fenwear.case import Case, changed_case
+from fenwear.case.dependence import evaluate_law
 from fenwear.cycle.stability import growth_rate
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.life.model import Model
@@ -169,7 +171,8 @@ def test_own_law_in_python(assembled: Assemble) -> None:
             (lambda now: now["p"][:3], "expected one for each of"),
             (lambda now: now["p"] * np.nan, "expected zero or more, got nan"),
             (lambda now: -1e-8, "expected zero or more, got -1e-08"),
-            (lambda now: now["depth"], "the law 'mine' fails: 'depth'"),
+            (lambda now: now["depth"], "the law 'mine' asks for 'depth', but is of T, p, v"),
+            (lambda now: 1j * now["p"], "the law 'mine' fails: it gives complex numbers"),
         ):
             fenwear.register_law("mine", wrong)
             with pytest.raises(CaseError, match=message):
@@ -182,6 +185,23 @@ def test_own_law_in_python(assembled: Assemble) -> None:
         fenwear.register_law("mine", 3)
     with pytest.raises(CaseError, match="expected a list of some of T, p, v, x, y, z, depth, s, got 'q'"):
         fenwear.register_law("mine", abs, of=["p", "q"])
+
+
+def test_a_slow_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Once, after the first calls; here any time counts as slow."""
+    monkeypatch.setattr(fenwear.case.dependence, "SLOW", -1.0)
+    state = {"p": np.ones(5)}
+    fenwear.register_law("slow", lambda now: now["p"], of=["p"])
+    try:
+        for _ in range(fenwear.case.dependence.FIRST - 1):
+            evaluate_law("slow", state, (5,))
+        with pytest.warns(UserWarning, match=r"the law 'slow' takes .* s for 5 nodes.*arrays of numpy"):
+            evaluate_law("slow", state, (5,))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            evaluate_law("slow", state, (5,))
+    finally:
+        fenwear.case.dependence._LAWS.clear()
 
 
 def test_what_changes_for_ever_has_no_steady_state(assembled: Assemble) -> None:

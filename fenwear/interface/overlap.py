@@ -25,6 +25,7 @@ Indices: TypeAlias = NDArray[np.int64]
 SLACK = 1e-6  # of the surface's size: how far the first surface may reach beyond the second
 CURVED, CURVED_STEPS = 1e-13, 20  # of the surface's size: rounding of a point's place; Newton steps to it
 ASTRAY, FOLDED = 1e-9, 1e3  # of the surface's size: what Newton's method may leave, and where it has no end
+BENT = 4  # degrees more where facets are bent, in which no quadrature is exact: its error falls to rounding
 NOTHING = 1e-12  # of the smaller of two polygons: they share an edge up to rounding, no area
 RING = {"interval": [0, 1], "triangle": [0, 1, 2], "quadrilateral": [0, 1, 3, 2]}  # basix' corners in order around
 
@@ -74,6 +75,14 @@ class ChartedSurface:
         """Longest side of the box around the surface, mm."""
         return float(np.ptp(self.s, axis=0).max())
 
+    @property
+    def bent(self) -> bool:
+        """Whether a facet is anything but an interval, triangle or parallelogram with its nodes at their places."""
+        corners, reference = self.corners, _element(self.cell, self.degree).points
+        sides = corners[:, 1 : 1 + reference.shape[1]] - corners[:, :1]
+        away = self.s[self.facets] - corners[:, :1] - reference @ sides
+        return bool(np.abs(away).max(initial=0.0) > ASTRAY * self.extent)
+
     def shape_functions(self, points: Array) -> Array:
         """Return the trace's shape functions at reference points (q, d - 1), shape (q, k)."""
         return tabulate(self.cell, self.degree, points)
@@ -87,8 +96,9 @@ class ChartedSurface:
 class Overlap:
     """Quadrature where the facets of two surfaces lie over each other.
 
-    It is exact for products of two shape functions of the first surface, or of one of each (on quadrilaterals
-    that are parallelograms). Points come simplex by simplex, `per_simplex` of them each.
+    It is exact for products of two shape functions of the first surface, or of one of each, and to rounding where
+    facets are bent: else it would depend on how the simplices of an overlap lie, which rounding decides. Points come
+    simplex by simplex, `per_simplex` of them each.
 
     Attributes:
         facet1, facet2: Facets that meet at each point (q,).
@@ -136,7 +146,8 @@ def overlap(first: ChartedSurface, second: ChartedSurface) -> Overlap:
     flat = corners1.shape[2]
     own, other = (surface.degree * (2 if surface.cell == "quadrilateral" else 1) for surface in (first, second))
     shape = basix.CellType.interval if flat == 1 else basix.CellType.triangle
-    points, gauss = basix.make_quadrature(shape, own + max(own, other))
+    more = BENT if first.bent or second.bent else 0
+    points, gauss = basix.make_quadrature(shape, own + max(own, other) + more)
     edges = simplices[:, 1:] - simplices[:, :1]
     s = (simplices[:, :1] + points @ edges).reshape(-1, flat)
     weights = (np.abs(np.linalg.det(edges))[:, None] * gauss).ravel()

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem
+from fenwear import Tribosystem, load_case
+from fenwear.assembly import place_case
+from fenwear.interface import pair as paired
 
 
 def test_transfer_between_unmatched_nodes(unmatched: Tribosystem) -> None:
@@ -29,6 +32,18 @@ def test_wear_never_makes_a_surface_grow(unmatched: Tribosystem) -> None:
         assert on_strip.min() >= 0
         assert pair.strip.weights @ on_strip == pytest.approx(pair.weights[node], rel=1e-13)
     np.testing.assert_allclose(pair.deposit @ np.ones(len(pair.weights)), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["ball-on-flat", "ring-on-ring"])
+def test_rounding_moves_nothing(name: str) -> None:
+    """Where facets are cut is decided by rounding; what is integrated over the cuts must not be, bent facets or not."""
+    bodies = place_case(load_case(name, ["geometry.parameters.across=4"] * (name == "ball-on-flat"))).bodies
+    punch, strip = bodies.punch.surface, bodies.strip.surface
+    rings = bodies.punch.law.kind == "axisymmetric"
+    noise = 1e-15 * np.random.default_rng(1).standard_normal(punch.trace.shape)
+    one, other = (paired(replace(punch, trace=punch.trace + by), strip, axisymmetric=rings) for by in (0.0, noise))
+    np.testing.assert_allclose(other.transfer.toarray(), one.transfer.toarray(), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(other.weights, one.weights, rtol=1e-12)
 
 
 def test_interpolate(unmatched: Tribosystem) -> None:

@@ -112,13 +112,10 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
-        self._unit = np.concatenate([np.full(n, self._pressure_scale), self._rigid_scale])
         self._many = n > MANY
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self._blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
-        self._rigid_of_gap = np.array([np.linalg.pinv(phase.interface.rigid.rigid_normal) for phase in phases])
-        self._taken: Array = np.zeros((m, r))  # by rigid motions, of the gap that is being solved for
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
         self._slide(range(m))
@@ -228,13 +225,11 @@ class CondensedContact:
             ConvergenceError: SNES did not converge.
         """
         m, n = self.shape
-        # Rigid motions take up what they can of a worn depth, which may be thousands of times what the bodies give:
-        # the rest is as small as the elastic gap, and so is the rounding of the residual.
-        open_gap = np.broadcast_to(gap + self._loads, (m, n))
-        taken = [modes @ one for modes, one in zip(self._rigid_of_gap, open_gap, strict=True)]
-        for k, (phase, amplitudes) in enumerate(zip(self.phases, taken, strict=True)):
-            self._offset[k, :n] = (open_gap[k] - phase.interface.rigid.rigid_normal @ amplitudes) / self._gap_scale
-        self._taken = np.array(taken)
+        # From the rigid motions of the start: they take up a worn depth that may be thousands of times what the bodies
+        # give. What is left at the nodes in contact is as small as the elastic gap, and so is the residual's rounding.
+        begun = np.zeros((m, self._offset.shape[1] - n)) if start is None else start.rigid
+        opened = [phase.interface.rigid.rigid_normal @ own for phase, own in zip(self.phases, begun, strict=True)]
+        self._offset[:, :n] = (gap + self._loads + np.array(opened)) / self._gap_scale
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._layer = layer
@@ -244,7 +239,7 @@ class CondensedContact:
         return ContactState(
             pressure,
             self.inequality.residual.reshape(m, -1)[:, :n] * self._gap_scale,
-            x[:, n:] * self._rigid_scale - self._taken,
+            begun + x[:, n:] * self._rigid_scale,
             self.inequality.iterations,
         )
 
@@ -265,7 +260,8 @@ class CondensedContact:
     def _ways(self, start: ContactState | None) -> Iterator[tuple[Array, bool, str]]:
         """Yield where to start, whether with a line search, and the name of the remedy that this is."""
         if start is not None:
-            near = np.concatenate([start.pressure, start.rigid + self._taken], axis=1) / self._unit
+            near = np.zeros_like(self._offset)
+            near[:, : self.shape[1]] = start.pressure / self._pressure_scale
             yield near, False, ""
             yield near, True, LINE_SEARCH
         full = np.zeros_like(self._offset)

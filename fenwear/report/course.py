@@ -98,6 +98,8 @@ def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
             continue
         colour = BODY_COLOURS[body]
         axes[0].plot(x, 1e3 * history[f"max_wear{end}"], color=colour, label=body, **mark_few(x))
+        if f"scar_width{end}" not in history:  # worn all the way round
+            continue
         axes[1].plot(x, history[f"scar_width{end}"], color=colour, label=f"{body}, at 1 %", **mark_few(x))
         axes[1].plot(x, history[f"scar_width_5{end}"], color=colour, linestyle="--", label=f"{body}, at 5 %")
     axes[0].set_ylabel("largest worn depth (µm)")

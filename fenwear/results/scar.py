@@ -30,7 +30,8 @@ class ScarGeometry:
     Attributes:
         coordinates: Along and across the sliding (n, 2), or across it alone (n, 1), mm.
         edges: Pairs of neighbouring nodes (m, 2).
-        names: Of the extents: ("length", "width"), or ("width",) of what is worn all the way round.
+        names: Of the extents: ("length", "width"), ("width",) of what is worn all the way round, and none of a plane's
+            strip that is.
     """
 
     coordinates: Array
@@ -44,6 +45,8 @@ class ScarGeometry:
             depth: Worn depths of k half-cycles (k, n), mm.
             share: Of the largest depth, where a scar ends.
         """
+        if not self.names:
+            return {}
         return dict(zip(self.names, extents(depth, self.coordinates, self.edges, share).T, strict=True))
 
 
@@ -78,10 +81,15 @@ def scar_geometry(placed: Placed, surface: ContactSurface) -> ScarGeometry:
     cells = surface_cells(surface)
     edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     edges = np.unique(edges, axis=0)
+    all_round = surface is placed.pair.strip and placed.sliding.track is not None
     if surface.dim == 2:
-        return ScarGeometry(surface.x[:, :1], edges, ("width",))
+        return (
+            ScarGeometry(surface.x[:, :0], edges, ())
+            if all_round
+            else ScarGeometry(surface.x[:, :1], edges, ("width",))
+        )
     coordinates = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x)
-    if surface is placed.pair.strip and placed.sliding.track is not None:  # worn all along it
+    if all_round:
         return ScarGeometry(coordinates[:, 1:], edges, ("width",))
     return ScarGeometry(coordinates, edges, ("length", "width"))
 

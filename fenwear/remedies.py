@@ -9,6 +9,7 @@ FULL_START = "contact solved from full contact on"
 FULL_START_SEARCH = "contact solved from full contact on, with a line search"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
+GRAZING = "nodes conduct whose pressure tends to nothing"
 
 
 class Remedies:

@@ -16,6 +16,7 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat, CycleJump
+from fenwear.remedies import GRAZING
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn
 
@@ -106,6 +107,15 @@ def _touching(pressure: NDArray[Any]) -> Array:
     return np.where(pressure > CLOSE * pressure.max(), pressure, 0.0)
 
 
+def _grazing(pressure: NDArray[Any]) -> Array:
+    """Return the pressures: a node whose pressure tends to nothing conducts on.
+
+    There may be no other state: where a node that conducts is opened by the heat and one that does not is closed,
+    neither lasts (J. R. Barber, J. Elasticity 8, 1978, 409).
+    """
+    return np.asarray(pressure)
+
+
 class Coupled:
     """Contact of all phases of a cycle at the heat and the coefficients of its own end.
 
@@ -152,6 +162,27 @@ class Coupled:
         Raises:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
+        try:
+            return self._solve(temperature, cycles, start, solve, passing, _touching, lagged=lagged)
+        except ConvergenceError:
+            if self.heat is None or temperature is None:
+                raise
+        found = self._solve(temperature, cycles, start, solve, passing, _grazing, lagged=lagged)
+        self.system.remedies.note(GRAZING)
+        return found
+
+    def _solve(
+        self,
+        temperature: Array | None,
+        cycles: float,
+        start: ContactState,
+        solve: SolveContact,
+        passing: Passing | None,
+        conducting: Callable[[NDArray[Any]], Array],
+        *,
+        lagged: bool,
+    ) -> tuple[ContactState, Array | None]:
+        """Return the same, where nodes of these pressures conduct."""
         system, heat, constant = self.system, self.heat, self.system.constant_coefficients
         shape, contact = start.pressure.shape, start
         known: tuple[bytes, CycleJump] | None = None
@@ -177,7 +208,7 @@ class Coupled:
                 contact = solve(None, None, contact)
                 state, same = None, True
             else:
-                conductances = heat.conductances(_touching(pressure))
+                conductances = heat.conductances(conducting(pressure))
                 key = conductances.tobytes()
                 if known is None or known[0] != key:
                     known = (key, heat.jump(temperature, cycles, conductances))
@@ -186,7 +217,7 @@ class Coupled:
                     self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling * self.mu, contact)
                 )
                 state = end.state(self.mu * contact.pressure)
-                same = np.array_equal(heat.conductances(_touching(contact.pressure)), conductances, equal_nan=True)
+                same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
                 if warm:
                     found.append(self.surfaces(state, contact.pressure).ravel())
             if passing is not None:

@@ -193,6 +193,7 @@ def test_surfaces_that_do_not_face(tmp_path: Path) -> None:
                 'Physical Curve("strip_contact") = {bottom_lines[0], bottom_lines[#distances[] - 1]};',
                 "do not point at each other",
             ),
+            ('Physical Curve("strip_contact") = {strip_contact[], strip_ends[]};', "folds back on itself"),
             (tail + " Translate{0, 5, 0}{Surface{lower[], upper[]};}", "5 mm above"),
             (tail + " Symmetry{0, 1, 0, -100}{Surface{lower[], upper[], strip[]};}", "the punch lies below the strip"),
         ]

@@ -9,10 +9,11 @@ from collections.abc import Callable
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, load_case
+from fenwear import CaseError, assemble, load_case
 from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem
 from fenwear.assembly import needs as module
-from fenwear.assembly.needs import GIB, BodyNeeds, Needs, free_memory, needs
+from fenwear.assembly.needs import BodyNeeds, Needs, needs
+from fenwear.memory import GIB, free_memory
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
 
@@ -120,3 +121,10 @@ def test_what_each_rank_does(way: str, told: str) -> None:
     lines = shares_text(placed, needs_of(placed))
     assert [line.partition(":")[0] for line in lines] == ["punch", "strip"]
     assert all(re.search(told, line) for line in lines)
+
+
+def test_a_contact_too_large_is_refused_before_the_bodies_are_meshed() -> None:
+    """160,000 contact nodes: hundreds of GiB, told within seconds, where meshing alone takes minutes and gigabytes."""
+    case = load_case("ball-on-flat", ["geometry.parameters.across=200"])
+    with pytest.raises(CaseError, match=r"geometry: about 160,000 contact nodes take [56]\d\d\.\d GiB at least, but"):
+        assemble(case)

@@ -12,7 +12,6 @@ a half. Of many nodes as many fluxes last on any mesh, so that the time grows wi
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -21,9 +20,10 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.response import SURFACE_SHARE
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.prepare import MANY
+from fenwear.memory import GIB, free_memory, memory_size
 from fenwear.parallel import on_root
 
-NUMBER, GIB = 8, 2**30  # bytes
+NUMBER = 8  # bytes
 FACTORING = {2: 1e-8, 3: 8e-10}  # s over N^1.5 in a plane and N² in a solid
 ASSEMBLING = {2: 5e-6, 3: 8e-5}  # s over N
 SOLVING = 6.5e10  # operations a second of many sparse solutions at once, four for each entry of a factor
@@ -202,27 +202,6 @@ def check_memory(placed: Placed, wanted: Needs) -> None:
         times, less = found
         message += f"; elements {times:.2g} times as large would fit: {less.text()}"
     raise CaseError(InputError("geometry", message))
-
-
-def free_memory() -> float | None:
-    """Return the bytes that this process may still take; None where the system does not tell."""
-    found: list[float] = []
-    try:
-        lines = Path("/proc/meminfo").read_text("ascii").splitlines()
-        found += [1024.0 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable")]
-    except (OSError, ValueError, IndexError):
-        pass
-    try:  # the limit of a container
-        limit, used = (Path(f"/sys/fs/cgroup/memory.{name}").read_text("ascii").strip() for name in ("max", "current"))
-        found += [] if limit == "max" else [float(limit) - float(used)]
-    except (OSError, ValueError):
-        pass
-    return min(found) if found else None
-
-
-def memory_size(memory: float) -> str:
-    """Say so many bytes."""
-    return f"{memory / GIB:.1f} GiB" if memory > 0.1 * GIB else f"{memory / 2**20:.0f} MiB"
 
 
 def duration(seconds: float) -> str:

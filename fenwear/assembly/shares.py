@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fenwear.assembly.needs import BodyNeeds, Needs, duration, memory_size
+from fenwear.assembly.needs import BodyNeeds, Needs, duration
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import SPREAD, entries
 from fenwear.bodies.response import Request
+from fenwear.memory import memory_size
 
 DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular solutions of dense matrices
 

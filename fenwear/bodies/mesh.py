@@ -24,10 +24,13 @@ from fenwear.arrays import Array, Mask
 from fenwear.bodies.mesh_check import element_problems
 from fenwear.case import Geometry, Kind
 from fenwear.errors import CaseError, InputError, OutputError
+from fenwear.memory import free_memory, memory_size
 from fenwear.parallel import on_root
 
 BODIES = ("punch", "strip")
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
+TRIANGLE = 2  # gmsh's number of the cell
+MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, forces of three directions
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 
 
@@ -205,14 +208,39 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind) -> None:
     for name, value in geometry.parameters.items():
         gmsh.parser.setNumber(name, [value])
     _check_parameters(geometry, path)
+    too_large = ""
     try:
         _merge(gmsh, path)
         if path.suffix == ".geo":
-            gmsh.model.mesh.generate(_dim(kind))
-            gmsh.model.mesh.setOrder(geometry.order)
+            if kind == "solid":
+                gmsh.model.mesh.generate(2)
+                too_large = _too_large(gmsh, geometry)
+            if not too_large:
+                gmsh.model.mesh.generate(_dim(kind))
+                gmsh.model.mesh.setOrder(geometry.order)
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
+    if too_large:
+        raise CaseError(InputError("geometry", too_large))
     _check_groups(gmsh, path, kind)
+
+
+def _too_large(gmsh: Any, geometry: Geometry) -> str:
+    """Say that the contact of the meshed surfaces alone would not fit into memory, before the bodies are meshed."""
+    tag, free = _groups(gmsh, 2).get("punch_contact"), free_memory()
+    if tag is None or free is None:
+        return ""
+    nodes = 0.0
+    for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
+        for cell, cells in zip(*gmsh.model.mesh.getElements(2, entity)[:2], strict=True):
+            nodes += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**2)
+    least = MATRICES * 8 * nodes**2
+    if least <= free:
+        return ""
+    return (
+        f"about {nodes:,.0f} contact nodes take {memory_size(least)} at least, but {memory_size(free)} are free; "
+        f"elements {(least / free) ** 0.25:.2g} times as large at the contact might fit"
+    )
 
 
 def _merge(gmsh: Any, path: Path) -> None:

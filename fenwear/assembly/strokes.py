@@ -9,9 +9,7 @@ import numpy as np
 
 from fenwear.case import Case, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, InputError
-from fenwear.interface import (
-    ContactPair,
-)
+from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import Friction

@@ -60,4 +60,5 @@ class Progress:
 
     def _line(self, text: str) -> None:
         self.told = time.perf_counter()
-        print(text, file=sys.stderr, flush=True)
+        sys.stderr.write(f"{text}\n")  # at once: see cli.base
+        sys.stderr.flush()

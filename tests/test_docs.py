@@ -121,7 +121,14 @@ def _sessions(text: str) -> list[tuple[str, list[str]]]:
 
 
 def _compare(shown: list[str], printed: str, command: str) -> None:
-    """Check that the lines shown are printed in this order; without "..." between them one after the other."""
+    """Check that the lines shown are printed in this order; without "..." between them one after the other.
+
+    What comes through mpirun has no order: it may exchange what a process writes one after the other.
+    """
+    if "mpirun" in command:
+        for line in shown:
+            assert line == "..." or line in printed, f"{command} does not print:\n{line}\nbut:\n{printed}"
+        return
     lines = [line.rstrip() for line in printed.replace("\r", "\n").splitlines()]
     at, anywhere = 0, False
     for line in shown:

@@ -9,7 +9,7 @@ import typer
 
 from fenwear.case import builtin_cases
 from fenwear.cli import suggestions
-from fenwear.cli.base import JsonOption, app, print_json
+from fenwear.cli.base import JsonOption, app, print_json, show
 
 
 @app.command("info")
@@ -34,20 +34,20 @@ def info_command(
         if as_json:
             print_json({"keys": [asdict(k) for k in found]})
         else:
-            print("\n".join(k.text() for k in found))
+            show("\n".join(k.text() for k in found))
         return
     if as_json:
         print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})
         return
     for name, version in versions().items():
-        print(f"{name:14} {version}")
+        show(f"{name:14} {version}")
     state = kept.summary()
-    print(
+    show(
         f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}"
     )
-    print("\nbuilt-in cases:")
+    show("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
-        print(f"  {name:26} {title}")
+        show(f"  {name:26} {title}")
 
 
 @app.command("schema")

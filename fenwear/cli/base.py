@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 from mpi4py import MPI
@@ -45,7 +45,18 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object 
 
 def log(message: str) -> None:
     """Print to standard error; every rank but 0 has it closed."""
-    print(message, file=sys.stderr, flush=True)
+    _write(sys.stderr, message)
+
+
+def show(text: str) -> None:
+    """Print what was asked for to standard output."""
+    _write(sys.stdout, text)
+
+
+def _write(stream: TextIO, text: str) -> None:
+    """Write text and the end of its line at once: mpirun may exchange what it gets one after the other."""
+    stream.write(f"{text}\n")
+    stream.flush()
 
 
 def load(case: str, settings: list[str]) -> Case:
@@ -56,4 +67,4 @@ def load(case: str, settings: list[str]) -> Case:
 
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object in a line."""
-    print(json.dumps(data), flush=True)
+    show(json.dumps(data))

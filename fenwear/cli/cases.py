@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 import fenwear
 from fenwear.case import doubts
-from fenwear.cli.base import DEFAULT_CASE, CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json
+from fenwear.cli.base import DEFAULT_CASE, CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
@@ -25,7 +25,7 @@ def main(
 ) -> None:
     """Run the built-in Example 1 where no command is given."""
     if version:
-        print(f"fenwear {fenwear.__version__}")
+        show(f"fenwear {fenwear.__version__}")
     elif context.invoked_subcommand is None:
         run(DEFAULT_CASE)
 
@@ -60,7 +60,7 @@ def run(
         print_json(summary)
     else:
         if not quiet:
-            print(key_numbers_text(summary) if "energy_ratio" in summary else sheet_text(summary))
+            show(key_numbers_text(summary) if "energy_ratio" in summary else sheet_text(summary))
         say(f"results in {directory}")
 
 
@@ -80,7 +80,7 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         text = check_text(loaded)
         for warning in doubts(loaded):
             log(f"warning: {warning}")
-        print(loaded.to_toml())
+        show(loaded.to_toml())
         log(text)
         return
     placed = place_case(loaded)
@@ -93,7 +93,7 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
     for warning in warnings:
         log(f"warning: {warning}")
-    print(loaded.to_toml())
+    show(loaded.to_toml())
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
@@ -116,9 +116,9 @@ def new_command(
     from fenwear.case.templates import all_text, dimensions_text, write_case_of
 
     if template is None:
-        print(all_text())
+        show(all_text())
     elif list_dimensions:
-        print(dimensions_text(template))
+        show(dimensions_text(template))
     else:
         path = output or Path(f"{template}.toml")
         on_root(MPI.COMM_WORLD, lambda: write_case_of(template, path, settings))

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from mpi4py import MPI
 
-from fenwear.cli.base import JsonOption, SetOption, app, load, log, print_json
+from fenwear.cli.base import JsonOption, SetOption, app, load, log, print_json, show
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
@@ -28,7 +28,7 @@ def plot_command(
     look, endings = chosen_look(width, axis), chosen_formats(formats)
     paths = on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True, look=look, formats=endings))
     for path in paths:
-        print(path)
+        show(path)
 
 
 @app.command("export")
@@ -45,7 +45,7 @@ def export_command(
     from fenwear.results.export import export
 
     for path in on_root(MPI.COMM_WORLD, lambda: export(directory, output, at)):
-        print(path)
+        show(path)
 
 
 @app.command("compare")
@@ -80,7 +80,7 @@ def compare_command(
     if as_json:
         print_json(comparison.as_json())
     else:
-        print(comparison.text())
+        show(comparison.text())
     log(f"figure in {output}")
 
 

@@ -8,7 +8,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from fenwear.case import Case, doubts
-from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json
+from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
@@ -82,7 +82,7 @@ def _print_final(name: str, case: Case, *, as_json: bool, fresh: bool) -> None:
     if as_json:
         print_json(numbers)
     else:
-        print(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
+        show(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
 
 
 def _coordinates(system: Tribosystem) -> dict[str, Any]:
@@ -103,37 +103,37 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     from fenwear.results.degrees import degrees_of
     from fenwear.results.scar import conforming
 
-    print(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
+    show(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
     words, moves = system.direction_words, "turns" if any(system.sliding.field.turn) else "moves"
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
-        print(f"  strip {moves} {words[d]:9} largest pressure {p.max():8.3f} MPa, "
+        show(f"  strip {moves} {words[d]:9} largest pressure {p.max():8.3f} MPa, "
               f"contact {part.format(width)}")  # fmt: skip
     if conforming(system.pair):
-        print(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
+        show(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     scale = pressure_scale(system, state.phase_pressure)
-    print(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
-    print(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
+    show(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
+    show(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
     if state.passes:
         times = "once" if state.passes == 1 else f"{state.passes} times"
-        print(f"  properties of materials are those of these temperatures, taken anew {times}")
+        show(f"  properties of materials are those of these temperatures, taken anew {times}")
     if state.heat is not None:
         degrees = degrees_of(system.case)
         punch, strip = (degrees.of(body.max()) for body in (state.heat.punch, state.heat.strip))
         unit = degrees.shown
-        print(f"  largest temperature at the contact: punch {punch:.3f} {unit}, strip {strip:.3f} {unit}")
+        show(f"  largest temperature at the contact: punch {punch:.3f} {unit}, strip {strip:.3f} {unit}")
     sys.stdout.flush()
 
 
 def _print_way(rate: float, cycles: int | None, seconds: dict[str, float], in_all: float) -> None:
     """Print how the state is reached, and where the time went."""
     if rate > 0:
-        print(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
+        show(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
     elif cycles is None:
-        print("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
+        show("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
     else:
-        print(f"  pressure within 1 % of the pressure scale after about {cycles:,} cycles from the initial shape")
-    print(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
+        show(f"  pressure within 1 % of the pressure scale after about {cycles:,} cycles from the initial shape")
+    show(f"  {_duration(in_all)} in all: meshes and operators {_duration(seconds['setup'])}, "
           f"steady state {_duration(seconds['steady'])}, the way there {_duration(seconds['way_there'])}")  # fmt: skip
 
 
@@ -164,9 +164,9 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
         )
         return
     for name, state in found.items():
-        print(f"{name:9}  {_velocities(state.velocity, 's')}")
+        show(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):
             chi = math.degrees(state.tilt[end])
             names, place = system.case.model.axes[:-1], system.pair.punch.x[end]
             at = ", ".join(f"{axis} = {round(c, 9) + 0.0:g}" for axis, c in zip(names, place, strict=False))
-            print(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")
+            show(f"           p = {state.pressure[end]:.4f} MPa, chi = {chi:.2f}° at {at} mm")

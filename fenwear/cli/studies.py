@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json
+from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json, show
 from fenwear.errors import CaseError, InputError
 
 
@@ -27,7 +27,7 @@ def verify_command(
     if list_cases:
         for name, title in titles().items():
             if not only or name in only:
-                print(f"{name:24} {title}")
+                show(f"{name:24} {title}")
         return
     found, directory = verify(cases, paper, output, log if as_json else print)
     if as_json:
@@ -63,7 +63,7 @@ def sensitivity_command(
     if as_json:
         print_json(commands.as_json(found))
     else:
-        print("\n\n".join(one.text() for one in found))
+        show("\n\n".join(one.text() for one in found))
     log(f"results in {folder}")
 
 
@@ -100,7 +100,7 @@ def calibrate_command(
         if as_json:
             print_json(commands.each_as_json(tests, between))
         else:
-            print("\n".join([*(one.text() for one in tests), *between.text]))
+            show("\n".join([*(one.text() for one in tests), *between.text]))
         log(f"results in {folder}")
         return
     found, sample, folder = commands.run_calibrate(
@@ -109,7 +109,7 @@ def calibrate_command(
     if as_json:
         print_json(found.as_json())
     else:
-        print(found.text() if sample is None else f"{found.text()}\n{sample.text()}")
+        show(found.text() if sample is None else f"{found.text()}\n{sample.text()}")
     log(f"results in {folder}")
 
 
@@ -142,7 +142,7 @@ def life_command(
     if as_json:
         print_json(found.as_json())
     else:
-        print(found.text())
+        show(found.text())
     log(f"results in {folder}")
 
 
@@ -173,7 +173,7 @@ def sweep_command(
     if as_json:
         print_json(command.as_json(dataset))
     else:
-        print(command.text(dataset))
+        show(command.text(dataset))
     log(f"results in {folder}")
     if (dataset["trouble"].values != "").any():
         raise typer.Exit(3)

@@ -10,7 +10,18 @@ from mpi4py import MPI
 
 import fenwear
 from fenwear.case import doubts
-from fenwear.cli.base import DEFAULT_CASE, CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
+from fenwear.cli.base import (
+    DEFAULT_CASE,
+    CaseArgument,
+    FreshOption,
+    JsonOption,
+    SetOption,
+    app,
+    load,
+    log,
+    print_json,
+    show,
+)
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 

@@ -180,29 +180,29 @@ class CondensedContact:
             self._elastic = ManyNodes(self._blocks) if self._many and self._coupling is None else self._as_phases()
         return self._elastic
 
-    def _as_phases(self, border: tuple[Array, Array] | None = None) -> Phases:
+    def _as_phases(self, border: tuple[Array, Array] | None = None, local: Array | None = None) -> Phases:
         """Return the derivative by matrices of all nodes."""
         scale = self._pressure_scale / self._gap_scale
         dense = np.array([block.matrix() for block in self._blocks]) if self._many else self._dense
-        return Phases(dense, None if self._coupling is None else self._coupling * scale, border)
+        return Phases(dense, None if self._coupling is None else self._coupling * scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
         if self._layer is None:
             return self._linear
         m, n = self.shape
         pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._pressure_scale / self._gap_scale
-        slope = self._layer.local(pressure) if self._many and self._coupling is None else None
-        left: Array | None = None
+        left, slope = None, self._layer.local(pressure)
         if slope is None:
             left, slope = self._layer.border(pressure)
         last = self._operator
         if last is None or self._slope is None or not np.array_equal(slope, self._slope):
             self._slope = slope
-            if left is None:
-                before = last if isinstance(last, ManyNodes) else None
-                self._operator = ManyNodes(self._blocks, slope * scale, before)
+            if left is not None:
+                self._operator = self._as_phases(border=(left, slope * scale))
+            elif self._many and self._coupling is None:
+                self._operator = ManyNodes(self._blocks, slope * scale, last if isinstance(last, ManyNodes) else None)
             else:
-                self._operator = self._as_phases((left, slope * scale))
+                self._operator = self._as_phases(local=slope * scale)
         return self._operator or self._linear
 
     def solve(

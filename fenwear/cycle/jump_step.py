@@ -24,9 +24,9 @@ cycle, where those of a march come one after the other: they differ by the wear 
 explicit march does from an implicit one.
 
 A node that comes into contact within a step has f(y_1) = 0: all that it must lose to follow its neighbours
-it loses by g N f(y_2), and at the end it carries up to 1 / g = 3.4 times their pressure. So a jump in which nodes come into contact ends by one step of the implicit Euler method over a share of
-it, `LAST`, y_3 = y_2 + h f(y_3): in it such a node loses what its neighbours lose. Its share is larger than
-the few relaxation times of such a node wherever a jump is long beside them.
+it loses by g N f(y_2), and at the end it carries up to 1 / g = 3.4 times their pressure. So a jump in which
+nodes come into contact ends by one step of the implicit Euler method over a share of it, `LAST`:
+y_3 = y_2 + h f(y_3). In it such a node loses what its neighbours lose.
 """
 
 from __future__ import annotations

@@ -1,68 +1,139 @@
-"""The law of contact where a case leaves it open: stick where the bodies take up much of the stroke elastically."""
+"""The law of contact that a case leaves open: stick where the bodies take up much of the stroke elastically.
+
+The estimate needs the bodies condensed as gross sliding needs them: what is made for it is what then slides.
+"""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from mpi4py import MPI
 
-from fenwear.assembly import assemble
-from fenwear.case import Case, make_case
+from fenwear.assembly import Preparation, Tribosystem, assemble, with_exchange, with_reduced_heat
+from fenwear.assembly.bodies import Bodies
+from fenwear.case import Case
 from fenwear.case.laws import Stick
-from fenwear.errors import CaseError
-from fenwear.watch import TAKEN_UP, elastic_and_amplitude
+from fenwear.errors import CaseError, InputError
+from fenwear.watch import TAKEN_UP, elastic_share
 
+Law = Literal["gross-sliding", "coulomb"]
 Log = Callable[[str], None]
 
 
-def with_law(case: Case, log: Log, comm: MPI.Comm = MPI.COMM_WORLD) -> Case:
-    """Return the case with the law that its stroke calls for, where contact.law = "auto"; collective.
+@dataclass(frozen=True)
+class Choice:
+    """The law that contact.law = "auto" takes.
 
-    Both bodies are condensed for it as gross sliding needs them, and kept on disk where it is what is taken.
+    Attributes:
+        law: Which.
+        text: It, and why, in a line.
+        share: Of the amplitude that the bodies take up elastically, by an estimate; None where that plays no part.
+    """
+
+    law: Law
+    text: str
+    share: float | None = None
+
+
+@dataclass(frozen=True)
+class Decided:
+    """A case whose law is decided.
+
+    Attributes:
+        case: With the law.
+        system: Ready to slide; None where it is to stick.
+        bodies: That were built to find out; None where nothing had to be.
+        choice: Of "auto"; None where the law was given.
+    """
+
+    case: Case
+    system: Tribosystem | None
+    bodies: Bodies | None
+    choice: Choice | None
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """What the summary of a run says of it."""
+        share = None if self.choice is None else self.choice.share
+        if share is None and self.system is not None:
+            share = elastic_share(self.system)
+        return {"contact_law": self.case.contact.law, "elastic_share_of_stroke": share}
+
+
+def choose_law(system: Tribosystem) -> Choice:
+    """Return the law that the stroke of a system calls for; collective.
+
+    Stick where the bodies take up more than `watch.TAKEN_UP` of the amplitude elastically and nothing in the case
+    goes against it; gross sliding elsewhere.
+
+    Args:
+        system: Both bodies condensed, from a case.
+    """
+    share = system.comm.bcast(elastic_share(system))  # one number decides on all ranks
+    if share is None:
+        return Choice("gross-sliding", "contact.law: 'gross-sliding' is taken: the strip slides one way")
+    told = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"
+    if share <= TAKEN_UP:
+        return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {told}", share)
+    against = system.case.against_stick
+    if against:
+        return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken, though {told}: {against[0]}", share)
+    return Choice("coulomb", f"contact.law: 'coulomb' is taken: {told}", share)
+
+
+def decided(
+    case: Case, log: Log, comm: MPI.Comm = MPI.COMM_WORLD, *, heat: Preparation = "as set", fresh: bool = False
+) -> Decided:
+    """Return a case with its law, and its system where it slides; collective.
 
     Args:
         case: The problem.
-        log: Told which law is taken, and why.
+        log: Told which law is taken of "auto", and why.
         comm: The ranks.
+        heat: How that of a system is prepared: see `assembly.assemble`.
+        fresh: Condense the bodies again, even where they are kept on disk.
 
     Raises:
-        CaseError: the table stick is given in a case that does not go with stick; or what only the geometry can
-            tell is wrong.
+        CaseError: what only the geometry can tell is wrong.
     """
-    if case.contact.law != "auto":
-        return case
+    if case.contact.law == "coulomb":
+        return Decided(case, None, None, None)
+    if case.contact.law == "gross-sliding":
+        system = assemble(case, comm, heat=heat, fresh=fresh)
+        return Decided(case, system, system.bodies, None)
     if case.stick != Stick():
-        log("contact.law: 'coulomb' is taken, as the table stick is given")
-        return _set(case, "coulomb")
-    sliding = _set(case, "gross-sliding")
-    system = assemble(sliding, comm, heat="none")
-    if len(set(system.motion.directions)) == 1:
-        log("contact.law: 'gross-sliding' is taken: the strip slides one way")
-        return sliding
-    way, amplitude = elastic_and_amplitude(system)
-    share = (
-        f"the bodies follow friction elastically by an estimate {1e3 * way:.3g} µm each way, "
-        f"{100 * way / amplitude:.3g} % of the amplitude"
-    )
-    if way <= TAKEN_UP * amplitude:
-        log(f"contact.law: 'gross-sliding' is taken: {share}")
-        return sliding
-    try:
-        sticking = _set(case, "coulomb")
-    except CaseError as error:
-        log(f"contact.law: 'gross-sliding' is taken, as the case does not go with stick ({error.problems[0].key})")
-        return sliding
-    log(f"contact.law: 'coulomb' is taken: {share}")
-    return sticking
+        choice = Choice("coulomb", "contact.law: 'coulomb' is taken, as the table stick is given")
+        log(choice.text)
+        return Decided(with_law(case, choice.law), None, None, choice)
+    system = assemble(case, comm, heat="none", fresh=fresh)
+    choice = choose_law(system)
+    log(choice.text)
+    taken = with_law(case, choice.law)
+    if choice.law == "coulomb":
+        return Decided(taken, None, system.bodies, choice)
+    system = replace(system, made_from=taken)
+    if heat != "none":
+        prepare = with_reduced_heat if heat == "reduced" else with_exchange
+        system = prepare(system, keep=True, fresh=fresh)
+    return Decided(taken, system, system.bodies, choice)
 
 
-def _set(case: Case, law: str) -> Case:
-    """Return the case with a law.
+def with_law(case: Case, law: Law) -> Case:
+    """Return the case with a law that goes with it."""
+    return case.model_copy(update={"contact": case.contact.model_copy(update={"law": law})})
+
+
+def check_slides(system: Tribosystem) -> None:
+    """Make sure that a case of what follows gross sliding alone does not call for stick; collective.
 
     Raises:
-        CaseError: they do not go together.
+        CaseError: it leaves its law open, and stick is what it calls for.
     """
-    tables = tomllib.loads(case.to_toml())
-    tables.setdefault("contact", {})["law"] = law
-    return make_case(tables, case.folder)
+    if system.case.contact.law != "auto":
+        return
+    choice = choose_law(system)
+    if choice.law == "coulomb":
+        message = f"{choice.text.removeprefix('contact.law: ')}, and stick is not followed here; set 'gross-sliding'"
+        raise CaseError(InputError("contact.law", f"{message} to leave it out"))

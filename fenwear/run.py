@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
-from fenwear.law import with_law
+from fenwear.law import decided
 from fenwear.parallel import on_root
 from fenwear.progress import LOOK, How, Log, Progress
 from fenwear.results import checkpoint
@@ -34,7 +35,9 @@ from fenwear.results.history import (
 )
 from fenwear.results.summary import summarise
 from fenwear.signals import Signals
-from fenwear.stick.run import run_stick
+from fenwear.stick import checkpoint as stick_checkpoint
+from fenwear.stick.run import check_touching, run_stick
+from fenwear.stick.setup import make_rig
 from fenwear.watch import Watch, stroke_warnings
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
@@ -76,36 +79,49 @@ def run_case(
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    case = with_law(case, log, comm)
-    if case.contact.law == "coulomb":
-        return run_stick(case, name, output, log, resume=resume, progress=progress, comm=comm, last=last, fresh=fresh)
     begin = time.perf_counter()
-    system = assemble(case, comm, heat=preparation_of(case), fresh=fresh)
+    found = decided(case, log, comm, heat=preparation_of(case), fresh=fresh)
+    drive: Callable[..., dict[str, Any]]
+    touching: Callable[[], None]
+    if found.system is None:
+        rig = make_rig(found.case, comm, fresh=fresh, bodies=found.bodies)
+        touching, drive = partial(check_touching, rig), partial(run_stick, rig, found.case)
+        unit, reached = "cycle", stick_checkpoint.reached
+    else:
+        touching, drive = found.system.check_touching, partial(_run, found.system)
+        unit, reached = "half-cycle", checkpoint.reached
     if not resume:
-        system.check_touching()
-    setup = time.perf_counter() - begin
+        touching()
+    how = {"setup_seconds": time.perf_counter() - begin, **found.numbers}
     directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
     try:
-        signals = Signals(comm, last=last)
-        return _run(system, directory, log, progress, setup, signals, resume=resume), directory
+        return drive(directory, log, progress, how, Signals(comm, last=last), resume=resume), directory
     except OutputError as error:
-        raise OutputError(error.path, error.reason, on_root(comm, lambda: _way_on(directory))) from error
+        way_on = on_root(comm, lambda: _way_on(reached(directory), unit))
+        raise OutputError(error.path, error.reason, way_on) from error
 
 
 def _run(
-    system: Tribosystem, directory: Path, log: Log, progress: How, setup: float, noted: Signals, *, resume: bool
+    system: Tribosystem,
+    directory: Path,
+    log: Log,
+    progress: How,
+    how: Mapping[str, Any],
+    noted: Signals,
+    *,
+    resume: bool,
 ) -> dict[str, Any]:
     run = _Run(system, directory, log, resume=resume)
     failure: Exception | None = None
     begin = time.perf_counter()
 
     def finish() -> dict[str, Any]:
-        times = {"setup_seconds": setup, "half_cycles_seconds": time.perf_counter() - begin}
         # Who interrupts a run is in a hurry: its figures can be drawn later.
         report = system.case.output.report and not isinstance(failure, InterruptedRunError)
         warnings = [*run.warnings, *run.watch.warnings()]
-        how = {"stop": run.stop(failure), **times, "warnings": warnings, "retries": run.remedies}
-        return run.finish(how, report=report)
+        seconds = time.perf_counter() - begin
+        ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
+        return run.finish({**ended, "warnings": warnings, "retries": run.remedies}, report=report)
 
     with noted as signals:
         try:
@@ -127,12 +143,11 @@ def preparation_of(case: Case) -> Preparation:
     return "reduced" if case.run.integration == "jump" else "as set"
 
 
-def _way_on(directory: Path) -> str:
-    """Say how to go on after a fault of the disk."""
-    reached = checkpoint.reached(directory)
+def _way_on(reached: int | None, unit: str) -> str:
+    """Say how to go on after a fault of the disk, from a checkpoint of this cycle or half-cycle."""
     if reached is None:
         return "there is no checkpoint to go on from: mend the cause, then start anew in a new folder"
-    return f"mend the cause, then go on from the checkpoint of half-cycle {reached}: --resume"
+    return f"mend the cause, then go on from the checkpoint of {unit} {reached}: --resume"
 
 
 class _Run:

@@ -1,4 +1,4 @@
-"""The law of contact where a case leaves it open."""
+"""The law of contact that a case leaves open."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from fenwear import CaseError, load_case
-from fenwear.law import with_law
+from fenwear.assembly import assemble
+from fenwear.law import check_slides, decided
 from fenwear.run import run_case
+from fenwear.sweeps.evaluate import Workshop
+from fenwear.watch import stroke_warnings
 
 SMALL = (
     "contact.law='auto'",
@@ -17,43 +20,96 @@ SMALL = (
     "geometry.follow_wear='never'",
     "motion.positions=2",
 )
+WIDE = "geometry.parameters.overlap='0.6 mm'"
+ONE_WAY = "motion={kind='one-way', speed='1 mm/s', direction='leftward', duration='1 s'}"
 
 
 @pytest.mark.parametrize(
     ("settings", "law", "reason"),
     [
-        (("motion.amplitude='3 um'",), "coulomb", "% of the amplitude"),
-        (("motion.amplitude='300 um'", "geometry.parameters.overlap='0.6 mm'"), "gross-sliding", "% of the amplitude"),
+        (("motion.amplitude='3 um'",), "coulomb", "% of the stroke"),
+        (("motion.amplitude='300 um'", WIDE), "gross-sliding", "% of the stroke"),
         (("motion.amplitude='3 um'", "run.integration='implicit'"), "gross-sliding", "run.integration"),
         (("motion.amplitude='300 um'", "stick.force='60 N'"), "coulomb", "table stick"),
+        ((ONE_WAY, "wear={punch={coefficient=1e-8}}"), "gross-sliding", "one way"),
     ],
 )
 def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) -> None:
     """Against the way that the bodies follow friction; what does not go with stick slides, and is told."""
     told: list[str] = []
     case = load_case("fretting-partial-slip", [*SMALL, *settings])
-    found = with_law(case, told.append)
-    assert found.contact.law == law
-    assert found.folder == case.folder
-    assert found.materials == case.materials
+    found = decided(case, told.append)
+    assert found.case.contact.law == found.numbers["contact_law"] == law
+    assert (found.system is None) == (law == "coulomb")
+    assert found.case.folder == case.folder
+    assert found.case.materials == case.materials
     assert len(told) == 1
     assert f"'{law}' is taken" in told[0]
     assert reason in told[0]
+    if reason == "run.integration":
+        assert found.system is not None
+        assert "cannot be followed here: run.integration" in stroke_warnings(found.system)[0]
+
+
+def test_the_estimate_decides_where_it_says() -> None:
+    """The way that is taken up is of the bodies alone, and the law changes where its share passes a tenth."""
+    ways, laws = [], []
+    for amplitude in (12.0, 48.0):
+        found = decided(load_case("fretting-partial-slip", [*SMALL, WIDE, f"motion.amplitude='{amplitude} um'"]), str)
+        share = found.numbers["elastic_share_of_stroke"]
+        ways.append(share * amplitude)
+        laws.append(found.case.contact.law)
+        assert (share > 0.1) == (laws[-1] == "coulomb")
+    assert laws == ["coulomb", "gross-sliding"]
+    assert ways == pytest.approx([ways[0]] * 2, rel=1e-9)
 
 
 def test_a_law_that_is_given_stays() -> None:
     """Without a word; a table stick that does not go with the case is an error."""
-    case = load_case("example1")
-    assert with_law(case, pytest.fail) is case
+    case = load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'", "stick={}"])
+    assert decided(case, pytest.fail).case is case
     with pytest.raises(CaseError, match=r"run\.integration: expected 'explicit' or 'jump'"):
         load_case("fretting-partial-slip", [*SMALL, "stick.force='60 N'", "run.integration='implicit'"])
+    with pytest.raises(CaseError, match=r"wear\.strip\.coefficient: expected a constant with contact\.law = 'coulomb'"):
+        load_case("fretting-partial-slip", ["wear.strip={coefficient={expression='1e-8 * p'}}"])
+
+
+def test_what_knows_gross_sliding_alone_says_so() -> None:
+    """Sweeps and lives are no results of a law that the case does not call for; the law given, they are."""
+    case = load_case("fretting-partial-slip", [*SMALL, "motion.amplitude='3 um'"])
+    with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken: .* set 'gross-sliding' to leave it out"):
+        Workshop().values(case, "steady")
+    with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken"):
+        check_slides(assemble(case))
+    check_slides(assemble(load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'"])))
 
 
 def test_a_run_tells_its_law(tmp_path: Path) -> None:
-    """The case in its folder has the one that was taken."""
+    """The case in its folder has the one that was taken, the summary besides why; it goes on with the same one."""
     told: list[str] = []
-    case = load_case("fretting-partial-slip", [*SMALL, "run.half_cycles=2", "stick.steps=4", "output.report=false"])
-    run_case(case, "auto", tmp_path / "out", told.append, progress="none")
+    settings = [*SMALL, "run.half_cycles=2", "stick.steps=4", "output.report=false"]
+    settings[0] = "contact={law='auto', friction=0.9}"
+    case = load_case("fretting-partial-slip", settings)
+    out = tmp_path / "out"
+    run_case(case, "auto", out, told.append, progress="none")
     assert any("'coulomb' is taken" in text for text in told)
-    assert 'law = "coulomb"' in (tmp_path / "out" / "case.toml").read_text("utf-8")
-    assert json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["energy_ratio"] > 0
+    assert 'law = "coulomb"' in (out / "case.toml").read_text("utf-8")
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    assert summary["energy_ratio"] > 0
+    assert summary["contact_law"] == "coulomb"
+
+
+def test_a_slide_tells_its_law_and_goes_on(tmp_path: Path) -> None:
+    """The estimate is in the log, the summary, and the run goes on from its checkpoint by the case or its folder's."""
+    told: list[str] = []
+    settings = ["geometry.parameters.elements_along_contact=8", "run.half_cycles=2", "output.report=false"]
+    out = tmp_path / "out"
+    run_case(load_case("example1", settings), "auto", out, told.append, progress="none")
+    assert any("'gross-sliding' is taken: the bodies take up about 1" in text for text in told)
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    assert summary["contact_law"] == "gross-sliding"
+    assert summary["elastic_share_of_stroke"] == pytest.approx(0.012, rel=0.2)
+    for case, half_cycles in (("example1", 4), (str(out / "case.toml"), 6)):
+        farther = load_case(case, [*settings, f"run.half_cycles={half_cycles}"])
+        done, _ = run_case(farther, "auto", out, told.append, resume=True, progress="none")
+        assert done["half_cycles"] == half_cycles

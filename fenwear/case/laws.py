@@ -133,9 +133,10 @@ class Contact(Part):
     """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
 
     law: Literal["gross-sliding", "coulomb", "auto"] = Field(
-        default="gross-sliding",
+        default="auto",
         description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
-        "as in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically",
+        "as in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically and "
+        "nothing goes against it, else gross-sliding",
     )
     friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
         default=0.0, description="mu"

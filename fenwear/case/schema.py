@@ -162,7 +162,7 @@ class Case(Part):
         least = 1 if one_way else 2
         if self.run.integration == "jump" and self.run.half_cycles < least:
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
-        if self.wear.strip is not None and self.passes and self.contact.law != "coulomb":
+        if self.wear.strip is not None and self.passes and not self.sticks:
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
@@ -240,11 +240,19 @@ class Case(Part):
         return []
 
     def _stick_problems(self) -> list[str]:
-        """Return what does not go with contact with stick."""
+        """Return what does not go with contact with stick, where the case has that."""
         if self.contact.law == "gross-sliding":
             return [] if self.stick == Stick() else ["stick: expected with contact.law = 'coulomb' only"]
-        if self.contact.law == "auto" and self.stick == Stick():
-            return []
+        return [f"{problem} with contact.law = 'coulomb'" for problem in self.against_stick] if self.sticks else []
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the contact is one with stick, without a look at the bodies."""
+        return self.contact.law == "coulomb" or (self.contact.law == "auto" and self.stick != Stick())
+
+    @property
+    def against_stick(self) -> list[str]:
+        """What does not go with contact with stick: a key and what it expects, each."""
         wrong = {
             "contact.friction: expected a constant": isinstance(self.contact.friction, Dependence),
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
@@ -253,6 +261,7 @@ class Case(Part):
             "heat.track: expected none": self.heat is not None and self.heat.track is not None,
             "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
+            "materials: expected properties that do not depend on the temperature": self.warming,
             "program: expected none": self.program is not None,
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes,
@@ -260,8 +269,13 @@ class Case(Part):
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)
             ),
+            **{
+                f"wear.{body}.coefficient: expected a constant": isinstance(law.coefficient, Dependence)
+                for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip))
+                if law is not None
+            },
         }
-        return [f"{problem} with contact.law = 'coulomb'" for problem, so in wrong.items() if so]
+        return [problem for problem, so in wrong.items() if so]
 
     @property
     def varies(self) -> bool:
@@ -333,7 +347,7 @@ class Case(Part):
                 del data["heat"]["convecting_faces"]
             if data["motion"].get("along") is not None:
                 del data["motion"]["axis"]
-        if self.contact.law == "gross-sliding":
+        if not self.sticks:
             del data["stick"]
         return tomli_w.dumps(data)
 

@@ -42,9 +42,7 @@ def info_command(
     for name, version in versions().items():
         show(f"{name:14} {version}")
     state = kept.summary()
-    show(
-        f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}"
-    )
+    show(f"\nkept set-ups: {state['files']} files, {state['MiB']:g} of {state['limit_MiB']:g} MiB in {state['folder']}")
     show("\nbuilt-in cases:")
     for name, title in builtin_cases().items():
         show(f"  {name:26} {title}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,12 +10,24 @@ import typer
 from mpi4py import MPI
 
 import fenwear
-from fenwear.case import doubts
-from fenwear.cli.base import DEFAULT_CASE, CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
+from fenwear.case import Case, doubts
+from fenwear.cli.base import (
+    DEFAULT_CASE,
+    CaseArgument,
+    FreshOption,
+    JsonOption,
+    SetOption,
+    app,
+    load,
+    log,
+    print_json,
+    show,
+)
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
 if TYPE_CHECKING:
+    from fenwear.assembly import Bodies
     from fenwear.progress import How
 
 
@@ -69,25 +82,27 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     """Validate a case with its geometry and print it with all defaults."""
     from fenwear.assembly import elastic, needs_of, place_case, shares_text
     from fenwear.cycle import stability_number
-    from fenwear.law import with_law
+    from fenwear.law import choose_law, with_law
     from fenwear.run import position_warnings
     from fenwear.watch import initial_warnings
 
-    loaded = with_law(load(case, settings), log)
-    if loaded.contact.law == "coulomb":
-        from fenwear.stick.command import check_text
-
-        text = check_text(loaded)
-        for warning in doubts(loaded):
-            log(f"warning: {warning}")
-        show(loaded.to_toml())
-        log(text)
+    loaded = load(case, settings)
+    if loaded.sticks:
+        _check_stick(with_law(loaded, "coulomb"))
         return
     placed = place_case(loaded)
     wanted = needs_of(placed)
     for line in (wanted.text(), *shares_text(placed, wanted)):
         log(line)
     system = elastic(placed)
+    if loaded.contact.law == "auto":
+        choice = choose_law(system)
+        log(choice.text)
+        loaded = with_law(loaded, choice.law)
+        if choice.law == "coulomb":
+            _check_stick(loaded, system.bodies)
+            return
+        system = replace(system, made_from=loaded)
     number = stability_number(system)
     system.check_touching()
     warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
@@ -97,6 +112,17 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
+
+
+def _check_stick(case: Case, bodies: Bodies | None = None) -> None:
+    """Print a case with stick with all defaults, and what its first cycle comes to."""
+    from fenwear.stick.command import check_text
+
+    text = check_text(case, bodies)
+    for warning in doubts(case):
+        log(f"warning: {warning}")
+    show(case.to_toml())
+    log(text)
 
 
 @app.command("new")

@@ -28,7 +28,7 @@ def plot_command(
     look, endings = chosen_look(width, axis), chosen_formats(formats)
     paths = on_root(MPI.COMM_WORLD, lambda: write_report(directory, log, complete=True, look=look, formats=endings))
     for path in paths:
-        show(path)
+        show(str(path))
 
 
 @app.command("export")
@@ -45,7 +45,7 @@ def export_command(
     from fenwear.results.export import export
 
     for path in on_root(MPI.COMM_WORLD, lambda: export(directory, output, at)):
-        show(path)
+        show(str(path))
 
 
 @app.command("compare")

@@ -7,12 +7,13 @@ import sys
 import time
 from typing import TYPE_CHECKING, Any
 
-from fenwear.case import Case, doubts
+from fenwear.case import doubts
 from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
     from fenwear.cycle import Steady
+    from fenwear.law import Decided
 
 
 @app.command("steady")
@@ -23,18 +24,17 @@ def steady_command(
     as_json: JsonOption = False,
 ) -> None:
     """Solve for the cyclic steady state directly."""
-    from fenwear.assembly import assemble
     from fenwear.cycle import cycles_to_reach, growth_rate, steady
-    from fenwear.law import with_law
+    from fenwear.law import decided
     from fenwear.results.degrees import degrees_of
     from fenwear.watch import steady_warnings
 
     begin = time.perf_counter()
-    loaded = with_law(load(case, settings), log)
-    if loaded.contact.law == "coulomb":
-        _print_final(case, loaded, as_json=as_json, fresh=fresh)
+    lawful = decided(load(case, settings), log, heat="reduced", fresh=fresh)
+    loaded, system = lawful.case, lawful.system
+    if system is None:
+        _print_final(case, lawful, as_json=as_json, fresh=fresh)
         return
-    system = assemble(loaded, heat="reduced", fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
     found = state.system
@@ -74,11 +74,11 @@ def steady_command(
     )
 
 
-def _print_final(name: str, case: Case, *, as_json: bool, fresh: bool) -> None:
+def _print_final(name: str, lawful: Decided, *, as_json: bool, fresh: bool) -> None:
     """Print the shape to which partial slip wears."""
     from fenwear.stick.command import final_of, final_text
 
-    _, numbers = final_of(case, fresh=fresh)
+    _, numbers = final_of(lawful.case, fresh=fresh, bodies=lawful.bodies)
     if as_json:
         print_json(numbers)
     else:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgetrf, dgetrs
 from scipy.sparse import coo_array, csc_array, csr_array
@@ -252,22 +251,32 @@ def eliminate(matrix: Array) -> Solve:
 
 
 class Phases:
-    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + L_k R_j.
+    """The blocks of the phases of a cycle, and what they meet in: diag(A_k) + C_kj + diag(d_j) + L_k R_j.
 
     Args:
         blocks: A_k (m, size, size).
         coupling: C (m, n, m, n) on the first n unknowns of each block; None where there is none.
         border: L (m, n, q) and R (m, q, n), on the same; None where there is none.
+        local: d (m, n), in place of a border: what each unknown of phase j adds to its own place in all phases.
     """
 
-    def __init__(self, blocks: Array, coupling: Array | None = None, border: tuple[Array, Array] | None = None) -> None:
+    def __init__(
+        self,
+        blocks: Array,
+        coupling: Array | None = None,
+        border: tuple[Array, Array] | None = None,
+        local: Array | None = None,
+    ) -> None:
         m, size, _ = blocks.shape
         self.blocks, self.border = blocks, border
         self._whole: Dense | None = None
-        if m == 1 and coupling is None and border is None:
+        if m == 1 and coupling is None and border is None and local is None:
             self._whole = Dense(blocks[0])
         elif m == 1 or coupling is not None or m * size <= DENSE:
-            self._whole = Dense(_whole(blocks, coupling, border))
+            self._whole = Dense(_whole(blocks, coupling, border, local))
+        elif local is not None:
+            unit, n = np.eye(local.shape[1]), local.shape[1]
+            self.border = np.broadcast_to(unit, (m, n, n)), unit * local[:, None, :]
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (m size,)."""
@@ -321,11 +330,13 @@ class Phases:
         return solve
 
 
-def _whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None) -> Array:
+def _whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | None, local: Array | None) -> Array:
     """Return the matrix as one (m size, m size)."""
     m, size, _ = blocks.shape
-    matrix: Array = blocks[0].copy() if m == 1 else scipy.linalg.block_diag(*blocks)
+    matrix: Array = np.zeros((m * size, m * size))
     view = matrix.reshape(m, size, m, size)
+    for k, block in enumerate(blocks):
+        view[k, :, k, :] = block
     if coupling is not None:
         n = coupling.shape[1]
         view[:, :n, :, :n] += coupling
@@ -335,4 +346,7 @@ def _whole(blocks: Array, coupling: Array | None, border: tuple[Array, Array] | 
         for k, left in enumerate(lefts):
             for j in range(m):
                 view[k, :n, j, :n] += left @ right[j]
+    if local is not None:
+        nodes = np.arange(local.shape[1])
+        view[:, nodes, :, nodes] += local.T[:, None, :]
     return matrix

@@ -19,6 +19,7 @@ from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, 
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.cycle.state import RunState, beginning, joined
 from fenwear.errors import CaseError, InputError
+from fenwear.law import check_slides
 from fenwear.life.keys import with_values
 
 BODIES = ("punch", "strip")
@@ -127,7 +128,7 @@ class Model:
         """Return the assembled problem with keys at these values; what does not change is shared.
 
         Raises:
-            CaseError: a value is not possible.
+            CaseError: a value is not possible, or the case calls for stick.
         """
         base = self._base(tuple(settings))
         if not values:
@@ -144,6 +145,7 @@ class Model:
             first = next(iter(self._bases.values()), None)
             case = with_values(self.case, {}, settings)
             base = assemble(case, MPI.COMM_SELF, heat="reduced") if first is None else with_case(first, case)
+            check_slides(base)
             self._bases[settings] = base
         return self._bases[settings]
 

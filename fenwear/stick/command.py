@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fenwear.assembly import Bodies
 from fenwear.case import Case
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
@@ -16,14 +17,18 @@ from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
 
 
-def check_text(case: Case) -> str:
+def check_text(case: Case, bodies: Bodies | None = None) -> str:
     """Return what a case with stick comes to in its first cycle; collective.
+
+    Args:
+        case: With contact.law = "coulomb".
+        bodies: Of the case, where they are built already.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: a time step did not converge.
     """
-    rig = make_rig(case)
+    rig = make_rig(case, bodies=bodies)
     check_touching(rig)
     rig, fineness = fine_enough(rig, case)
     records = Records.joined(rig.cycle(rig.beginning())[1])
@@ -42,14 +47,19 @@ def check_text(case: Case) -> str:
     )
 
 
-def final_of(case: Case, *, fresh: bool = False) -> tuple[FinalShape, dict[str, Any]]:
+def final_of(case: Case, *, fresh: bool = False, bodies: Bodies | None = None) -> tuple[FinalShape, dict[str, Any]]:
     """Return the final shape of a case's partial slip, and its key numbers; collective.
+
+    Args:
+        case: With contact.law = "coulomb".
+        fresh: Condense the bodies again, even where they are kept on disk.
+        bodies: Of the case, where they are built already.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
-    rig = make_rig(case, fresh=fresh)
+    rig = make_rig(case, fresh=fresh, bodies=bodies)
     check_touching(rig)
     found = final_shape(rig)
     solid = case.model.kind == "solid"

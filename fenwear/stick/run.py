@@ -3,85 +3,63 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
-from mpi4py import MPI
 
 from fenwear.case import Case, doubts
-from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, OutputError
+from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError
 from fenwear.parallel import on_root
 from fenwear.progress import LOOK, How, Log, Progress
 from fenwear.report.stick import write_stick_report
-from fenwear.results.history import HISTORY, free_directory, make_directory, write_case, write_summary
+from fenwear.results.history import HISTORY, make_directory, write_case, write_summary
 from fenwear.signals import Signals
 from fenwear.stick import checkpoint
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.fineness import Fineness, fine_enough
+from fenwear.stick.interface import meshed
 from fenwear.stick.jump import Cycle, jump, march
 from fenwear.stick.results import dataset, row_of, summary_of
-from fenwear.stick.setup import make_rig, reaches_border
+from fenwear.stick.setup import reaches_border
 from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
 
 
 def run_stick(
+    rig: Rig,
     case: Case,
-    name: str,
-    output: Path | None,
+    directory: Path,
     log: Log,
+    progress: How,
+    how: Mapping[str, Any],
+    signals: Signals,
     *,
-    resume: bool = False,
-    progress: How = "bar",
-    comm: MPI.Comm = MPI.COMM_WORLD,
-    last: bool = False,
-    fresh: bool = False,
-) -> tuple[dict[str, Any], Path]:
-    """Run a case with contact.law = "coulomb" and write its results; collective.
+    resume: bool,
+) -> dict[str, Any]:
+    """Drive the bodies of a case with stick over its cycles, write its results and return the summary; collective.
 
     Args:
+        rig: The bodies.
         case: The problem.
-        name: Names the folder results/NAME where `output` is None.
-        output: New folder of the results, or with `resume` the folder of the run to go on with.
+        directory: New folder of the results, or with `resume` the folder of the run to go on with.
         log: Called with each message.
-        resume: Go on from the checkpoint in `output`.
         progress: A bar where standard error is a terminal, a line now and then, or none.
-        comm: The ranks.
-        last: Whether the process ends after a run that a signal has ended: see `signals.Signals`.
-        fresh: Condense the bodies again, even where they are kept on disk.
-
-    Returns:
-        The summary and the folder.
+        how: What the summary says besides of how the run went.
+        signals: That end it.
+        resume: Go on from the checkpoint in the folder.
 
     Raises:
-        CaseError: the case, its geometry or its checkpoint is wrong, or the folder cannot be made.
+        CaseError: the checkpoint is wrong, or the folder cannot be made.
         ConvergenceError: a time step failed; the results up to it are in the folder.
         InterruptedRunError: a signal ended the run; it can be resumed.
         OutputError: a file cannot be written; what was written before it is whole.
     """
-    begin = time.perf_counter()
-    rig = make_rig(case, comm, fresh=fresh)
-    if not resume:
-        check_touching(rig)
-    setup = time.perf_counter() - begin
-    directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
-    try:
-        with Signals(comm, last=last) as signals:
-            run = _Run(rig, case, directory, log, comm, signals, progress, resume=resume)
-            return run.all_cycles(setup), directory
-    except OutputError as error:
-        raise OutputError(error.path, error.reason, on_root(comm, lambda: _way_on(directory))) from error
-
-
-def _way_on(directory: Path) -> str:
-    """Say how to go on after a fault of the disk."""
-    reached = checkpoint.reached(directory)
-    if reached is None:
-        return "there is no checkpoint to go on from: mend the cause, then start anew in a new folder"
-    return f"mend the cause, then go on from the checkpoint of cycle {reached}: --resume"
+    with signals:
+        run = _Run(rig, case, directory, log, signals, progress, resume=resume)
+        return run.all_cycles(how)
 
 
 class _Run:
@@ -93,13 +71,13 @@ class _Run:
         case: Case,
         directory: Path,
         log: Log,
-        comm: MPI.Comm,
         signals: Signals,
         progress: How,
         *,
         resume: bool,
     ) -> None:
-        self.case, self.directory, self.log, self.comm, self.signals = case, directory, log, comm, signals
+        self.case, self.directory, self.log, self.signals = case, directory, log, signals
+        self.comm = comm = meshed(rig.interface).bodies.comm
         self.cycles = max(case.run.half_cycles // rig.program.half_cycles, 1)
         self.jumps = case.run.integration == "jump"
         self.rig, self.resume = rig.watched(self._watch), resume
@@ -127,7 +105,7 @@ class _Run:
         """Cycles whose wear is in the state to go on from."""
         return 0 if self.last is None else self.last.number + (not self.jumps)
 
-    def all_cycles(self, setup: float) -> dict[str, Any]:
+    def all_cycles(self, how: Mapping[str, Any]) -> dict[str, Any]:
         """Compute all cycles and return the summary; collective."""
         begin, fineness = time.perf_counter(), None
         failure: ConvergenceError | InterruptedRunError | None = None
@@ -145,11 +123,11 @@ class _Run:
         warnings = [*doubts(self.case), *_warnings(self.rig, self.last, fineness)]
         for warning in warnings:
             self.log(f"warning: {warning}")
-        times = {"setup_seconds": setup, "cycles_seconds": time.perf_counter() - begin}
+        found = {**how, "cycles_seconds": time.perf_counter() - begin, "warnings": warnings}
         stop = "all cycles done" if failure is None else str(failure)
         # Who interrupts a run is in a hurry: its figures can be drawn later.
         report = self.case.output.report and not isinstance(failure, InterruptedRunError)
-        summary = on_root(self.comm, lambda: self._finish({"stop": stop, **times, "warnings": warnings}, report=report))
+        summary = on_root(self.comm, lambda: self._finish({"stop": stop, **found}, report=report))
         if failure is not None:
             so_far = f"the results up to cycle {self.last.number} are in {self.directory}, to go on: --resume"
             raise type(failure)(f"{failure}\n{so_far}") from failure

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import build_bodies, make_sliding
+from fenwear.assembly import Bodies, build_bodies, make_sliding
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
@@ -18,7 +18,14 @@ from fenwear.stick.program import far_enough, make_program
 from fenwear.stick.wear import local_wear
 
 
-def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None = None, fresh: bool = False) -> Rig:
+def make_rig(
+    case: Case,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    steps: int | None = None,
+    fresh: bool = False,
+    bodies: Bodies | None = None,
+) -> Rig:
     """Return the bodies of a case with what is done to them; collective.
 
     The condensed bodies and the bases of their temperatures are kept on disk for the next time.
@@ -28,13 +35,14 @@ def make_rig(case: Case, comm: MPI.Comm = MPI.COMM_WORLD, *, steps: int | None =
         comm: The ranks.
         steps: Of a half-cycle, in place of the case's.
         fresh: Condense the bodies again, even where they are kept.
+        bodies: Of the case, where they are built already.
 
     Raises:
         CaseError: it is a case of gross sliding, or what only the geometry can tell is wrong.
     """
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
-    bodies, sliding = build_bodies(case, comm), make_sliding(case)
+    bodies, sliding = bodies or build_bodies(case, comm), make_sliding(case)
     moves = _moves(case, bodies.punch.surface)
     interface = StickInterface(bodies, sliding, case, moves=moves, keep=True, fresh=fresh)
     middle = interface.middle

@@ -16,6 +16,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block, follow, jump, march, steady
 from fenwear.cycle.state import RunState, joined
 from fenwear.errors import ConvergenceError
+from fenwear.law import check_slides
 from fenwear.sweeps.plan import Of, preparation_for
 
 Values = Mapping[str, NDArray[np.float64]]
@@ -94,6 +95,8 @@ class Workshop:
             FenwearError: as the assembly of the case and its solution.
         """
         system = self._assembled(case, preparation_for(case, of))
+        if of != "optimum":
+            check_slides(system)
         return {**_nodes(system), **COMPUTED[of](system)}
 
     def _assembled(self, case: Case, heat: Preparation) -> Tribosystem:

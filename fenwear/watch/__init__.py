@@ -8,12 +8,12 @@ states    a run's blocks, the first contact and the steady state: clipped, too h
 """
 
 from fenwear.watch.states import Watch, hot, initial_warnings, pressed, steady_warnings
-from fenwear.watch.stroke import TAKEN_UP, elastic_and_amplitude, elastic_way, stroke_warnings
+from fenwear.watch.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_warnings
 
 __all__ = [
     "TAKEN_UP",
     "Watch",
-    "elastic_and_amplitude",
+    "elastic_share",
     "elastic_way",
     "hot",
     "initial_warnings",

@@ -21,7 +21,7 @@ def elastic_way(system: Tribosystem) -> float:
         return 0.0
     weights = system.pair.weights
     pressure = np.full(len(weights), system.rigid.mean_pressure)
-    pressed_in = float(weights @ (system.interface.compliance(0.0) @ pressure) / weights.sum())
+    pressed_in = float(weights @ system.interface.opened(0.0, pressure) / weights.sum())
     ratio = float(weights @ np.linalg.norm(system.friction_ratio(1), axis=1) / weights.sum())
     return ratio * max(pressed_in, 0.0)
 
@@ -32,15 +32,25 @@ def elastic_and_amplitude(system: Tribosystem) -> tuple[float, float]:
     return elastic_way(system), slid / (2 * system.motion.half_cycles)
 
 
+def elastic_share(system: Tribosystem) -> float | None:
+    """Return the share of the amplitude that the bodies take up elastically; None for sliding one way."""
+    if len(set(system.motion.directions)) == 1:
+        return None
+    way, amplitude = elastic_and_amplitude(system)
+    return way / max(amplitude, 1e-300)
+
+
 def stroke_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of a stroke to and fro that the bodies take up elastically."""
-    if len(set(system.motion.directions)) == 1:
+    share = elastic_share(system)
+    if share is None or share <= TAKEN_UP:
         return []
     way, amplitude = elastic_and_amplitude(system)
-    if way <= TAKEN_UP * amplitude:
-        return []
+    against = system.case.against_stick
+    remedy = f"stick and slip cannot be followed here: {against[0]}" if against else ""
     return [
         f"before they slide as a whole the bodies follow friction elastically, by an estimate {1e3 * way:.3g} µm each "
-        f"way, {100 * way / amplitude:.3g} % of the amplitude of {1e3 * amplitude:.3g} µm; gross sliding leaves that "
-        'out, and its slip and wear are too large by it; set contact.law = "coulomb" to follow stick and slip'
+        f"way, {100 * share:.3g} % of the amplitude of {1e3 * amplitude:.3g} µm; gross sliding leaves that "
+        f"out, and its slip and wear are too large by it; "
+        + (remedy or 'set contact.law = "coulomb" to follow stick and slip')
     ]

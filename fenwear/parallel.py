@@ -1,4 +1,4 @@
-"""Ranks: what one finds wrong, every rank raises; what they add up is the same to the last bit.
+"""Ranks: what one finds wrong, every rank raises; what they add up is the same to the last bit; one leads all.
 
 PETSc's objects on several ranks are freed by all of them together, so that petsc4py keeps those that
 Python drops until it is told to free them. What is large is destroyed where it was made, and the rest
@@ -7,8 +7,10 @@ where `release` is called.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import TypeVar
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -59,3 +61,88 @@ def release(comm: MPI.Comm) -> None:
     """Free the objects of PETSc that every one of these ranks has dropped; collective."""
     if comm.size > 1:
         PETSc.garbage_cleanup(lasting(comm))
+
+
+@dataclass(frozen=True)
+class Rows:
+    """A run of rows for each rank, of a matrix or of vectors that are too large for every rank to have them all.
+
+    Attributes:
+        comm: The ranks.
+        starts: First row of each rank, and the number of all (ranks + 1,).
+    """
+
+    comm: MPI.Comm
+    starts: NDArray[np.int64]
+
+    @classmethod
+    def equal(cls, comm: MPI.Comm, size: int) -> Rows:
+        """Return as many rows of `size` for each rank as for the others, or one less."""
+        return cls(comm, size * np.arange(comm.size + 1, dtype=np.int64) // comm.size)
+
+    @property
+    def own(self) -> slice:
+        """The rows of this rank."""
+        first, last = self.starts[self.comm.rank : self.comm.rank + 2]
+        return slice(int(first), int(last))
+
+    def gathered(self, part: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return all rows (size, ...) from this rank's own, the same on every rank; collective."""
+        whole = np.empty((int(self.starts[-1]), *part.shape[1:]))
+        counts: Any = np.diff(self.starts) * math.prod(part.shape[1:])
+        self.comm.Allgatherv(np.ascontiguousarray(part), (whole, counts))
+        return whole
+
+
+class Team:
+    """Ranks that work for rank 0 while it leads: what it decides needs no other rank's agreement.
+
+    Args:
+        comm: The ranks.
+    """
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self.comm = comm
+        self._parts: dict[int, object] = {}
+
+    def serve(self, number: int, part: object) -> None:
+        """Have this rank's part of what is shared called by its number."""
+        self._parts[number] = part
+
+    def lead(self, function: Callable[[], T]) -> T:
+        """Call `function` on rank 0, which may `call` all ranks meanwhile; return its result on each; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        if self.comm.rank:
+            while (order := self.comm.bcast(None)) is not None:
+                self.comm.gather(self._done(*order))
+            return on_root(self.comm, function)
+
+        def led() -> T:
+            try:
+                return function()
+            finally:
+                self.comm.bcast(None)
+
+        return on_root(self.comm, led)
+
+    def call(self, number: int, method: str, *arguments: Any) -> list[Any]:
+        """Call a method of each rank's part and return what each has returned; on rank 0, while it leads.
+
+        Raises:
+            Exception: what it raised on some rank.
+        """
+        self.comm.bcast((number, method, arguments))
+        results, errors = zip(*(self.comm.gather(self._done(number, method, arguments)) or []), strict=True)
+        for error in errors:
+            if error is not None:
+                raise error
+        return list(results)
+
+    def _done(self, number: int, method: str, arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:
+        try:
+            return getattr(self._parts[number], method)(*arguments), None
+        except Exception as error:  # raised again on rank 0, which all wait for
+            return None, error

@@ -149,7 +149,12 @@ def fenwear(run_python: Callable[..., Any], forks: str) -> Callable[..., Any]:
     return fenwear
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Choose by what tests start: ranks that wait for one another take a core each, whoever else needs it."""
+    parser.addoption("--ranks", choices=("without", "only"), help="tests that start several ranks: without or only")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what starts a process with the fixtures above, whose imports take seconds, and what long.txt names."""
     long = set((TESTS / "long.txt").read_text("utf-8").split())
     for item in items:
@@ -158,6 +163,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         path, name = item.path.relative_to(TESTS).as_posix(), item.name.partition("[")[0]
         if long & {path, f"{path}::{name}"}:
             item.add_marker("long")
+    if choice := config.getoption("--ranks"):
+        left = [item for item in items if bool(item.get_closest_marker("ranks")) != (choice == "only")]
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if item not in set(left)]
     items[:] = _long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 

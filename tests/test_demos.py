@@ -89,7 +89,7 @@ def test_notebook_is_made_from_its_script(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.ranks] * n.startswith("04")) for n in NAMES])
 def test_notebook_runs(name: str, tmp_path: Path) -> None:
     """Every cell runs without a display, draws its figures, and leaves nothing behind."""
     if name.startswith("04") and shutil.which("mpirun") is None:

@@ -51,12 +51,12 @@ Histories = dict[str, xarray.Dataset]
 
 
 @pytest.fixture
-def run(run_python: Run, tmp_path: Path) -> Callable[[int], Histories]:
-    """Return run(ranks): the history of every case, each time from a process of its own."""
-    cases = {name: [case, *SMALL, "output.fields_at=[]", *settings] for name, (case, *settings) in CASES.items()}
-    cases |= {name: list(settings) for name, settings in EVERYWHERE.items()}
+def run(run_python: Run, tmp_path: Path) -> Callable[..., Histories]:
+    """Return run(ranks, again=False): the history of every case, or of CASES, each time from a process of its own."""
 
-    def run(ranks: int) -> Histories:
+    def run(ranks: int, *, again: bool = False) -> Histories:
+        cases = {name: [case, *SMALL, "output.fields_at=[]", *settings] for name, (case, *settings) in CASES.items()}
+        cases |= {} if again else {name: list(settings) for name, settings in EVERYWHERE.items()}
         folder = tmp_path / f"{ranks} {len(list(tmp_path.iterdir()))}"
         done = run_python("-m", "mpi4py", "-c", ALL, folder, json.dumps(cases), ranks=ranks)
         assert done.returncode == 0, done.stderr
@@ -91,14 +91,15 @@ def check_same_numbers(one: xarray.Dataset, other: xarray.Dataset) -> None:
 
 
 @pytest.mark.slow
-def test_the_same_again_and_on_other_ranks(run: Callable[[int], Histories]) -> None:
+@pytest.mark.ranks
+def test_the_same_again_and_on_other_ranks(run: Callable[..., Histories]) -> None:
     """Each case: the same bits twice on one rank and twice on three, and the same numbers on one, two and three.
 
     Where they are asked for, the same bits on one, two and three.
     """
     one, two, three = run(1), run(2), run(3)
     for first in (one, three):
-        again = run(1 if first is one else 3)
+        again = run(1 if first is one else 3, again=True)
         for name in CASES:
             check_same_bits(first[name], again[name])
     for name in CASES:

@@ -220,6 +220,7 @@ def test_full_disk_for_other_commands(fenwear: Run, small_disk: Callable[[int], 
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.ranks
 def test_signal_to_one_rank(fenwear: Run, tmp_path: Path, number: signal.Signals) -> None:
     """All ranks end together, with a checkpoint."""
     folder = tmp_path / "run"
@@ -232,6 +233,7 @@ def test_signal_to_one_rank(fenwear: Run, tmp_path: Path, number: signal.Signals
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.ranks
 def test_signal_to_mpirun(fenwear: Run, tmp_path: Path, number: signal.Signals) -> None:
     """mpirun passes it on to all ranks: they end, and what is there is whole."""
     folder = tmp_path / "run"
@@ -266,6 +268,7 @@ def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
 
 
 @pytest.mark.parametrize("victims", [1, 2])
+@pytest.mark.ranks
 def test_killed_ranks(fenwear: Run, tmp_path: Path, victims: int) -> None:
     """One rank killed: the other does not wait for it for ever. Both killed: the files are whole all the same."""
     folder = tmp_path / "run"
@@ -354,6 +357,7 @@ def _reached(folder: Path) -> int:
 # ---------------------------------------------------------------------- removed files
 
 
+@pytest.mark.ranks
 def test_history_removed(fenwear: Run, tmp_path: Path) -> None:
     """The run ends and says so; it goes on with a new history, and says this, too."""
     folder = tmp_path / "run"
@@ -385,6 +389,7 @@ def test_checkpoint_removed(fenwear: Run, tmp_path: Path) -> None:
     check_goes_on(fenwear, folder)
 
 
+@pytest.mark.ranks
 def test_results_removed(tmp_path: Path) -> None:
     """The whole folder gone: the run ends and says that there is nothing to go on from."""
     folder = tmp_path / "run"
@@ -543,6 +548,7 @@ def test_second_signal_ends_all_ranks(run_python: Run, tmp_path: Path, ranks: in
     assert "too late" not in said.read_text()
 
 
+@pytest.mark.ranks
 def test_signals_until_the_end(tmp_path: Path) -> None:
     """Those that come while an interrupted run ends do not kill it, to the last moment: the exit status stays."""
     folder = tmp_path / "run"

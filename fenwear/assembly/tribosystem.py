@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
@@ -21,12 +23,11 @@ from fenwear.contact.full import FullContact
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
-from fenwear.interface import (
-    Interface,
-    join,
-)
+from fenwear.interface import Interface, RigidEquilibrium, join
+from fenwear.parallel import Rows, lasting
 
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
+SHARED = 2000  # contact nodes from which on ranks share the rows of their compliance
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
 
 
@@ -38,11 +39,17 @@ class Condensed:
         punch: Onto the contact nodes.
         strip: Onto its own trace nodes where it moves as a whole, else onto the contact nodes opposite.
         strip_moves: Which of the two.
+        rows: Of the contact nodes on each rank, where ranks share what both answer; None where every rank has all.
     """
 
     punch: CondensedBody
     strip: CondensedBody
     strip_moves: bool
+    rows: Rows | None = None
+
+    def join(self, rigid: RigidEquilibrium) -> Interface:
+        """Return both joined at the place of a pair; collective where ranks share the rows."""
+        return join(rigid, self.punch, self.strip, strip_moves=self.strip_moves, rows=self.rows)
 
     def under_loads(self, bodies: Bodies) -> Condensed:
         """Return the same under the loads of these bodies; collective."""
@@ -145,18 +152,44 @@ def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
         ]
     # In one frame, forces and displacements along its normals are all that is ever asked for.
     moves, fixed, flat = _frame(placed)
-    onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0])
+    rows = shared_rows(placed)
+    of_punch, of_strip = _kept(placed, rows, moves=moves)
+    onto_punch = Request(bodies.punch, middle.punch.spread, middle.normal if fixed else None, couplings[0], of_punch)
     if moves:
         trace = middle.strip.trace
         along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
-        onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1])
+        onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1], of_strip)
     else:
-        onto_strip = Request(bodies.strip, csr_array(middle.transfer.T), middle.normal_on_strip, couplings[1])
+        opposite = csr_array(middle.transfer.T)
+        onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1], of_strip)
     punch, strip = condense_together([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()
-    return Condensed(punch, strip, moves)
+    return Condensed(punch, strip, moves, rows)
+
+
+def shared_rows(placed: Placed) -> Rows | None:
+    """Return the contact nodes whose rows of the compliance each rank has; None where every rank has all.
+
+    Ranks share a contact of many nodes. What heat and the contact on all displacements make of a compliance is whole.
+    """
+    comm, nodes = placed.comm, len(placed.pair.weights)
+    alone = comm.size == 1 or placed.bodies.punch.setup.reproducible
+    if alone or placed.heat is not None or placed.solver != "condensed" or nodes < SHARED:
+        return None
+    return Rows.equal(lasting(comm), nodes)
+
+
+def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np.int64] | None, ...]:
+    """Return the patterns of punch and strip whose columns this rank's rows are made from; None for all."""
+    if rows is None:
+        return None, None
+    nodes = np.arange(rows.own.start, rows.own.stop)
+    if not moves:
+        return nodes, nodes
+    below = [csr_array(pair.transfer[rows.own]).indices for pair in (placed.pair, *placed.pairs)]
+    return nodes, np.unique(np.concatenate(below)).astype(np.int64)
 
 
 def _identity(size: int) -> csr_array:
@@ -166,7 +199,7 @@ def _identity(size: int) -> csr_array:
 
 def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
-    interface = join(placed.rigid, condensed.punch, condensed.strip, strip_moves=condensed.strip_moves)
+    interface = condensed.join(placed.rigid)
     found: list[Interface] = []
     for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
         earlier = next((j for j in range(k) if placed.rigids[j] is rigid and placed.loaded[j] is bodies), None)
@@ -176,14 +209,19 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
             found.append(found[earlier])
         else:
             own = condensed if bodies is placed.bodies else condensed.under_loads(bodies)
-            found.append(join(rigid, own.punch, own.strip, strip_moves=condensed.strip_moves))
+            found.append(own.join(rigid))
     parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
     return Tribosystem(**parts, condensed=condensed, interface=interface, interfaces=tuple(found), exchange=exchange)
 
 
-def same_frame(system: Tribosystem, placed: Placed) -> bool:
-    """Return whether bodies condensed for one motion answer for another one, too."""
-    return _frame(system) == _frame(placed)
+def answers_for(condensed: Condensed, before: Placed, placed: Placed) -> bool:
+    """Return whether bodies condensed for one motion answer for another one, too; collective."""
+    frame = _frame(placed)
+    if _frame(before) != frame:
+        return False
+    have = condensed.strip.kept
+    _, needed = _kept(placed, condensed.rows, moves=frame[0])
+    return bool(placed.comm.allreduce(have is None or needed is None or np.isin(needed, have).all(), op=MPI.LAND))
 
 
 def _frame(placed: Placed) -> tuple[bool, bool, bool]:

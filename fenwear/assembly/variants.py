@@ -14,12 +14,12 @@ from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
     Preparation,
     Tribosystem,
+    answers_for,
     condense_bodies,
     elastic,
     heating_friction,
     joined,
     preparation,
-    same_frame,
     with_exchange,
     with_reduced_heat,
 )
@@ -123,7 +123,7 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     if not conducts_alike:
         bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
     placed = place(bodies, sliding, case.heat, solver=case.contact.solver, case=case)
-    if not same_frame(system, placed):
+    if not answers_for(condensed, system, placed):
         condensed = condense_bodies(placed)
     elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
         condensed = condensed.under_loads(bodies)

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
@@ -24,6 +25,7 @@ from fenwear.bodies.factor import entries, make_together, solve_together
 from fenwear.bodies.response import Request, respond_together
 from fenwear.bodies.substructure import make_substructures
 
+EVERY = slice(None)
 LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
 
 
@@ -31,14 +33,17 @@ LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept bes
 class CondensedBody:
     """A body condensed onto q patterns of force on its contact surface, per thickness, the same on every rank.
 
+    Where ranks share the columns of a response that is too large for each, a rank has those that it was asked to keep.
+
     Attributes:
         patterns: Share of each trace node in a unit force (N, q).
         directions: Along which each pattern was solved for (q, d, a): one direction, or all d axes.
-        response: Displacement at each pattern from a unit force of each pattern along each of its
-            directions (q, d, q, a), mm per N/mm.
+        response: Displacement at each pattern from a unit force of each pattern, or of those that this rank has,
+            along each of its directions (q, d, k, a), mm per N/mm.
         by_load: Displacement at each pattern from the body's loads (q, d), mm.
         by_temperature: Displacement of each pattern along its one direction from the temperature of this
-            rank's own nodes (q, owned), mm/K; None without heat. The one member that differs between ranks.
+            rank's own nodes (q, owned), mm/K; None without heat. It differs between ranks.
+        kept: Patterns whose columns this rank has, ascending (k,); None for all.
     """
 
     patterns: csr_array
@@ -46,36 +51,40 @@ class CondensedBody:
     response: Array
     by_load: Array
     by_temperature: Array | None = None
+    kept: NDArray[np.int64] | None = None
 
     def arrays(self) -> dict[str, Array]:
         """Return what was solved for, by its name."""
         found = {"response": self.response, "by_load": self.by_load}
         return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
 
-    def normal_response(self, normal: Array, reading: csr_array | None = None) -> Array:
-        """Return the displacement along e_n at each contact node from unit forces along the axes at each (n, n, d).
+    def normal_response(self, normal: Array, reading: csr_array | None = None, own: slice = EVERY) -> Array:
+        """Return the displacement along e_n at contact nodes from unit forces along the axes at each (rows, n, d).
+
+        By Maxwell and Betti the displacement at a node is the work of a force there, so that rows need the columns
+        of their own patterns alone.
 
         Args:
             normal: e_n of the contact nodes (n, d), in the body's own frame.
             reading: Share of each pattern in what a contact node sees, and in the force that it gives
                 back (n, q); by default the patterns are the contact nodes'.
+            own: Which rows; by default all.
         """
-        if self.directions.shape[2] == 1:
-            # e_l . U_lk = displacement at l along e_l from a force along each axis at k.
-            at_patterns = self.response[:, :, :, 0].transpose(2, 0, 1)
-            return at_patterns if reading is None else _both_ways(reading, at_patterns)
         q, d = self.by_load.shape
+        kept = np.arange(q) if self.kept is None else self.kept
+        fixed = self.directions.shape[2] == 1
         if reading is None:
-            return np.einsum("ic,icjb->ijb", normal, self.response)
-        n = len(normal)
-        seen = (reading @ self.response.reshape(q, -1)).reshape(n, d, q, d)
-        along = np.einsum("ic,iclb->ilb", normal, seen)
-        return np.stack([(reading @ along[:, :, b].T).T for b in range(d)], axis=2)
-
-
-def _both_ways(reading: csr_array, response: Array) -> Array:
-    """Return R X_b R^T for each component b of a response (q, q, d)."""
-    return np.stack([(reading @ (reading @ response[:, :, b]).T).T for b in range(response.shape[2])], axis=2)
+            first, last = np.searchsorted(kept, own.indices(q)[:2])
+            answers = self.response[:, :, first:last]
+            if fixed:
+                return answers[:, :, :, 0].transpose(2, 0, 1)
+            return np.einsum("ic,jbic->ijb", normal[own], answers)
+        rows, found = csr_array(reading[own])[:, kept], np.zeros((len(normal[own]), len(normal), d))
+        for axis in range(d):
+            for across in range(1 if fixed else d):  # along e_l, or each axis, from a force along `axis`
+                seen = (reading @ (rows @ self.response[:, axis, :, across].T).T).T
+                found[:, :, axis] += seen if fixed else normal[own, across, None] * seen
+        return found
 
 
 def condense(
@@ -124,7 +133,7 @@ def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh:
     computed = iter(_condensed([one for one, found in zip(requests, stored, strict=True) if found is None]))
     condensed = []
     for one, key, found in zip(requests, keys, stored, strict=True):
-        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found)
+        body = next(computed) if found is None else CondensedBody(one.patterns, one.along, **found, kept=one.kept)
         if found is None:
             kept.save(comm, key, body.arrays())
         condensed.append(body)
@@ -147,9 +156,11 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
     condensed = []
     for one, (response, by_temperature), load in zip(requests, found, loads, strict=True):
         q, d, along = one.patterns.shape[1], one.elastic.dim, one.along
-        whole = _symmetric(response.reshape(q, d, q, -1), along)
+        answers: Array = response.reshape(q, d, -1, along.shape[2])
+        if one.kept is None:
+            answers = _symmetric(answers, along)
         by_load = one.patterns.T @ load
-        condensed.append(CondensedBody(one.patterns, along, whole, by_load, by_temperature))
+        condensed.append(CondensedBody(one.patterns, along, answers, by_load, by_temperature, one.kept))
         if by_temperature is not None and entries(one.elastic.size, d) > LARGE:
             one.elastic.free_factor()
     return condensed

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -39,12 +40,14 @@ class Request:
         patterns: Share of each trace node in a unit force (N, q).
         directions: One unit vector for each pattern (q, d); None for all axes.
         thermal_coupling: G; needs one direction for each pattern.
+        kept: Patterns whose columns this rank keeps, ascending (k,); None for all on every rank.
     """
 
     elastic: ElasticBody
     patterns: csr_array
     directions: Array | None = None
     thermal_coupling: PETSc.Mat | None = None
+    kept: NDArray[np.int64] | None = None
 
     @property
     def along(self) -> Array:
@@ -62,6 +65,7 @@ class Request:
         patterns, coupling = csr_array(self.patterns), self.thermal_coupling
         values = [patterns.data, patterns.indices, patterns.indptr, np.asarray(self.along)]
         setup = self.elastic.setup
+        values += [] if self.kept is None else [self.kept]
         return [setup, *self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
 
     def forces(self, columns: NDArray[np.int64]) -> Array:
@@ -109,7 +113,7 @@ def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | N
         working = [answer for answer in answers if number < len(answer.blocks)]
         found = [answer.solve(answer.blocks[number]) for answer in working]
         for answer, one in zip(working, found, strict=True):
-            answer.share(one)
+            answer.share(answer.blocks[number], one)
     return [answer.gathered() for answer in answers]
 
 
@@ -118,7 +122,7 @@ class _Answer:
 
     def __init__(self, request: Request) -> None:
         """Bring to the owner what it needs; collective."""
-        elastic, coupling = request.elastic, request.thermal_coupling
+        elastic, coupling, a = request.elastic, request.thermal_coupling, request.along.shape[2]
         self.request = request
         self.factor = elastic.begin_substructures() if request.in_substructures else elastic.factor
         self.comm: MPI.Comm = self.factor.comm
@@ -126,7 +130,7 @@ class _Answer:
         held[elastic.supported] = 1.0
         self._held = elastic.trace.pick(held[:, None])[:, :, 0].ravel() > 0
         count = request.count
-        whole = request.by_surface and not self.factor.is_spread
+        whole = request.by_surface and not self.factor.is_spread and request.kept is None
         self.blocks: list[Columns] = (
             [np.arange(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK)]
             if not whole
@@ -138,6 +142,9 @@ class _Answer:
             self._temperatures = np.append(0, np.cumsum(self.comm.allgather(coupling.getLocalSize()[1])))
             self._coupling = _rows(coupling) if self.factor.is_spread else _rows(moved(coupling, self.factor.owner))
         self._response: list[Array] = []
+        # Of each rank the columns that it keeps, where ranks share them.
+        mine = None if request.kept is None else (request.kept[:, None] * a + np.arange(a)).ravel()
+        self._keeping: list[Columns] | None = None if mine is None else self.comm.allgather(mine)
         self._by_temperature: Array | None = None  # (q, owned): as large as a factor, so there once
         self._filled = 0
 
@@ -170,9 +177,11 @@ class _Answer:
         warm = None if self._coupling is None else np.asarray(self._coupling.T @ solution)
         return self.request.seen(displacement.reshape(forces.shape)), warm
 
-    def share(self, found: tuple[Array, Array | None] | None) -> None:
+    def share(self, columns: Columns, found: tuple[Array, Array | None] | None) -> None:
         """Keep what was found for a block, and give each rank its part of the response to temperature; collective."""
-        if found is not None:
+        if self._keeping is not None:
+            self._hand_out(self._keeping, columns, None if found is None else found[0])
+        elif found is not None:
             self._response.append(found[0])
         if self._temperatures is None:
             return
@@ -183,11 +192,27 @@ class _Answer:
             first, last = self._temperatures[self.comm.rank : self.comm.rank + 2]
             self._fill(total(self.comm, warm)[first:last])
             return
-        columns = self.comm.bcast(None if warm is None else warm.shape[1], root=self.factor.owner)
-        own = np.empty((counts[self.comm.rank], columns))
-        sent = None if warm is None else (np.ascontiguousarray(warm), (counts * columns).tolist())
+        own = np.empty((counts[self.comm.rank], len(columns)))
+        sizes: Any = counts * len(columns)
+        sent = None if warm is None else (np.ascontiguousarray(warm), sizes)
         self.comm.Scatterv(sent, own, root=self.factor.owner)
         self._fill(own)
+
+    def _hand_out(self, keeping: list[Columns], columns: Columns, found: Array | None) -> None:
+        """Give each rank what it keeps of a block's response (q, d, k); collective."""
+        rank, owner = self.comm.rank, self.factor.owner
+        shares = [np.flatnonzero(np.isin(columns, mine)) for mine in keeping]
+        if found is not None:
+            self._response.append(found[:, :, shares[rank]])
+            if self.factor.is_spread:  # all ranks have it
+                return
+            for other, share in enumerate(shares):
+                if other != rank and len(share):
+                    self.comm.Send(np.ascontiguousarray(found[:, :, share]), other)
+        elif len(shares[rank]):
+            part = np.empty((self.request.patterns.shape[1], self.request.elastic.dim, len(shares[rank])))
+            self.comm.Recv(part, owner)
+            self._response.append(part)
 
     def _fill(self, warm: Array) -> None:
         """Keep this rank's part of the response to temperature for a block (owned, k)."""
@@ -198,10 +223,11 @@ class _Answer:
         self._filled = after
 
     def gathered(self) -> tuple[Array, Array | None]:
-        """Return the whole response, on every rank, and this rank's part of that to temperature; collective."""
+        """Return the response, all of it on every rank or what each keeps, and that to temperature; collective."""
         q, d = self.request.patterns.shape[1], self.request.elastic.dim
-        response = np.concatenate(self._response, axis=2) if self._response else np.empty((q, d, self.request.count))
-        if self.comm.size > 1:  # where it is spread, equal to the last bit on all ranks
+        count = self.request.count if self._keeping is None else 0
+        response = np.concatenate(self._response, axis=2) if self._response else np.empty((q, d, count))
+        if self.comm.size > 1 and self._keeping is None:  # where it is spread, equal to the last bit on all ranks
             self.comm.Bcast(response, root=self.factor.owner)
         return response, self._by_temperature
 

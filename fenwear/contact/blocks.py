@@ -14,6 +14,7 @@ serves all steps that wear a few times more or less: 5 to 20 iterations.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,18 +30,19 @@ ENOUGH = 2e-12  # residual of the depth, scaled to 1, that ends the iterations
 
 
 class Columns:
-    """A square matrix whose columns are made when they are first asked for.
+    """A matrix whose columns are made when they are first asked for.
 
     Args:
-        size: Rows, and columns.
-        make: Returns the columns of these numbers (size, k).
+        size: Columns.
+        make: Returns the columns of these numbers (rows, k).
+        rows: By default as many as columns.
     """
 
-    def __init__(self, size: int, make: Callable[[NDArray[np.int64]], Array]) -> None:
+    def __init__(self, size: int, make: Callable[[NDArray[np.int64]], Array], rows: int | None = None) -> None:
         self._size, self._make = size, make
         self._place = np.full(size, -1)  # of each column among those made
         self._numbers: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-        self._made: Array = np.zeros((size, 0))
+        self._made: Array = np.zeros((size if rows is None else rows, 0))
 
     @property
     def made(self) -> int:
@@ -56,7 +58,7 @@ class Columns:
             new = np.flatnonzero(self._place < 0)
         count = self.made + len(new)
         if count > self._made.shape[1]:
-            room: Array = np.empty((self._size, min(self._size, int(SPARE * count))))
+            room: Array = np.empty((len(self._made), min(self._size, int(SPARE * count))))
             room[:, : self.made] = self._made[:, : self.made]
             self._made = room
         self._made[:, self.made : count] = self._make(new)
@@ -74,6 +76,16 @@ class Columns:
         return self._made[np.ix_(rows, self._place[columns])]
 
 
+class Compliance(Protocol):
+    """A square matrix that gives products and some of its numbers."""
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x (size,)."""
+
+    def entries(self, rows: Indices, columns: Indices) -> Array:
+        """Return the numbers of some rows and columns."""
+
+
 class PhaseBlock:
     """[S, H; E, 0] of one phase, with n pressures and r rigid modes.
 
@@ -86,13 +98,18 @@ class PhaseBlock:
     """
 
     def __init__(
-        self, compliance: Columns, diagonal: Array, modes: Array, balance: Array, *, iterated: bool = True
+        self, compliance: Compliance, diagonal: Array, modes: Array, balance: Array, *, iterated: bool = True
     ) -> None:
         self.compliance, self.modes, self.balance = compliance, modes, balance
         self.nodes, self.size = len(modes), len(modes) + modes.shape[1]
         self.diagonal = np.concatenate([diagonal, np.zeros(modes.shape[1])])
-        self.updating = Updating(self.entries, self.diagonal if iterated else None)
+        self.updating = self.factors(self.entries, self.diagonal if iterated else None, np.zeros(self.nodes))
         self._worn: tuple[Array, Updating] | None = None
+
+    @property
+    def iterations(self) -> int:
+        """All that its sets were solved by."""
+        return self.updating.iterations + (0 if self._worn is None else self._worn[1].iterations)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (n + r,)."""
@@ -114,6 +131,10 @@ class PhaseBlock:
         every = np.arange(self.size, dtype=np.int32)
         return self.entries(every, every)
 
+    def factors(self, entries: Callable[[Indices, Indices], Array], diagonal: Array | None, _wear: Array) -> Updating:
+        """Return the factors of its sets, with wear (n,) on the diagonal that is in the entries already."""
+        return Updating(entries, diagonal)
+
     def worn(self, wear: Array) -> Updating:
         """Return factors of the same with wear (n,) on the diagonal; those of the last are kept."""
         if self._worn is None or not np.array_equal(self._worn[0], wear):
@@ -126,7 +147,7 @@ class PhaseBlock:
                 found[at[same], same] += added[columns[same]]
                 return found
 
-            self._worn = (wear, Updating(entries, self.diagonal + added))
+            self._worn = (wear, self.factors(entries, self.diagonal + added, wear))
         return self._worn[1]
 
 

@@ -24,8 +24,10 @@ from fenwear.arrays import Array
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator, Phases
+from fenwear.contact.spread import OwnRows, SpreadBlock, SpreadCompliance
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
+from fenwear.parallel import Team
 from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedies
 
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
@@ -95,7 +97,11 @@ class CondensedContact:
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
     PETSc's absolute tolerances mean the same for every case. Phases meet in the layer only: where
     there are many, one small elimination for each of them takes the place of one of all. Where nodes are
-    many, no matrix of all of them is made: see `fenwear.contact.blocks`.
+    many, no matrix of all of them is made: see `fenwear.contact.blocks`. Where ranks share the rows of the
+    interface, rank 0 leads: see `fenwear.contact.spread`.
+
+    Attributes:
+        blocks: Of the phases, where nodes are many.
     """
 
     def __init__(self, phases: Sequence[SlidingContact], remedies: Remedies | None = None) -> None:
@@ -112,9 +118,10 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
-        self._many = n > MANY
+        self._team = None if interface.rows is None else Team(interface.rows.comm)
+        self._many = n > MANY or self._team is not None
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
-        self._blocks: list[PhaseBlock] = []
+        self.blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
@@ -130,23 +137,29 @@ class CondensedContact:
     def _slide(self, phases: Iterable[int]) -> None:
         """Take the friction of phases."""
         n, scale = self.shape[1], self._pressure_scale / self._gap_scale
-        blocks: list[PhaseBlock | None] = [*self._blocks] or [None] * len(self.phases)
+        blocks: list[PhaseBlock | None] = [*self.blocks] or [None] * len(self.phases)
         for k in phases:
             interface, ratio = self.phases[k].interface, self._ratios[k]
             modes = interface.rigid.rigid_normal * (self._rigid_scale / self._gap_scale)
             balance = interface.rigid.equilibrium(ratio) * (self._pressure_scale / self._resultant_scale[:, None])
             if self._many:
-                blocks[k] = PhaseBlock(
-                    Columns(n, partial(_scaled_columns, interface, ratio, scale)),
-                    interface.own_compliance(ratio) * scale,
-                    modes,
-                    balance,
-                    iterated=len(self.phases) == 1,
-                )
+                blocks[k] = self._block(k, scale, modes, balance)
             else:
                 self._dense[k, :n, :n] = interface.compliance(ratio) * scale
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
-        self._blocks = [block for block in blocks if block is not None]
+        self.blocks = [block for block in blocks if block is not None]
+
+    def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
+        """Return the block of a phase of many nodes."""
+        interface, ratio = self.phases[k].interface, self._ratios[k]
+        make, diagonal = partial(_scaled_columns, interface, ratio, scale), interface.own_compliance(ratio) * scale
+        alone, rows = len(self.phases) == 1, interface.rows
+        if rows is None or self._team is None:
+            return PhaseBlock(Columns(len(modes), make), diagonal, modes, balance, iterated=alone)
+        compliance = SpreadCompliance(self._team, k, OwnRows(rows, make))
+        if alone:
+            return SpreadBlock(compliance, diagonal, modes, balance)
+        return PhaseBlock(compliance, diagonal, modes, balance, iterated=False)
 
     def press(self, factor: float) -> None:
         """Take all loads times a factor."""
@@ -177,13 +190,13 @@ class CondensedContact:
     def _linear(self) -> Operator:
         """The derivative of the residual without the layer."""
         if self._elastic is None:
-            self._elastic = ManyNodes(self._blocks) if self._many and self._coupling is None else self._as_phases()
+            self._elastic = ManyNodes(self.blocks) if self._many and self._coupling is None else self._as_phases()
         return self._elastic
 
     def _as_phases(self, border: tuple[Array, Array] | None = None, local: Array | None = None) -> Phases:
         """Return the derivative by matrices of all nodes."""
         scale = self._pressure_scale / self._gap_scale
-        dense = np.array([block.matrix() for block in self._blocks]) if self._many else self._dense
+        dense = np.array([block.matrix() for block in self.blocks]) if self._many else self._dense
         return Phases(dense, None if self._coupling is None else self._coupling * scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
@@ -200,7 +213,7 @@ class CondensedContact:
             if left is not None:
                 self._operator = self._as_phases(border=(left, slope * scale))
             elif self._many and self._coupling is None:
-                self._operator = ManyNodes(self._blocks, slope * scale, last if isinstance(last, ManyNodes) else None)
+                self._operator = ManyNodes(self.blocks, slope * scale, last if isinstance(last, ManyNodes) else None)
             else:
                 self._operator = self._as_phases(local=slope * scale)
         return self._operator or self._linear
@@ -233,18 +246,18 @@ class CondensedContact:
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._layer = layer
-        x = self._solve(start).reshape(m, -1)
+        solve = partial(self._solve, start)
+        x, f, iterations, remedy = solve() if self._team is None else self._team.lead(solve)
+        if remedy:
+            self._remedies.note(remedy)
+        x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale
         pressure[x[:, :n] <= ZERO] = 0.0
-        return ContactState(
-            pressure,
-            self.inequality.residual.reshape(m, -1)[:, :n] * self._gap_scale,
-            begun + x[:, n:] * self._rigid_scale,
-            self.inequality.iterations,
-        )
+        gaps = f.reshape(m, -1)[:, :n] * self._gap_scale
+        return ContactState(pressure, gaps, begun + x[:, n:] * self._rigid_scale, iterations)
 
-    def _solve(self, start: ContactState | None) -> Array:
-        """Return the solution by the first way that finds it."""
+    def _solve(self, start: ContactState | None) -> tuple[Array, Array, int, str]:
+        """Return the solution by the first way that finds it: unknowns, residual, iterations, and the remedy or ""."""
         failure: ConvergenceError | None = None
         for guess, line_search, name in self._ways(start):
             try:
@@ -252,9 +265,7 @@ class CondensedContact:
             except ConvergenceError as error:
                 failure = failure or error  # the usual way's says most
                 continue
-            if failure is not None:
-                self._remedies.note(name)
-            return x
+            return x, self.inequality.residual, self.inequality.iterations, "" if failure is None else name
         raise failure or ConvergenceError(self.inequality.name)
 
     def _ways(self, start: ContactState | None) -> Iterator[tuple[Array, bool, str]]:

@@ -10,6 +10,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
 from fenwear.cycle.totals import Totals, none_yet
+from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.wear import Worn
 
@@ -57,6 +58,13 @@ def parted(contact: ContactState) -> tuple[ContactState, ...]:
         ContactState(contact.pressure[k : k + 1], contact.gap[k : k + 1], contact.rigid[k : k + 1], contact.iterations)
         for k in range(len(contact.pressure))
     )
+
+
+def present(contact: ContactState | None) -> ContactState:
+    """Return the contact of a phase that a step has solved."""
+    if contact is None:
+        raise ConvergenceError("a phase of the motion has no contact yet")
+    return contact
 
 
 def pressure_scale(system: Tribosystem, pressure: Array) -> float:

@@ -13,6 +13,7 @@ from fenwear.bodies.condensation import CondensedBody
 from fenwear.interface.equilibrium import RigidEquilibrium
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
+from fenwear.parallel import Rows, total
 
 
 @dataclass(frozen=True)
@@ -22,40 +23,60 @@ class Interface:
     Attributes:
         rigid: H, F, the nodes and the transfer.
         gap_by_force: Gap at node i from a unit force along each axis at node j, on the punch and its
-            reaction on the strip (n, n, d), mm per N/mm in the plane.
+            reaction on the strip (n, n, d), mm per N/mm in the plane; this rank's own rows where ranks share them.
         load_gap: g_load (n,), mm.
+        own_by_force: Gap at each node from a unit force along each axis at itself (n, d).
+        rows: Of each rank; None where every rank has all.
     """
 
     rigid: RigidEquilibrium
     gap_by_force: Array
     load_gap: Array
+    own_by_force: Array
+    rows: Rows | None = None
 
     def compliance(self, friction_ratio: Array | float) -> Array:
-        """Return S (n, n), mm/MPa: the gap from unit pressures with their friction.
+        """Return S (n, n), mm/MPa: the gap from unit pressures with their friction; collective where ranks share it.
 
         Args:
             friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; 0.0 for none.
         """
+        own = self._own_rows(friction_ratio)
+        return own if self.rows is None else self.rows.gathered(own)
+
+    def _own_rows(self, friction_ratio: Array | float) -> Array:
         traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
         return np.einsum("ijd,jd->ij", self.gap_by_force, traction)
 
+    def opened(self, friction_ratio: Array | float, pressure: Array) -> Array:
+        """Return S p (n,), mm; collective where ranks share S."""
+        own: Array = self._own_rows(friction_ratio) @ pressure
+        return own if self.rows is None else self.rows.gathered(own)
+
     def compliance_of(self, friction_ratio: Array, nodes: NDArray[np.int64]) -> Array:
-        """Return the columns of S of some nodes (n, k), mm/MPa."""
+        """Return the columns of S of some nodes (n, k), mm/MPa; this rank's own rows where ranks share them."""
         traction = (self.pair.normal[nodes] + friction_ratio[nodes]) * self.pair.weights[nodes, None]
         return np.einsum("ijd,jd->ij", self.gap_by_force[:, nodes], traction)
 
     def own_compliance(self, friction_ratio: Array) -> Array:
         """Return the diagonal of S (n,), mm/MPa."""
         traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
-        return np.einsum("iid,id->i", self.gap_by_force, traction)
+        return np.einsum("id,id->i", self.own_by_force, traction)
 
     @cached_property
     def elastic_length(self) -> float:
-        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps."""
-        elastic = self.compliance(0.0)
+        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps.
+
+        Collective at first use where ranks share S.
+        """
         modes = self.rigid.rigid_normal
-        elastic = elastic - modes @ np.linalg.lstsq(modes, elastic, rcond=None)[0]
-        return float(np.abs(elastic).sum(axis=1).mean())
+        own = slice(None) if self.rows is None else self.rows.own
+        elastic = self._own_rows(0.0)
+        rigid = np.linalg.pinv(modes)[:, own] @ elastic
+        if self.rows is not None:
+            rigid = total(self.rows.comm, rigid)
+        lengths = np.abs(elastic - modes[own] @ rigid).sum(axis=1)
+        return float((lengths if self.rows is None else self.rows.gathered(lengths)).mean())
 
     @property
     def pair(self) -> ContactPair:
@@ -63,23 +84,29 @@ class Interface:
         return self.rigid.pair
 
 
-def join(rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, *, strip_moves: bool) -> Interface:
-    """Join two condensed bodies at the place of a pair.
+def join(
+    rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, *, strip_moves: bool, rows: Rows | None = None
+) -> Interface:
+    """Join two condensed bodies at the place of a pair; collective where ranks share the rows.
 
     Args:
         rigid: The equilibrium there.
         punch: Condensed onto its pressure nodes.
         strip: Condensed onto its trace nodes where it moves as a whole, else onto the contact nodes opposite.
         strip_moves: Which of the two.
+        rows: Of the contact nodes on each rank; None where every rank has all.
     """
     pair = rigid.pair
+    own = slice(0, len(pair.weights)) if rows is None else rows.own
     reading = pair.transfer if strip_moves else None
-    on_strip = strip.normal_response(pair.normal_on_strip, reading)
+    on_strip = strip.normal_response(pair.normal_on_strip, reading, own)
     if pair.placement.turn != ZERO:
         on_strip = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
     by_load = strip.by_load if reading is None else reading @ strip.by_load
     load_gap = _along(pair.normal, punch.by_load) - _along(pair.normal_on_strip, by_load)
-    return Interface(rigid, punch.normal_response(pair.normal) + on_strip, load_gap)
+    by_force = punch.normal_response(pair.normal, None, own) + on_strip
+    diagonal = by_force[np.arange(len(by_force)), np.arange(own.start, own.stop)]
+    return Interface(rigid, by_force, load_gap, diagonal if rows is None else rows.gathered(diagonal), rows)
 
 
 def _along(normal: Array, vectors: Array) -> Array:

@@ -21,7 +21,7 @@ def elastic_way(system: Tribosystem) -> float:
         return 0.0
     weights = system.pair.weights
     pressure = np.full(len(weights), system.rigid.mean_pressure)
-    pressed_in = float(weights @ (system.interface.compliance(0.0) @ pressure) / weights.sum())
+    pressed_in = float(weights @ system.interface.opened(0.0, pressure) / weights.sum())
     ratio = float(weights @ np.linalg.norm(system.friction_ratio(1), axis=1) / weights.sum())
     return ratio * max(pressed_in, 0.0)
 

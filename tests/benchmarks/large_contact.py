@@ -1,6 +1,6 @@
 """Contacts of thousands of nodes: a sphere on a half-space that wears, by an operator and by a dense matrix.
 
-python3 tests/benchmarks/large_contact.py [--beside] [--steps N] [--loads F F ...]
+python3 tests/benchmarks/large_contact.py [--beside] [--steps N] [--loads F F ...] [--ranks N N ...] [--radius R]
 
 Square grids of 2,025, 4,900 and 10,000 nodes, constant pressure on each square (Love 1929), friction
 none, the load given. Each implicit wear step is one inequality in p and the approach.
@@ -8,8 +8,9 @@ none, the load given. Each implicit wear step is one inequality in p and the app
 "run" is the contact of every run, whose compliance is a matrix: it makes the columns of nodes that touch, and its
 factor follows them. "fft" has this half-space's own products by fast Fourier transform; a large set that comes at once
 is iterated. --beside gives the same steps with factors alone and with the matrix of all nodes. --loads changes
-the load from step to step, so that hundreds of nodes come and go. Times are of the process; memory is the most that it
-had, each row in a process of its own.
+the load from step to step, so that hundreds of nodes come and go; --radius 1000 lets all nodes touch. On several ranks
+each has its share of the rows. Times are of the process, or of rank 0; memory is the most that it, or any rank, had,
+each row in processes of its own; Krylov iterations are those of a step.
 """
 
 from __future__ import annotations
@@ -30,13 +31,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import scipy.fft
+from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Dense, Indices, Solve, Updating
-from fenwear.interface import Interface
+from fenwear.interface import Interface, RigidEquilibrium
+from fenwear.parallel import Rows
 
+COMM = MPI.COMM_WORLD
 WEAR, LOAD, RADIUS = 5e-4, 6.6e-4, 8.0  # gap worn by unit pressure in a step; mean pressure over all; of the sphere
 
 
@@ -94,6 +98,11 @@ class Rigid:
         return self
 
     @property
+    def normal(self) -> Array:
+        """Of one component: nothing else acts."""
+        return np.ones((len(self.weights), 1))
+
+    @property
     def resultant(self) -> Array:
         """The load."""
         return np.array([-LOAD * self.weights.sum()])
@@ -108,25 +117,17 @@ class Rigid:
         return self.weights[None]
 
 
-class Grid:
-    """The interface of sphere and half-space, as `fenwear.interface.Interface` has it: columns by Love's formula."""
-
-    def __init__(self, side: int) -> None:
-        far = 2 / side * np.arange(side)
-        self.table = love(far[:, None], far[None, :], 1 / side)
-        self.at = np.divmod(np.arange(side * side), side)
-        self.rigid = Rigid(np.full(side * side, 1.0 / (side * side)))
-        self.load_gap = np.zeros(side * side)
-        self.elastic_length = float(self.table.sum())
-
-    def compliance_of(self, _ratio: Array, nodes: Indices) -> Array:
-        """Return columns."""
-        i, j = (np.abs(place[:, None] - place[nodes][None, :]) for place in self.at)
-        return np.asarray(self.table[i, j])
-
-    def own_compliance(self, _ratio: Array) -> Array:
-        """Return the diagonal."""
-        return np.full(len(self.load_gap), self.table[0, 0])
+def grid(side: int) -> Interface:
+    """Return the interface of sphere and half-space by Love's formula; several ranks share its rows."""
+    far, n = 2 / side * np.arange(side), side * side
+    table, at = n * love(far[:, None], far[None, :], 1 / side), np.divmod(np.arange(n), side)
+    rows = Rows.equal(COMM, n) if COMM.size > 1 else None
+    own = slice(0, n) if rows is None else rows.own
+    by_force: Array = np.empty((own.stop - own.start, n, 1))
+    for k, i in enumerate(range(own.start, own.stop)):
+        by_force[k, :, 0] = table[np.abs(at[0] - at[0][i]), np.abs(at[1] - at[1][i])]
+    rigid = cast(RigidEquilibrium, Rigid(np.full(n, 1.0 / n)))
+    return Interface(rigid, by_force, np.zeros(n), np.full((n, 1), table[0, 0]), rows)
 
 
 @dataclass(frozen=True)
@@ -157,20 +158,24 @@ def love(x: Array, y: Array, half: float) -> Array:
     )
 
 
-def wear(side: int, steps: int, loads: Sequence[float], way: str) -> tuple[list[float], list[int], list[int], Array]:
-    """Return time, Newton iterations and nodes in contact of each step, and the last pressures.
+Found = tuple[list[float], list[int], list[int], Array, int]
+
+
+def wear(side: int, steps: int, loads: Sequence[float], radius: float, way: str) -> Found:
+    """Return time, Newton iterations and nodes in contact of each step, the last pressures, all Krylov iterations.
 
     Args:
         side: Nodes along a side of the square.
         steps: How many.
         loads: Of one step after the other, over and over.
+        radius: Of the sphere.
         way: "iterated", "factors" or "dense".
     """
     n = side * side
     space = HalfSpace(side, iterated=way == "iterated")
     every = np.arange(n + 1, dtype=np.int32)
     operator = Dense(space.entries(every, every)) if way == "dense" else space
-    middle = (2 * (np.arange(side) + 0.5) / side - 1) ** 2 / (2 * RADIUS)
+    middle = (2 * (np.arange(side) + 0.5) / side - 1) ** 2 / (2 * radius)
     gap = np.append((middle[:, None] + middle).ravel(), 0.0)
     solver = Inequality(
         np.append(np.zeros(n), -np.inf),
@@ -190,14 +195,14 @@ def wear(side: int, steps: int, loads: Sequence[float], way: str) -> tuple[list[
         times.append(time.process_time() - begin)
         iterations.append(solver.iterations)
         touching.append(int((x[:-1] > 0).sum()))
-    return times, iterations, touching, x[:-1]
+    return times, iterations, touching, x[:-1], space.updating.iterations
 
 
-def run(side: int, steps: int, loads: Sequence[float]) -> tuple[list[float], list[int], list[int], Array]:
-    """Return the same by the contact of every run."""
-    grid, x = Grid(side), 2 * (np.arange(side) + 0.5) / side - 1
-    gap = ((x**2)[:, None] + x**2).ravel() / (2 * RADIUS)
-    contact = CondensedContact([SlidingContact(cast(Interface, grid), np.zeros((len(gap), 3)))])
+def run(side: int, steps: int, loads: Sequence[float], radius: float) -> Found:
+    """Return the same by the contact of every run, on one rank or on several."""
+    x = 2 * (np.arange(side) + 0.5) / side - 1
+    gap = ((x**2)[:, None] + x**2).ravel() / (2 * radius)
+    contact = CondensedContact([SlidingContact(grid(side), np.zeros((len(gap), 1)))])
     start = np.where(gap < 0.1 * gap.max(), LOAD, 0.0)[None]
     state = ContactState(start, np.zeros_like(start), np.zeros((1, 1)), 0)
     times, iterations, touching = [], [], []
@@ -209,21 +214,34 @@ def run(side: int, steps: int, loads: Sequence[float]) -> tuple[list[float], lis
         times.append(time.process_time() - begin)
         iterations.append(state.iterations)
         touching.append(int((state.pressure > 0).sum()))
-    return times, iterations, touching, state.pressure[0]
+    return times, iterations, touching, state.pressure[0], sum(block.iterations for block in contact.blocks)
 
 
-def report(name: str, side: int, run: Callable[[], tuple[list[float], list[int], list[int], Array]]) -> Array:
-    """Print the row of one run."""
-    times, iterations, touching, pressure = run()
+def report(name: str, side: int, run: Callable[[], Found]) -> None:
+    """Print the row of one run, and its pressures."""
+    times, iterations, touching, pressure, krylov = run()
     later = np.array(times[1:])
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    print(
+    peak = max(COMM.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024))
+    if COMM.rank:
+        return
+    row = (
         f"| {side * side:6,} | {name:8} | {touching[0]:,} to {touching[-1]:,} | {times[0]:.2f} s in {iterations[0]} "
         f"| {1e3 * np.median(later):.1f} | {1e3 * later.mean():.1f} | {later.max():.2f} "
-        f"| {np.mean(iterations[1:]):.1f} | {sum(times):.1f} s | {peak:.0f} |",
-        flush=True,
+        f"| {np.mean(iterations[1:]):.1f} | {krylov / len(times):.1f} | {sum(times):.1f} s | {peak:.0f} |"
     )
-    return pressure
+    print(json.dumps([row, pressure.tolist()]))
+
+
+def row(way: str, side: int, steps: int, asked: argparse.Namespace) -> Array:
+    """Print the row of a run in a process of its own, or in several; return its pressures."""
+    words = ["--way", way, "--sides", side, "--steps", steps, "--radius", asked.radius, "--loads", *asked.loads]
+    ranks = ["mpirun", "--oversubscribe", "-n", way.removesuffix(" ranks")] if way.endswith("ranks") else []
+    command = [*ranks, sys.executable, "-m", "mpi4py", __file__, *map(str, words)]
+    environment = {**os.environ, "HWLOC_HIDE_ERRORS": "2"}
+    done = subprocess.run(command, check=True, env=environment, capture_output=True, text=True)
+    text, pressures = json.loads(done.stdout.splitlines()[-1])
+    print(text.replace("iterated", "fft     "), flush=True)
+    return np.array(pressures)
 
 
 def main() -> None:
@@ -231,31 +249,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Contacts of thousands of nodes.")
     parser.add_argument("--beside", action="store_true")
     parser.add_argument("--loads", type=float, nargs="*", default=[1.0])
+    parser.add_argument("--radius", type=float, default=RADIUS)
     parser.add_argument("--steps", type=int, default=1000)
     parser.add_argument("--sides", type=int, nargs="*", default=[45, 70, 100])
+    parser.add_argument("--ranks", type=int, nargs="*", default=[2])
     parser.add_argument("--way", default=None)
     asked = parser.parse_args()
     if asked.way:
         way, side = asked.way, asked.sides[0]
-        found = run if way == "run" else partial(wear, way=way)
-        pressure = report(way, side, lambda: found(side, asked.steps, loads=asked.loads))
-        print(json.dumps(pressure.tolist()))
+        found = run if way == "run" or way.endswith("ranks") else partial(wear, way=way)
+        report(way, side, lambda: found(side, asked.steps, loads=asked.loads, radius=asked.radius))
         return
-    print("| nodes | way | in contact | first step | median ms | mean ms | longest s | Newton | all steps | MiB |")
-    print("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    print("| nodes | way | in contact | first step | median ms | mean ms | longest s | Newton | Krylov | all | MiB |")
+    print("| ---: | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     for side in asked.sides:
         few = min(asked.steps, 50)
-        ways = [("run", asked.steps), ("iterated", asked.steps)]
+        ways = [("run", asked.steps), *((f"{ranks} ranks", asked.steps) for ranks in asked.ranks)]
+        ways += [("iterated", asked.steps)]
         ways += [("factors", few), ("dense", few)] if asked.beside else []
-        last = {}
-        for way, steps in ways:
-            words = ["--way", way, "--sides", side, "--steps", steps, "--loads", *asked.loads]
-            done = subprocess.run(
-                [sys.executable, __file__, *map(str, words)], check=True, capture_output=True, text=True
-            )
-            row, pressures = done.stdout.splitlines()
-            print(row.replace("iterated", "fft     "), flush=True)
-            last[way] = np.array(json.loads(pressures))
+        last = {way: row(way, side, steps, asked) for way, steps in ways}
         same = [last[way] for way, steps in ways if steps == asked.steps]
         print(f"largest difference of pressure: {max(np.abs(p - same[0]).max() for p in same) / same[0].max():.0e}")
 

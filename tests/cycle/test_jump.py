@@ -12,7 +12,7 @@ from fenwear import Case, Tribosystem, assemble, jump, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block
-from fenwear.cycle.jump import _force_difference
+from fenwear.cycle.jump_error import force_difference
 from fenwear.sliding.wear import WornLayer
 
 MEAN = 1e4 / 600
@@ -87,7 +87,7 @@ def test_laws_come_to_the_march(assembled: Callable[..., Tribosystem], case: str
 
 
 def test_growing_contact(edited: Callable[..., Case]) -> None:
-    """A cylinder worn flat over many nodes, one by one: few steps, and the depth of single steps."""
+    """A cylinder worn flat over many nodes, one by one: few steps, depths and edge pressures of single steps."""
 
     def one_way(tables: dict[str, Any]) -> None:
         del tables["wear"]["strip"]
@@ -96,11 +96,27 @@ def test_growing_contact(edited: Callable[..., Case]) -> None:
 
     width = ("geometry.parameters.contact_width=1", "geometry.parameters.elements_along_contact=80")
     system = assemble(edited("fretting", one_way, *width))
-    *_, whole = march(system, 200, implicit=True)
-    blocks = list(jump(system, 200, tolerance=3e-3))
-    assert (blocks[0].pressure[0] > 0).sum() < 0.5 * (whole.pressure[-1] > 0).sum()
-    assert sum(len(block) for block in blocks) < 60
-    np.testing.assert_allclose(blocks[-1].wear[-1], whole.wear[-1], rtol=0, atol=1e-3 * whole.wear[-1].max())
+    marched = list(march(system, 220, implicit=True))
+    pressure = np.concatenate([block.pressure for block in marched])
+    depth = np.concatenate([block.wear for block in marched])[199]
+    assert (pressure[0] > 0).sum() < 0.5 * (pressure[199] > 0).sum()
+    for tolerance in (2e-2, 3e-3, 5e-4):
+        blocks = list(jump(system, 200, tolerance=tolerance))
+        if tolerance == 3e-3:
+            assert sum(len(block) for block in blocks) < 60
+            np.testing.assert_allclose(blocks[-1].wear[-1], depth, rtol=0, atol=1e-3 * depth.max())
+        # A node comes into contact a little earlier or later: compared with what it carries in 3 % of the half-cycles,
+        # of a march that itself knows no less than two.
+        missed = []
+        for block in blocks:
+            for number, found in zip(block.half_cycle, block.pressure, strict=True):
+                if number > 20:
+                    around = max(2, int(0.03 * number))
+                    own = pressure[number - 1 - around : number + around]
+                    beyond = np.maximum(found - own.max(axis=0), own.min(axis=0) - found).max()
+                    missed.append(max(beyond, 0.0) / pressure[number - 1].max())
+        assert np.mean(missed) < 0.03
+        assert max(missed) < 0.12
 
 
 @pytest.mark.mpi
@@ -149,4 +165,4 @@ def test_distance_of_forces(assembled: Callable[..., Tribosystem]) -> None:
     forces = weights @ one, weights @ other
     expected = wasserstein_distance(x, x, weights * one, weights * other) / np.ptp(x[(one > 0) | (other > 0)])
     expected += abs(forces[0] - forces[1]) / max(forces)
-    assert _force_difference(system, one, other) == pytest.approx(expected, rel=1e-12)
+    assert force_difference(system, one, other) == pytest.approx(expected, rel=1e-12)

@@ -141,7 +141,7 @@ def test_jumps_that_fail(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, s
     """A jump that does not converge is shortened; a single cycle is cut into smaller steps. All is told."""
     system = assembled("example1", *COARSE)
     *_, usual = jump(system, 400, tolerance=1e-3)
-    stepper = sys.modules["fenwear.cycle.jump"]._Stepper
+    stepper = sys.modules["fenwear.cycle.jump_step"].Stepper
     original = stepper.step
 
     def step(self: Any, moment: Any, cycles: float, *since: Any) -> Any:

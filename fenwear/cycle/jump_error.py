@@ -1,0 +1,90 @@
+"""The error of a cycle jump, estimated from the jump made whole and in two halves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, with_reduced_heat
+from fenwear.cycle.state import RunState, present
+from fenwear.sliding.wear import Worn
+
+ORDER = 2  # of the steps of a jump
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated error of a jump.
+
+    Attributes:
+        depth: Of the worn depths over what the jump wears, both integrated over the surfaces; so the errors of
+            all jumps add up to at most the largest of them times the depth.
+        pressure: How far the contact force lies from where it should, over the width in contact, in the worst phase.
+        temperature: Of the contact surfaces over their rise from the initial one, root mean squares.
+    """
+
+    depth: float
+    pressure: float
+    temperature: float
+
+    @property
+    def largest(self) -> float:
+        """The largest of the three."""
+        return max(self.depth, self.pressure, self.temperature)
+
+
+def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:
+    """Return the error of two half steps from their difference to the whole one, by Richardson."""
+    apart, step = whole.worn - halves.worn, halves.worn - before.worn
+    wrong, worn = area(system, apart), area(system, step)
+    pressure = max(
+        force_difference(system, present(one).pressure[0], present(other).pressure[0])
+        for one, other in zip(whole.contacts, halves.contacts, strict=True)
+    )
+    share = 1 / (2**ORDER - 1)
+    return Estimate(
+        share * wrong / max(worn, 1e-300), share * pressure, share * _heat_difference(system, whole, halves)
+    )
+
+
+def area(system: Tribosystem, worn: Worn) -> float:
+    """Return the integral of the size of depths over both surfaces."""
+    pair = system.pair
+    return float(pair.weights @ np.abs(worn.punch) + pair.strip.weights @ np.abs(worn.strip))
+
+
+def force_difference(system: Tribosystem, first: Array, second: Array) -> float:
+    """Return how far the force of one pressure (n,) lies from that of another, over the extent of the contact.
+
+    The Wasserstein distance of the two distributions, and the difference of their forces. Not a norm of the pressures'
+    difference: a node at the edge closes as soon as the shape changes by what a node gives way, and a norm would be
+    that of this node alone.
+    """
+    x, weights = system.pair.punch.x, system.pair.weights
+    forces = [weights * first, weights * second]
+    one, other = (float(force.sum()) for force in forces)
+    if min(one, other) <= 0:
+        return float(max(one, other) > 0)
+    touched = x[(first > 0) | (second > 0)]
+    width = max(float(np.ptp(touched, axis=0).max()), float(weights.min()))
+    apart = forces[0] / one - forces[1] / other
+    moved = 0.0
+    for along in x.T:  # each axis; scipy's function for it would take half a second of imports
+        order = along.argsort()
+        moved = max(moved, float(np.abs(apart[order].cumsum())[:-1] @ np.diff(along[order])))
+    return moved / width + abs(one - other) / max(one, other)
+
+
+def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> float:
+    """Return the difference of the contact temperatures over their rise; 0 without heat."""
+    exchange = with_reduced_heat(system).exchange
+    if exchange is None or one.temperature is None or other.temperature is None:
+        return 0.0
+    first, second, initial = (
+        np.array(exchange.contact_temperatures(t)) for t in (one.temperature, other.temperature, exchange.initial())
+    )
+    weights = system.pair.weights
+    apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
+    return apart / max(rise, 1e-300)

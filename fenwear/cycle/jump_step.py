@@ -1,0 +1,334 @@
+"""The implicit step of cycle jumps.
+
+A cycle takes the state y, the worn depths and the temperatures, to y + F(y). Let y(n) be smooth and meet
+the states of a march at whole numbers n of cycles: y(n + 1/2) changes by F(y(n)), so that to second order
+
+    dy/dn = f(y) = F(y - f(y) / 2):
+
+the cycle with the middle y begins half a cycle's change before it. One jump is a step of the two-stage,
+second-order, L-stable and stiffly accurate Runge-Kutta method (SDIRK; Alexander, SIAM J. Numer. Anal.
+14, 1977) with g = 1 - 1/sqrt(2):
+
+    y_1 = y + g N f(y_1),    y_2 = y + (1 - g) N f(y_1) + g N f(y_2).
+
+Its weights 1 - g and g are positive, so that no depth decreases, and its end y_2 is itself a solved
+contact. A stage solves contact, wear and heat together: all phases of a cycle stand in one inequality
+with the wear of h = g N cycles at their own pressures,
+
+    gap_k = S_k p_k + H a_k + g_k + w_n + h beta~ (sum of S_j p_j^b) >= 0,   p_k >= 0,   p_k gap_k = 0,
+
+and, with heat, the thermal gap at the end of each phase, which is linear in the same pressures. Its
+cycle begins at h - 1/2 cycles. Friction, wear and conductance are those of the stage itself: the
+pressure of each phase, and the temperature at its start. All phases meet the shape in the middle of the
+cycle, where those of a march come one after the other: they differ by the wear of half a cycle, as an
+explicit march does from an implicit one.
+
+A node that comes into contact within a step has f(y_1) = 0: all that it must lose to follow its neighbours
+it loses by g N f(y_2), and at the end it carries up to 1 / g = 3.4 times their pressure. So a jump in which
+nodes come into contact ends by one step of the implicit Euler method over a share of it, `LAST`:
+y_3 = y_2 + h f(y_3). In it such a node loses what its neighbours lose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
+from fenwear.cycle.coupled import Coupled, Passing
+from fenwear.cycle.driver import HalfCycle, Loading, Watch, as_given, unwatched
+from fenwear.cycle.jump_error import Estimate, area, estimated
+from fenwear.cycle.state import RunState, beginning, joined, parted, present
+from fenwear.cycle.totals import PhaseMeter, Totals
+from fenwear.errors import ConvergenceError
+from fenwear.remedies import SMALLER_STEPS
+from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import Worn, WornLayer
+
+GAMMA = 1 - np.sqrt(0.5)
+LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
+PARTS = 8  # of a cycle that does not converge as a whole
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals."""
+
+    contact: ContactState
+    heated: Array
+    worn: Worn
+    adds: Totals
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """Depths, temperatures (dim,), None without heat, and totals."""
+
+    worn: Worn
+    temperature: Array | None
+    totals: Totals
+
+    def after(self, stage: _Stage, cycles: float) -> _Moment:
+        """Return the moment so many cycles as that of a stage later."""
+        temperature = None if self.temperature is None else self.temperature + cycles * stage.heated
+        return _Moment(self.worn + stage.worn.times(cycles), temperature, self.totals + stage.adds.times(cycles))
+
+
+class Stepper:
+    """Implicit steps of any number of cycles."""
+
+    def __init__(
+        self, system: Tribosystem, tolerance: float, watch: Watch = unwatched, loading: Loading = as_given
+    ) -> None:
+        self.system, self.tolerance, self.watch, self.loading = system, tolerance, watch, loading
+        self.contact = system.phase_contact(range(len(system.motion.phases)))
+        self.ratios = system.friction_ratios()
+        self.wear = system.phases_wear
+        self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
+        self.coupled = Coupled(system, self.take)
+        self._heated: Array = np.zeros(0)  # by the last cycle
+        self._done = 0.0  # half-cycles at the end of the stage
+        self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
+
+    def beginning(self) -> RunState:
+        """Return the unworn bodies at their initial temperature."""
+        return beginning(self.system, None if self.coupled.heat is None else self.coupled.heat.exchange.initial())
+
+    def attempt(self, state: RunState, cycles: int) -> tuple[RunState, Estimate]:
+        """Return the state `cycles` cycles later, by two steps, and an estimate of its error.
+
+        Raises:
+            ConvergenceError: it did not converge; a single cycle not in smaller steps either.
+        """
+        try:
+            known, self._half = self._half, None
+            whole = known[2] if known and known[0] is state and known[1] == cycles else self.step(state, cycles)
+            half = self.step(state, cycles / 2)
+            self._half = (state, cycles / 2, half)
+            comes = _comes(state, half, whole)
+            last = LAST * cycles if comes else 0.0
+            halves = self.step(half, cycles / 2 - last, cycles / 2)
+            if comes:
+                halves = self._last_step(halves, last, cycles - last)
+            estimate = estimated(self.system, state, whole, halves)
+            if comes:
+                estimate = replace(estimate, depth=max(estimate.depth, self._bent(state, half, whole)))
+            if self.system.passing_laws:
+                missed = self._missed(state, half, halves, cycles)
+                estimate = replace(estimate, depth=max(estimate.depth, missed))
+            return halves, estimate
+        except ConvergenceError as error:
+            if cycles > 1:
+                raise
+            try:
+                parts = self.steps(state, cycles, PARTS)
+            except ConvergenceError:
+                raise error from None
+            self.system.remedies.note(SMALLER_STEPS.format(PARTS))
+            return parts, Estimate(np.inf, np.inf, np.inf)
+
+    def _bent(self, state: RunState, half: RunState, whole: RunState) -> float:
+        """Return the error of the depths by a last step of first order, h^2 y'' / 2, relative to what the jump wears.
+
+        y'' follows from what both halves of the jump wear, d_1 and d_2: 4 (d_2 - d_1) / N^2.
+        """
+        first, second = half.worn - state.worn, whole.worn - half.worn
+        worn = area(self.system, first + second)
+        return 2 * LAST**2 * area(self.system, second - first) / max(worn, 1e-300)
+
+    def _missed(self, state: RunState, half: RunState, halves: RunState, cycles: float) -> float:
+        """Return the error of what a jump wears where coefficients change with depth or distance, relative.
+
+        Its stages do not look at its begin: a coating that is worn through before the first of them would be missed.
+        Simpson's rule on the wear of a cycle at the begin, in the middle and at the end does, and is of higher order.
+        """
+        if any(contact is None for contact in state.contacts):
+            return 0.0
+        strokes = self.system.motion.half_cycles
+        begin, middle, end = (
+            self._rate(one, state.half_cycle + share * cycles * strokes)
+            for one, share in ((state, 0.0), (half, 0.5), (halves, 1.0))
+        )
+        simpson = (begin + middle.times(4.0) + end).times(cycles / 6)
+        worn = halves.worn - state.worn
+        wrong, all_worn = (area(self.system, one) for one in (simpson - worn, worn))
+        return wrong / max(all_worn, 1e-300)
+
+    def _rate(self, state: RunState, half_cycles: float) -> Worn:
+        """Return what a cycle wears at the depths, temperatures and pressures of a state."""
+        system, surfaces = self.system, None
+        pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
+        if self.coupled.heat is not None and state.temperature is not None:
+            surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
+        conditions = [
+            system.conditions(k, pressure, surfaces, state.worn, half_cycles) for k, pressure in enumerate(pressures)
+        ]
+        return system.wear.phases(conditions).worn(pressures)
+
+    def steps(self, state: RunState, cycles: float, count: int) -> RunState:
+        """Return the state `cycles` cycles later, by that many equal steps."""
+        for number in range(count):
+            state = self.step(state, cycles / count, number * cycles / count)
+        return state
+
+    def step(self, state: RunState, cycles: float, since: float = 0.0) -> RunState:
+        """Return the state `cycles` cycles later, by the two stages of one step.
+
+        Args:
+            state: Where it begins; its number of half-cycles is that of the jump's begin.
+            cycles: Its length.
+            since: Cycles from there to the begin of the step.
+        """
+        share = GAMMA * cycles
+        begin = self._moment(state)
+        self._press(state.half_cycle, since + share)
+        first = self._stage(begin, joined(state.contacts), share)
+        between = begin.after(first, cycles - share)
+        self._press(state.half_cycle, since + cycles)
+        return self._end(state, between, self._stage(between, first.contact, share), share)
+
+    def _last_step(self, state: RunState, cycles: float, since: float) -> RunState:
+        """Return the state `cycles` cycles later, by one implicit Euler step; as `step`."""
+        begin = self._moment(state)
+        self._press(state.half_cycle, since + cycles)
+        return self._end(state, begin, self._stage(begin, joined(state.contacts), cycles), cycles)
+
+    def _moment(self, state: RunState) -> _Moment:
+        heat, temperature = self.coupled.heat, None
+        if heat is not None and state.temperature is not None:
+            temperature = heat.exchange.own(state.temperature).values
+        return _Moment(state.worn, temperature, state.totals)
+
+    def _end(self, state: RunState, before: _Moment, last: _Stage, cycles: float) -> RunState:
+        """Return the end of a step whose last stage is solved."""
+        now, heat, temperature = before.after(last, cycles), self.coupled.heat, None
+        if heat is not None and now.temperature is not None:
+            temperature = heat.exchange.at(now.temperature)
+            self._heated = last.heated
+        return RunState(state.half_cycle, now.worn, parted(last.contact), temperature, now.totals)
+
+    def _passing(self, worn: Worn, cycles: float) -> Passing | None:
+        """Return how depths follow in a stage where coefficients depend on them."""
+        if not self.system.passing_laws:
+            return None
+        return Passing(worn, cycles, self._wear, self._done)
+
+    def _wear(self, pressure: Array) -> Worn:
+        return self.wear.worn(pressure)  # as last taken
+
+    def _press(self, half_cycle: int, cycles: float) -> None:
+        """Take the time and the loads so many cycles after a half-cycle."""
+        self._done = half_cycle + cycles * self.system.motion.half_cycles
+        if self.loading is not as_given and isinstance(self.contact, CondensedContact):
+            self.contact.press(self.loading(self._done))
+
+    def _stage(self, before: _Moment, start: ContactState | None, cycles: float) -> _Stage:
+        """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0."""
+        gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
+        if start is None:  # the first of all: what conducts is seen from the contact without heat
+            start = self._solve(gap, None, cycles)
+        contact, begin = self.coupled.solve(
+            before.temperature,
+            cycles - 0.5,
+            start,
+            lambda thermal, coupling, near: self._solve(
+                gap if thermal is None else gap + thermal, near, cycles, coupling
+            ),
+            self._passing(before.worn, cycles),
+            lagged=True,
+        )
+        heated: Array = np.zeros(0)
+        if begin is not None:
+            heated = self.coupled.through(begin, contact.pressure)[-1] - begin
+        adds = reduce(Totals.__add__, self._adds(contact.pressure))
+        return _Stage(contact, heated, self.wear.worn(contact.pressure), adds)
+
+    def _solve(
+        self, gap: Array, start: ContactState | None, cycles: float, coupling: Array | None = None
+    ) -> ContactState:
+        self.watch()
+        return self.contact.solve(gap, start, WornLayer(self.wear, cycles), coupling)
+
+    def take(self, conditions: Sequence[ContactConditions]) -> None:
+        """Take friction and wear at the conditions of the phases."""
+        system = self.system
+        self.wear = system.wear.phases(conditions)
+        self._measure([system.friction.values(state) for state in conditions])
+        if system.friction.constant:
+            return
+        self.ratios = system.friction_ratios(conditions)
+        if isinstance(self.contact, CondensedContact):
+            self.contact.slide(self.ratios)
+
+    def _measure(self, friction: Sequence[Array]) -> None:
+        self.meters = [PhaseMeter(self.system, k, mu, self.wear.some([k])) for k, mu in enumerate(friction)]
+
+    def _adds(self, pressure: Array) -> list[Totals]:
+        """Return what each phase of a cycle adds at its pressure (m, n)."""
+        return [meter(pressure[k, :]) for k, meter in enumerate(self.meters)]
+
+    def last_cycle(self, before: RunState, after: RunState, cycles: int) -> list[HalfCycle]:
+        """Return the half-cycles of the last cycle of a jump."""
+        motion, found = self.system.motion, []
+        contacts = [present(contact) for contact in after.contacts]
+        heats = self._last_cycle_heat(after)
+        # Half-cycles after one have worn what is missing at its end.
+        depths, totals = [after.worn], [after.totals]
+        adds = self._adds(np.concatenate([contact.pressure for contact in contacts]))
+        phases = list(range(len(contacts)))
+        for stroke in reversed(range(1, motion.half_cycles)):
+            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
+            depths.insert(0, depths[0] - self._worn(own, contacts))
+            totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
+        for stroke, depth in enumerate(depths):
+            own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
+            records = [self._phase_record(k, contacts[k], before.contacts[k], cycles, adds[k]) for k in own]
+            number = after.half_cycle - (motion.half_cycles - 1 - stroke)
+            own_heats = [heat for heat in (heats[k] for k in own) if heat is not None]
+            heat = reduce(HalfCycleHeat.then, own_heats) if own_heats else None
+            load = self.loading(after.half_cycle)
+            found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
+        return found
+
+    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState]) -> Worn:
+        pressures = np.concatenate([contacts[k].pressure for k in phases])
+        return self.wear.some(phases).worn(pressures)
+
+    def _phase_record(
+        self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals
+    ) -> PhaseRecord:
+        previous = None
+        if old is not None:
+            previous = contact.pressure[0] - (contact.pressure[0] - old.pressure[0]) / cycles
+        return PhaseRecord(phase, contact, previous, adds, self.ratios[phase])
+
+    def _last_cycle_heat(self, state: RunState) -> list[HalfCycleHeat | None]:
+        """Return the heat of the cycle that ends with the state."""
+        if self.coupled.heat is None or state.temperature is None:
+            return [None] * len(state.contacts)
+        heats: list[HalfCycleHeat | None] = []
+        exchange = self.coupled.heat.exchange
+        temperature = exchange.at(exchange.own(state.temperature).values - self._heated)
+        for phase, contact in enumerate(state.contacts):
+            pressure = present(contact).pressure[0]
+            conductance = exchange.conductance(pressure)
+            temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
+            bulk = np.nan if temperature.bulk is None else temperature.bulk
+            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature), terms, 1, bulk))
+        return heats
+
+
+def _comes(before: RunState, half: RunState, end: RunState) -> bool:
+    """Return whether a node comes into contact from the begin of a jump or from its middle to its end."""
+    return any(
+        bool(np.any((late.pressure > 0) & ((middle.pressure == 0) | (early is not None and early.pressure == 0))))
+        for early, middle, late in zip(
+            before.contacts, map(present, half.contacts), map(present, end.contacts), strict=True
+        )
+    )

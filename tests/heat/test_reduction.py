@@ -40,7 +40,7 @@ def temperatures(block: Block) -> Array:
 @pytest.mark.parametrize("settings", [(), WARM, ("heat.conductance=perfect", "heat.partition=0.3")])
 @pytest.mark.mpi
 def test_reduced_equals_full(assembled: Callable[..., Tribosystem], settings: tuple[str, ...]) -> None:
-    """Issue 4: contact temperatures within 0.1 K over 100 coupled half-cycles, with a fraction of the unknowns."""
+    """Contact temperatures within 0.1 K over 100 coupled half-cycles, with a fraction of the unknowns."""
     full = assembled("example1-heat", *COARSE, *settings, "heat.operator=full")
     reduced = assembled("example1-heat", *COARSE, *settings)
     sizes = [sum(system.comm.allreduce(body.owned) for body in system.bodies.heat) for system in (full, reduced)]

@@ -161,7 +161,7 @@ BAD = [
 
 @pytest.mark.parametrize(("arguments", "expected"), BAD)
 def test_wrong_case(fenwear: Run, tmp_path: Path, arguments: list[str], expected: str) -> None:
-    """Issue 2, "Bad input": exit status 2, the key named, no traceback, nothing written."""
+    """Exit status 2, the key named, no traceback, nothing written."""
     refused(fenwear("run", "example1", "-o", tmp_path / "run", *arguments), 2, expected)
     assert not (tmp_path / "run").exists()
 

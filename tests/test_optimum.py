@@ -104,7 +104,7 @@ def test_neither_speed_nor_wear_coefficient_changes_the_pressure(assembled: Call
 )
 @pytest.mark.mpi
 def test_tipping_punch_is_refused(settings: tuple[str, ...]) -> None:
-    """No pressure balances a resultant beyond the contact's edges (issue 2, "Bad input")."""
+    """No pressure balances a resultant beyond the contact's edges."""
     with pytest.raises(CaseError, match=r"punch\.loads: no pressure on the contact balances .*(tips|lifts)"):
         assemble(load_case("example1", settings))
 

@@ -7,7 +7,8 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from fenwear.arrays import Array
-from fenwear.bodies.contact_surface import CORNERS, ContactSurface
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.results.subcells import linear_cells
 from fenwear.stick.interface import Position
 
 
@@ -34,27 +35,29 @@ def directions(position: Position) -> Array:
 def surface_gradient(surface: ContactSurface) -> list[csr_array]:
     """Return the derivatives along each axis, within the surface, of values at its pressure nodes, d of (n, n).
 
-    At a node of several facets their mean by area.
+    The values go straight from node to node: at the edge of a stick zone, where the strain has a vertical tangent, a
+    parabola through nodes that stick and one that has slipped turns round and sets strains of the wrong sign beside it.
+    At a node the mean of the linear cells about it, each weighted by one over its size: no larger than the largest of
+    them, and of second order, which the mean by size is not where cells differ in size.
     """
     straight = surface.cell == "triangle"  # values live on the vertices
-    element = basix.create_element(
-        basix.ElementFamily.P,
-        basix.CellType[surface.cell],
-        1 if straight else surface.degree,
-        basix.LagrangeVariant.gll_warped,
-    )
+    cells = linear_cells(surface.cell, 1 if straight else surface.degree)
+    if surface.cell == "quadrilateral":
+        cells = cells[:, [0, 1, 3, 2]]  # basix' order of corners
+    corners = cells.shape[1]
+    facets = surface.facets[:, cells].reshape(-1, corners)
+    element = basix.create_element(basix.ElementFamily.P, basix.CellType[surface.cell], 1)
     table = element.tabulate(1, element.points)[1:, :, :, 0]
-    facets = surface.facets[:, : CORNERS["triangle"]] if straight else surface.facets
     jacobian = np.einsum("dqk,fkc->fqcd", table, surface.trace[facets])
     values = np.einsum("fqdc,dqk->cfqk", np.linalg.pinv(jacobian), table)
-    area = np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian)).mean(axis=1)
+    weight = 1 / np.sqrt(np.linalg.det(np.swapaxes(jacobian, -1, -2) @ jacobian)).mean(axis=1)
     number = np.zeros(len(surface.trace), dtype=np.int64)
     number[surface.nodes] = np.arange(len(surface.nodes))
     places, n = number[facets], len(surface.nodes)
     rows = np.broadcast_to(places[:, :, None], values.shape[1:]).ravel()
     columns = np.broadcast_to(places[:, None, :], values.shape[1:]).ravel()
-    share = np.bincount(places.ravel(), np.repeat(area, places.shape[1]), n)
-    scaled = values * area[:, None, None]
+    share = np.bincount(places.ravel(), np.repeat(weight, corners), n)
+    scaled = values * weight[:, None, None]
     return [csr_array(coo_array((v.ravel() / share[rows], (rows, columns)), shape=(n, n))) for v in scaled]
 
 

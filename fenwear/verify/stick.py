@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import cache
 
@@ -11,6 +11,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import build_bodies, make_sliding
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
+from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.verify.bodies import STEEL, two_block_case
 from fenwear.verify.suite import Line, Plot, Result, Row, number, profile, verification
 
@@ -19,7 +20,9 @@ MODULUS = STEEL["young"] / (2 * (1 - STEEL["poisson"] ** 2))  # E*, MPa
 HALF_WIDTH = 2 * np.sqrt(LOAD * RADIUS / (np.pi * MODULUS))  # a, mm
 PEAK = 2 * LOAD / (np.pi * HALF_WIDTH)  # p0, MPa
 CORE, FAR = 0.24, 600.0  # width of the evenly divided part, and half that of the blocks, mm
+SLOPE = 0.02  # of the wedge
 FORCES = np.linspace(0.05, 0.5, 10)  # Q / (mu P) of the steps
+COUNTS = (10, 20, 40, 80)  # elements on the core
 
 
 @cache
@@ -100,6 +103,32 @@ def back_from(x: Array, most: float, force: float) -> Array:
     return traction_of(x, most) - 2 * traction_of(x, (most - force) / 2)
 
 
+def stretch(x: Array, half_width: float) -> Array:
+    """Return what an elliptic traction of unit peak stretches the surface by by: y, less its root outside."""
+    y = x / half_width
+    return np.asarray(y - np.sign(y) * np.sqrt(np.maximum(y**2 - 1, 0)))
+
+
+def stress_of(x: Array, force: float) -> Array:
+    """Return sigma_xx in the strip's surface at a force Q / (mu P) on it, MPa: -p, and by traction."""
+    c = HALF_WIDTH * np.sqrt(1 - force)
+    pulled = stretch(x, HALF_WIDTH) - c / HALF_WIDTH * stretch(x, float(c))
+    return 2 * FRICTION * PEAK * pulled - PEAK * ellipse(x, HALF_WIDTH)
+
+
+def surface_stress(interface: StickInterface, state: StickState) -> Array:
+    """Return sigma_xx in the strip's surface at the contact nodes, from its displacement and the pressure (n,), MPa."""
+    nu, position = STEEL["poisson"], interface.middle
+    strain = surface_strain(position, surface_gradient(position.pair.punch), state.on_strip)[:, 0]
+    return STEEL["young"] / (1 - nu**2) * strain - nu / (1 - nu) * state.pressure
+
+
+def slope_of(what: str, errors: Sequence[float]) -> Row:
+    """Compare the order of errors over the meshes, fitted to all: each depends on where a node lies near an edge."""
+    slope = -float(np.polyfit(np.log(COUNTS), np.log(errors), 1)[0])
+    return number(what, 1.0, slope, 0.25)
+
+
 def away(x: Array, edges: Iterable[float]) -> Array:
     """Return where no edge of contact or stick, at which slopes are infinite, is nearer than 0.06 a (n,) bool."""
     return np.all([np.abs(np.abs(x) - abs(edge)) > 0.06 * HALF_WIDTH for edge in edges], axis=0)
@@ -143,17 +172,18 @@ def cattaneo_mindlin() -> Result:
         ]
         shown = np.abs(x) < 1.1 * HALF_WIDTH
         lines += [Line(f"exact, {name}", dense, drawn, reference=True), Line(f"fenwear, {name}", x[shown], q[shown])]
-    counts = (10, 20, 40, 80)
-    errors = [rms_error(count) for count in counts]
-    slope = float(np.polyfit(np.log(1 / np.array(counts)), np.log(errors), 1)[0])
-    rows.append(number("order of the L2 error over four meshes, forces from 0.2 to 0.8 mu P", 1.0, slope, 0.25))
+    errors = [cattaneo_error(count) for count in COUNTS]
+    rows.append(slope_of("order of the L2 error over four meshes, forces from 0.2 to 0.8 mu P", errors))
+    stress_rows, stress_plot = _stress()
+    rows += stress_rows
     plots = [
+        stress_plot,
         Plot("Partial slip: traction", "x (mm)", "traction (MPa)", lines),
         Plot(
             "Partial slip: error of the traction, whose slope is infinite at the edges",
             "element size h (mm)",
             "L2 error over that of the traction",
-            [Line("mean over forces", CORE / np.array(counts), np.array(errors))],
+            [Line("mean over forces", CORE / np.array(COUNTS), np.array(errors))],
             ("log", "log"),
             (1.0,),
         ),
@@ -161,16 +191,44 @@ def cattaneo_mindlin() -> Result:
     return Result(rows, plots)
 
 
-def rms_error(elements: int) -> float:
-    """Return the L2 error of the traction relative to its norm, the mean over forces."""
+def _stress() -> tuple[list[Row], Plot]:
+    """Return the stress in the strip's surface at mu P / 2 node by node, and the order of its error.
+
+    Its slope is infinite at the edges of contact and stick zone; the strain there must not swing beside them.
+    """
+    interface = half_planes()
+    x = interface.middle.pair.x
+    state, start = pressed(interface, parabola(x))
+    state, _ = follow(interface, state, start, FORCES, 0 * FORCES)
+    most = float(FORCES[-1])
+    exact, found, scale = stress_of(x, most), surface_stress(interface, state), FRICTION * PEAK
+    core, edges = np.abs(x) < CORE / 2, np.array([1, np.sqrt(1 - most)]) * HALF_WIDTH
+    free = np.logical_and(core, away(x, edges))
+    stuck = np.asarray(np.abs(x) < (np.sqrt(1 - most) - 0.03) * HALF_WIDTH)  # to a node of the edge
+    errors = [cattaneo_error(count, stress=True) for count in COUNTS]
+    rows = [
+        profile("stress in the strip's surface over mu p0", exact[free], found[free], 0.01, scale=scale),
+        profile("the same where it sticks, up to the edge", exact[stuck], found[stuck], 0.01, scale=scale),
+        number("its largest error over mu p0, at an edge", 0.0, np.abs(found - exact)[core].max(), 0.15, scale=scale),
+        slope_of("order of its L2 error over four meshes, forces from 0.2 to 0.8 mu P", errors),
+    ]
+    shown = np.abs(x) < 1.25 * HALF_WIDTH
+    lines = [Line("exact", x[shown], exact[shown], reference=True), Line("fenwear", x[shown], found[shown])]
+    return rows, Plot("Partial slip: stress in the strip's surface", "x (mm)", "stress along x (MPa)", lines)
+
+
+def cattaneo_error(elements: int, *, stress: bool = False) -> float:
+    """Return the L2 error of the traction, or of the strip's surface stress, over its norm, the mean over forces."""
     interface = half_planes(elements)
     x, weights = interface.middle.pair.x, interface.middle.pair.weights
     state, start = pressed(interface, parabola(x))
-    errors = []
+    core, errors = np.abs(x) < CORE / 2, []
     for force in np.linspace(0.2, 0.8, 13):
         state, start = follow(interface, state, start, [force], [0.0])
-        exact = traction_of(x, force)
-        errors.append(np.sqrt(weights @ (state.traction[:, 0] - exact) ** 2 / (weights @ exact**2)))
+        exact = stress_of(x, force) if stress else traction_of(x, force)
+        found = surface_stress(interface, state) if stress else state.traction[:, 0]
+        w = weights[core]
+        errors.append(np.sqrt(w @ (found - exact)[core] ** 2 / (w @ exact[core] ** 2)))
     return float(np.mean(errors))
 
 
@@ -217,11 +275,9 @@ def bulk_stress() -> Result:
             Line(f"exact, {name}", x[shown], exact[shown], reference=True),
             Line(f"fenwear, {name}", x[shown], q[shown]),
         ]
-    counts = (10, 20, 40, 80)
     for name, error in (("bulk stress", bulk_error), ("force taken back to zero", reversal_error)):
-        errors = [error(count) for count in counts]
-        slope = float(np.polyfit(np.log(1 / np.array(counts)), np.log(errors), 1)[0])
-        rows.append(number(f"{name}: order of the L2 error over four meshes, mean of forces", 1.0, slope, 0.25))
+        errors = [error(count) for count in COUNTS]
+        rows.append(slope_of(f"{name}: order of the L2 error over four meshes, mean of forces", errors))
     return Result(rows, [Plot("Bulk stress: traction", "x (mm)", "traction (MPa)", lines)])
 
 
@@ -263,7 +319,7 @@ def ciavarella_jaeger() -> Result:
     reach = HALF_WIDTH
     gaps: dict[str, Array] = {
         "wavy cylinder": parabola(x) + 2e-5 * np.cos(2 * np.pi * x / (0.5 * reach)),
-        "wedge": 0.02 * np.abs(x),
+        "wedge": SLOPE * np.abs(x),
         "rounded on one side": np.where(x > 0, x**2 / 4, x**2 / 12),
     }
     rows: list[Row] = []
@@ -288,4 +344,27 @@ def ciavarella_jaeger() -> Result:
             Line(f"superposition, {name}", x[shown], exact[shown], reference=True),
             Line(f"fenwear, {name}", x[shown], q[shown]),
         ]
+    wedges = [wedge_error(count) for count in COUNTS]
+    rows.append(slope_of("wedge: order of the L2 error over four meshes, mean of forces", wedges))
     return Result(rows, [Plot("Partial slip for other gaps: traction", "x (mm)", "traction (MPa)", lines)])
+
+
+def wedge_error(elements: int) -> float:
+    """Return the L2 error of the traction of a wedge over its norm, the mean over forces.
+
+    From the exact pressure p = E* s / pi arcosh(a / |x|), a = P / (E* s), of a wedge of slope s on a half-plane.
+    """
+    interface, errors = half_planes(elements), []
+    x, weights = interface.middle.pair.x, interface.middle.pair.weights
+    state, start = pressed(interface, SLOPE * np.abs(x))
+    half = LOAD / (MODULUS * SLOPE)
+    away_from_tip = np.where(x == 0, 1e-9 * half, np.abs(x))  # both pressures are infinite there, not the traction
+    for force in np.linspace(0.2, 0.8, 13):
+        state, start = follow(interface, state, start, [force], [0.0])
+        full, part = (
+            np.arccosh(np.maximum(width / away_from_tip, 1.0)) * MODULUS * SLOPE / np.pi
+            for width in (half, half * (1 - force))
+        )
+        exact = FRICTION * (full - part)
+        errors.append(np.sqrt(weights @ (state.traction[:, 0] - exact) ** 2 / (weights @ exact**2)))
+    return float(np.mean(errors))

@@ -24,7 +24,7 @@ def build(**parameters: float) -> tuple[BodyMesh, BodyMesh]:
 
 @pytest.mark.mpi
 def test_contract() -> None:
-    """The physical groups that issue 2 asks for, each with its own place (3 and 4 of Example 1's geometry)."""
+    """The physical groups, each with its own place (3 and 4 of Example 1's geometry)."""
     punch, strip = build()
     assert set(punch.regions) == {"punch_lower", "punch_upper"}
     assert set(strip.regions) == {"strip_body"}

@@ -114,7 +114,7 @@ LOAD_TWICE = "punch.loads=[{on='punch_load', force=[0, -1], traction=[0, -1]}]"
     ],
 )
 def test_refusal_names_the_key(settings: list[str], key: str, expected: str) -> None:
-    """Issue 2, "Bad input": a message naming the key and what was expected."""
+    """A message naming the key and what was expected."""
     with pytest.raises(CaseError) as refused:
         load_case("example1", settings)
     assert key in [p.key for p in refused.value.problems]

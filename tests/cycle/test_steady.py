@@ -118,7 +118,7 @@ def test_friction_can_tip_the_punch_out_of_any_steady_state(
 
 @pytest.mark.slow
 def test_forty_thousand_marched_half_cycles_end_there(assembled: Callable[..., Tribosystem]) -> None:
-    """Verification 11 and issue 3: marched and directly solved pressures within 0.1 MPa."""
+    """Verification 11: marched and directly solved pressures within 0.1 MPa."""
     system = assembled("example1", "geometry.degree=2")
     *_, last = march(system, 40_000)
     order = [1, 0] if last.direction[-1] == 1 else [0, 1]

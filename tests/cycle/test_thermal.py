@@ -237,7 +237,7 @@ def test_a_cycle_reproduces_the_steady_state(assembled: Assemble, partition: flo
 
 @pytest.mark.parametrize(("partition", "sign"), [(0.1, -1), (0.5, 1)])
 def test_sign_of_growth(assembled: Assemble, partition: float, sign: int) -> None:
-    """Issue 4: Example 1's steady state loses its stability between kappa = 0.1 and 0.5."""
+    """Example 1's steady state loses its stability between kappa = 0.1 and 0.5."""
     system = assembled("example1-heat", *COARSE, f"heat.partition={partition}")
     assert np.sign(growth_rate(system, steady(system).phase_pressure)) == sign
 
@@ -352,7 +352,7 @@ def test_no_growth_rate_of_what_is_not_stationary(assembled: Assemble) -> None:
 @pytest.mark.parametrize("operator", ["full", "reduced"])
 @pytest.mark.mpi
 def test_ranks_agree(assembled: Assemble, operator: str) -> None:
-    """Issue 4: march, jump, steady state and growth rate on these ranks and on one alone, to 1e-8."""
+    """March, jump, steady state and growth rate on these ranks and on one alone, to 1e-8."""
     settings = [*COARSE, f"heat.operator={operator}", "heat.partition=0.2", "heat.initial=-10"]
     together, alone = (
         assembled("example1-heat", *settings),

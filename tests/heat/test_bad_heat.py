@@ -1,4 +1,4 @@
-"""Issue 4, "Bad input": heat that cannot be is refused, in words and with the key."""
+"""Heat that cannot be is refused, in words and with the key."""
 
 from __future__ import annotations
 

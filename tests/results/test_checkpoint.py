@@ -40,7 +40,7 @@ def check_equal(resumed: Path, whole: Path) -> None:
 @pytest.mark.parametrize("integration", ["explicit", "jump"])
 @pytest.mark.parametrize("operator", ["reduced", "full"])
 def test_resumed_equals_whole(fenwear: Run, tmp_path: Path, integration: str, operator: str) -> None:
-    """Issue 5: a resumed run continues to the same numbers, 1e-10; a jump run is cut where a jump ends."""
+    """A resumed run continues to the same numbers, 1e-10; a jump run is cut where a jump ends."""
     case = options(f"run.integration={integration}", f"heat.operator={operator}", "output.fields_at=[40]")
     halves = ("--set", "run.half_cycles=40"), ("--set", "run.half_cycles=90", "--resume")
     for half in halves:
@@ -51,6 +51,7 @@ def test_resumed_equals_whole(fenwear: Run, tmp_path: Path, integration: str, op
     check_equal(tmp_path / "resumed", tmp_path / "whole")
 
 
+@pytest.mark.ranks
 def test_another_number_of_ranks(fenwear: Run, tmp_path: Path) -> None:
     """A run on two ranks goes on on one: the same scalars as a run on one, to 1e-9."""
     for ranks, count, extra in ((2, 20, ()), (1, 50, ("--resume",))):

@@ -209,3 +209,12 @@ def test_more_force_than_friction_holds() -> None:
     driven = rig("stick.force='109 N'")
     with pytest.raises(ConvergenceError, match=r"gross sliding starts: the tangential force .* reaches mu P = 108"):
         driven.cycle(driven.beginning())
+
+
+def test_the_surface_is_stretched_most_at_the_ends_of_strokes() -> None:
+    """Like bodies stretch alike: what sticks keeps its strain. None swings at a node as the edge of slip comes by."""
+    driven = rig()
+    _, parts = driven.cycle(driven.cycle(driven.beginning())[0])
+    strain = Records.joined(parts).strain[:, :, 0]
+    largest, at_ends = strain.max(axis=0), strain[[len(strain) // 2 - 1, -1]].max(axis=0)
+    assert np.abs(largest - at_ends).max() < 0.02 * np.ptp(strain, axis=0).max()

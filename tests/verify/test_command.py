@@ -155,6 +155,7 @@ def test_refusals(fenwear: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.ranks
 def test_ranks(fenwear: Run, tmp_path: Path, ranks: int) -> None:
     """Verification 18 on two and three ranks: compared with each rank on its own; said and written once."""
     done = fenwear("verify", "--only", "ranks", "-o", tmp_path / "v", ranks=ranks)

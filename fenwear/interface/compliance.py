@@ -66,12 +66,11 @@ class Interface:
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps."""
         modes = self.rigid.rigid_normal
-        own: Array = modes if self.rows is None else modes[self.rows.own]
-        inverse: Array = np.linalg.pinv(modes)
-        inverse = inverse if self.rows is None else inverse[:, self.rows.own]
+        here = EVERY if self.rows is None else self.rows.own
+        own, inverse = modes[here], np.linalg.pinv(modes)[:, here]
         runs = [slice(start, start + RUN) for start in range(0, len(own), RUN)]
         elastic = (self._own_rows(0.0, run) for run in runs)
-        rigid = np.zeros((modes.shape[1], len(modes)))
+        rigid: Array = np.zeros((modes.shape[1], len(modes)))
         for run, part in zip(runs, elastic, strict=True):
             rigid += inverse[:, run] @ part
         if self.rows is not None:

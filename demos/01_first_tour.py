@@ -106,6 +106,7 @@ for path in sorted(folder.rglob("*")):
 # `history.nc` holds every half-cycle and is read with xarray. Each variable knows its unit.
 
 # %%
+xarray.set_options(display_expand_attrs=False)  # the whole case file is among them
 history = read_history(folder)
 history
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "extensions")]
@@ -24,6 +22,7 @@ extensions = [
     "sphinx_copybutton",
     "mathml",
     "from_code",
+    "executed",
     "furo_files",
 ]
 exclude_patterns = ["_build", "extensions", "static"]
@@ -34,8 +33,10 @@ nitpick_ignore_regex = [("py:.*", ".*")]
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
 myst_heading_anchors = 3
-# Shown as they are; their tests execute them.
+# docs/extensions/executed.py does.
 nb_execution_mode = "off"
+nb_render_markdown_format = "gfm"  # tables in what cells show
+nb_merge_streams = True
 copybutton_exclude = ".linenos, .gp, .go"
 
 autodoc_member_order = "bysource"
@@ -55,11 +56,3 @@ html_show_sourcelink = False
 html_copy_source = False
 # All pages work without a network.
 html_theme_options = {"top_of_page_buttons": []}
-
-
-def setup(app: Any) -> None:
-    """Put the notebooks beside the pages."""
-    notebooks = HERE / "notebooks"
-    notebooks.mkdir(exist_ok=True)
-    for path in sorted((HERE.parent / "demos").glob("*.ipynb")):
-        shutil.copy(path, notebooks)

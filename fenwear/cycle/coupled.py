@@ -64,6 +64,22 @@ class Passing:
 
 
 @dataclass(frozen=True)
+class Solved:
+    """What `Coupled.solve` has found.
+
+    Attributes:
+        contact: Of all phases.
+        temperature: At the start of their cycle (dim,); None without heat.
+        conductances: By which these temperatures have come about (m, n), to be used wherever heat is followed through
+            the cycle: pressures that are nothing but for rounding do not say which of their nodes conduct.
+    """
+
+    contact: ContactState
+    temperature: Array | None = None
+    conductances: Array | None = None
+
+
+@dataclass(frozen=True)
 class _Unknowns:
     """Pressures, and where coefficients depend on them temperatures and depths, in one vector.
 
@@ -144,8 +160,8 @@ class Coupled:
         passing: Passing | None = None,
         *,
         lagged: bool = False,
-    ) -> tuple[ContactState, Array | None]:
-        """Return contact, and temperature (dim,) at the start of its cycle, `cycles` cycles on in one implicit step.
+    ) -> Solved:
+        """Return contact, and temperature at the start of its cycle, `cycles` cycles on in one implicit step.
 
         The unknowns are the pressures, and where coefficients depend on them the temperatures at the start of each
         phase and the worn depths. Without such coefficients the solution is exact once the same nodes conduct.
@@ -181,7 +197,7 @@ class Coupled:
         conducting: Callable[[NDArray[Any]], Array],
         *,
         lagged: bool,
-    ) -> tuple[ContactState, Array | None]:
+    ) -> Solved:
         """Return the same, where nodes of these pressures conduct."""
         system, heat, constant = self.system, self.heat, self.system.constant_coefficients
         shape, contact = start.pressure.shape, start
@@ -189,13 +205,14 @@ class Coupled:
         warm = heat is not None and temperature is not None and not constant
         parts: list[Array] = [start.pressure.ravel()]
         if temperature is not None and warm:
-            parts.append(self.surfaces(temperature, start.pressure).ravel())
+            first = None if heat is None else heat.conductances(start.pressure)
+            parts.append(self.surfaces(temperature, start.pressure, first).ravel())
         if passing is not None:
             # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
             parts += [passing.before.punch, passing.before.strip]
         unknowns = _Unknowns.like(parts, pressure_scale(system, start.pressure), warm=warm)
 
-        def advance(x: Array) -> tuple[Array, tuple[ContactState, Array | None], bool]:
+        def advance(x: Array) -> tuple[Array, Solved, bool]:
             nonlocal contact, known
             now = unknowns.parted(x)
             pressure = now[0].reshape(shape)
@@ -206,7 +223,7 @@ class Coupled:
             found: list[Array] = []
             if heat is None or temperature is None:
                 contact = solve(None, None, contact)
-                state, same = None, True
+                solved, same = Solved(contact), True
             else:
                 conductances = heat.conductances(conducting(pressure))
                 key = conductances.tobytes()
@@ -217,12 +234,13 @@ class Coupled:
                     self._in_step(end, contact, solve) if lagged else solve(end.gap, end.coupling * self.mu, contact)
                 )
                 state = end.state(self.mu * contact.pressure)
+                solved = Solved(contact, state, conductances)
                 same = np.array_equal(heat.conductances(conducting(contact.pressure)), conductances, equal_nan=True)
                 if warm:
-                    found.append(self.surfaces(state, contact.pressure).ravel())
+                    found.append(self.surfaces(state, contact.pressure, conductances).ravel())
             if passing is not None:
                 found.extend(passing.depths(contact.pressure))
-            return unknowns.joined([contact.pressure.ravel(), *found]), (contact, state), same and constant
+            return unknowns.joined([contact.pressure.ravel(), *found]), solved, same and constant
 
         return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE)
 
@@ -252,20 +270,25 @@ class Coupled:
             return self.heat
         return CycleHeat(self.heat.exchange.with_friction(self.mu))
 
-    def surfaces(self, state: Array, pressure: Array) -> Array:
+    def surfaces(self, state: Array, pressure: Array, conductances: Array | None) -> Array:
         """Return the contact temperatures of both bodies at the start of each phase (m, 2, n), K."""
         heat = self.heat
         if heat is None:
             return np.zeros((0, 2, pressure.shape[1]))
-        starts = self.through(state, pressure)[:-1]
+        starts = self.through(state, pressure, conductances)[:-1]
         return np.array([heat.exchange.contact_temperatures(heat.exchange.at(one)) for one in starts])
 
-    def through(self, state: Array, pressure: Array) -> list[Array]:
-        """Return the temperatures (dim,) before, between and after the phases of a cycle at these pressures."""
-        if self.heat is None:
+    def through(self, state: Array, pressure: Array, conductances: Array | None) -> list[Array]:
+        """Return the temperatures (dim,) before, between and after the phases of a cycle.
+
+        Args:
+            state: Before.
+            pressure: Of the phases (m, n).
+            conductances: Of the phases (m, n), such as those of `Solved`.
+        """
+        if self.heat is None or conductances is None:
             return [state]
-        cycle = self.heat.cycle(self.heat.conductances(pressure))
-        return [state, *cycle.states(state, self.mu * pressure)]
+        return [state, *self.heat.cycle(conductances).states(state, self.mu * pressure)]
 
     def _update(
         self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: Worn | None, passing: Passing | None

@@ -58,12 +58,16 @@ PARTS = 8  # of a cycle that does not converge as a whole
 
 @dataclass(frozen=True)
 class _Stage:
-    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals."""
+    """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals.
+
+    Its conductances (m, n) are those by which it is heated; None without heat.
+    """
 
     contact: ContactState
     heated: Array
     worn: Worn
     adds: Totals
+    conductances: Array | None
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,7 @@ class Stepper:
         self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
         self.coupled = Coupled(system, self.take)
         self._heated: Array = np.zeros(0)  # by the last cycle
+        self._conductances: Array | None = None  # in it
         self._done = 0.0  # half-cycles at the end of the stage
         self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
 
@@ -210,7 +215,7 @@ class Stepper:
         now, heat, temperature = before.after(last, cycles), self.coupled.heat, None
         if heat is not None and now.temperature is not None:
             temperature = heat.exchange.at(now.temperature)
-            self._heated = last.heated
+            self._heated, self._conductances = last.heated, last.conductances
         return RunState(state.half_cycle, now.worn, parted(last.contact), temperature, now.totals)
 
     def _passing(self, worn: Worn, cycles: float) -> Passing | None:
@@ -233,7 +238,7 @@ class Stepper:
         gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
         if start is None:  # the first of all: what conducts is seen from the contact without heat
             start = self._solve(gap, None, cycles)
-        contact, begin = self.coupled.solve(
+        solved = self.coupled.solve(
             before.temperature,
             cycles - 0.5,
             start,
@@ -243,11 +248,12 @@ class Stepper:
             self._passing(before.worn, cycles),
             lagged=True,
         )
+        contact, begin = solved.contact, solved.temperature
         heated: Array = np.zeros(0)
         if begin is not None:
-            heated = self.coupled.through(begin, contact.pressure)[-1] - begin
+            heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        return _Stage(contact, heated, self.wear.worn(contact.pressure), adds)
+        return _Stage(contact, heated, self.wear.worn(contact.pressure), adds, solved.conductances)
 
     def _solve(
         self, gap: Array, start: ContactState | None, cycles: float, coupling: Array | None = None
@@ -317,7 +323,7 @@ class Stepper:
         temperature = exchange.at(exchange.own(state.temperature).values - self._heated)
         for phase, contact in enumerate(state.contacts):
             pressure = present(contact).pressure[0]
-            conductance = exchange.conductance(pressure)
+            conductance = exchange.conductance(pressure) if self._conductances is None else self._conductances[phase]
             temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
             bulk = np.nan if temperature.bulk is None else temperature.bulk
             heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature), terms, 1, bulk))

@@ -28,8 +28,7 @@ from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key
-from fenwear.contact import ContactState
-from fenwear.cycle.coupled import Coupled
+from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.steady_inequality import OPEN, SteadyInequality
@@ -202,8 +201,8 @@ def _check_exists(system: Tribosystem) -> None:
             )
 
 
-def _solve(problem: SteadyInequality) -> tuple[ContactState, CycleHeat | None, Array | None]:
-    """Return the contact of all phases, and with heat the temperature."""
+def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None]:
+    """Return the contact of all phases, with heat the temperatures, and the heat of whole cycles."""
     system = problem.system
     try:
         contact = problem.solve()
@@ -218,12 +217,10 @@ def _solve(problem: SteadyInequality) -> tuple[ContactState, CycleHeat | None, A
         ) from error
     coupled = Coupled(system, problem.take)
     if coupled.heat is None and system.constant_coefficients:
-        return contact, None, None
+        return Solved(contact), None
     initial = None if coupled.heat is None else coupled.heat.initial()
-    contact, temperature = coupled.solve(
-        initial, np.inf, contact, lambda thermal, coupling, _: problem.solve(thermal, coupling)
-    )
-    return contact, coupled.at_friction(), temperature
+    solved = coupled.solve(initial, np.inf, contact, lambda thermal, coupling, _: problem.solve(thermal, coupling))
+    return solved, coupled.at_friction()
 
 
 def _no_state_under_cap(problem: SteadyInequality) -> str:
@@ -245,10 +242,8 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     )
 
 
-def _result(
-    problem: SteadyInequality, contact: ContactState, heat: CycleHeat | None, temperature: Array | None
-) -> Steady:
-    system = problem.system
+def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -> Steady:
+    system, contact = problem.system, solved.contact
     weights, motion = system.pair.weights, system.motion
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN
@@ -268,18 +263,20 @@ def _result(
         {name: float(value) for name, value in zip(system.rigid.mode_names, velocity, strict=True)},
         contact.iterations,
         0.0,
-        None if heat is None or temperature is None else _steady_heat(heat, temperature, contact.pressure, middle),
+        None if heat is None else _steady_heat(heat, solved, middle),
         coordinates=system.pair.punch.x,
         system=system,
     )
 
 
-def _steady_heat(heat: CycleHeat, state: Array, pressure: Array, middle: slice) -> SteadyHeat:
+def _steady_heat(heat: CycleHeat, solved: Solved, middle: slice) -> SteadyHeat | None:
     """Follow the temperatures through one cycle of the steady state."""
-    exchange, now = heat.exchange, heat.exchange.at(state)
+    if solved.temperature is None or solved.conductances is None:
+        return None
+    exchange, now = heat.exchange, heat.exchange.at(solved.temperature)
     punch, strip = [], []
-    for phase in range(len(pressure)):
-        now, _ = exchange.half_cycle(now, phase, pressure[phase], exchange.conductance(pressure[phase]))
+    for phase in range(len(solved.conductances)):
+        now, _ = exchange.half_cycle(now, phase, solved.contact.pressure[phase], solved.conductances[phase])
         temperatures = exchange.contact_temperatures(now)
         punch.append(temperatures[0])
         strip.append(temperatures[1])

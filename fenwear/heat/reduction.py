@@ -177,12 +177,15 @@ class _Growing:
         return fields
 
     def _append(self, fields: Array) -> None:
-        """Append independent fields that lie beside the basis."""
-        if not fields.shape[1]:
-            return
+        """Append fields that lie beside the basis, but for what rounding has made of dependent ones.
+
+        Raises:
+            ConvergenceError: they are no numbers.
+        """
         for _ in range(2):  # once more: rounding
-            fields = fields @ np.linalg.inv(np.linalg.cholesky(_gram(self.body, fields))).T
-            fields = self._beside(fields)
+            if not fields.shape[1]:
+                return
+            fields = self._beside(fields @ _orthogonal(self.body, fields))
         before, self._filled = self._filled, self._filled + fields.shape[1]
         if self._filled > self._room.shape[1]:
             room: Array = np.empty((len(fields), self._filled + before // 2), order="F")
@@ -241,10 +244,25 @@ def _gram(body: HeatBody, fields: Array) -> Array:
     return total(body.body.mesh.comm, fields.T @ body.store(fields))
 
 
-def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) -> tuple[Array, Array, float]:
-    """Return the combinations of fields that are principal (k, kept), their singular values, and the largest of all.
+def _orthogonal(body: HeatBody, fields: Array) -> Array:
+    """Return the combinations of fields (k, kept) that are orthonormal in the norm of the heat capacity; collective.
 
-    Collective.
+    Raises:
+        ConvergenceError: they are no numbers.
+    """
+    gram = _numbers(body, fields)
+    try:
+        return np.asarray(np.linalg.inv(np.linalg.cholesky(gram)).T)
+    except np.linalg.LinAlgError:  # one depends on the others; the same on every rank
+        sizes = np.sqrt(np.maximum(np.diag(gram), 0.0))
+        scale = np.divide(1.0, sizes, out=np.zeros_like(sizes), where=sizes > 0)
+        squares, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+        kept = squares > ROUNDING
+        return np.asarray(scale[:, None] * vectors[:, kept] / np.sqrt(squares[kept]))
+
+
+def _numbers(body: HeatBody, fields: Array) -> Array:
+    """Return the products of fields (k, k); collective.
 
     Raises:
         ConvergenceError: there are none, or they are no numbers.
@@ -256,6 +274,18 @@ def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) 
             f"the temperatures of the {body.body.name} are beyond all numbers: a material, a temperature or a time "
             "is too large or too small to compute with"
         )
+    return gram
+
+
+def _principal(body: HeatBody, fields: Array, tolerance: float, largest: float) -> tuple[Array, Array, float]:
+    """Return the combinations of fields that are principal (k, kept), their singular values, and the largest of all.
+
+    Collective.
+
+    Raises:
+        ConvergenceError: there are none, or they are no numbers.
+    """
+    gram = _numbers(body, fields)
     values, vectors = np.linalg.eigh(gram)
     values = np.sqrt(np.maximum(values, 0.0))
     kept = values > max(tolerance, ROUNDING) * max(largest, values[-1])

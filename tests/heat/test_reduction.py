@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, load_case, march
+from fenwear import Case, ConvergenceError, Tribosystem, assemble, load_case, march
 from fenwear.arrays import Array
 from fenwear.cycle import Block
 from fenwear.heat import prepare
+from fenwear.heat.reduction import _Growing
 
 # Faces that convect and no debris: all losses, and a strong feedback.
 COARSE = (
@@ -114,3 +115,22 @@ def test_bodies_that_hardly_lose_heat(edited: Callable[..., Case]) -> None:
         system = assemble(edited("example1-heat", edit, *small, f"heat.operator={operator}"))
         ends.append(list(march(system, 5))[-1].heat.temperature_strip[-1])
     assert np.abs(ends[1] - ends[0]).max() < 5e-3 * ends[0].max()
+
+
+def test_dependent_fields_are_appended_once(assembled: Callable[..., Tribosystem]) -> None:
+    """Fields of which one depends on the others, to the last bit, give a basis of the others: no failed factor."""
+    body = assembled("example1-heat", *COARSE).bodies.heat[0]
+    basis = _Growing(body, None)
+    before = basis.columns.shape[1]
+    x = np.linspace(0, 1, body.owned)
+    fields = np.array([np.sin(x), np.cos(3 * x), x**2, 0 * x]).T
+    fields[body.held] = 0.0
+    fields = np.hstack([fields, fields[:, :1] + 2 * fields[:, 1:2], 1e-200 * fields[:, :1]])
+    basis._append(basis._beside(fields))
+    assert basis.columns.shape[1] == before + 3
+    gram = basis.columns.T @ body.store(basis.columns)
+    np.testing.assert_allclose(gram, np.eye(before + 3), rtol=0, atol=1e-10)
+    left = basis._beside(fields)
+    assert np.abs(left).max() < 1e-7
+    with pytest.raises(ConvergenceError, match="beyond all numbers"):
+        basis._append(np.full((body.owned, 2), np.nan))

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from mpi4py import MPI
 
 from fenwear import CaseError
 from fenwear.paper import BRIEF, FULL, READINGS, Scope
@@ -106,7 +105,6 @@ def test_choice() -> None:
         choose(["papr"])
 
 
-@pytest.mark.mpi
 def test_paper(tmp_path: Path) -> None:
     """The comparison stands on the page and in the numbers; rows that are not reproduced are no disagreement."""
     folder = tmp_path / "v"
@@ -117,16 +115,14 @@ def test_paper(tmp_path: Path) -> None:
     assert {row["verdict"] for row in found["paper"]["rows"]} >= {"reproduced", "not reproduced"}
     text = "\n".join(said)
     assert all(f"{row['quantity']}: {row['verdict']}\n" in text for row in found["paper"]["rows"])
-    if MPI.COMM_WORLD.rank == 0:
-        assert json.loads((directory / "verification.json").read_text()) == found
-        content = (directory / "verification.html").read_text("utf-8")
-        page = _Page()
-        page.feed(content)
-        assert page.loads == []
-        assert page.images == 1 + 7
-        assert '<section id="paper">' in content
-        assert '<section id="time-steps">' in content
-    MPI.COMM_WORLD.Barrier()
+    assert json.loads((directory / "verification.json").read_text()) == found
+    content = (directory / "verification.html").read_text("utf-8")
+    page = _Page()
+    page.feed(content)
+    assert page.loads == []
+    assert page.images == 1 + 7
+    assert '<section id="paper">' in content
+    assert '<section id="time-steps">' in content
 
 
 def test_disagreement(fenwear: Run, tmp_path: Path) -> None:

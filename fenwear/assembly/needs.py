@@ -116,6 +116,7 @@ class Needs:
         nodes: Contact nodes.
         interfaces: Positions of the strip, and loads, that differ.
         phases: Of the motion.
+        copies: Of the contact: one on each rank, unless ranks share it.
     """
 
     punch: BodyNeeds
@@ -123,17 +124,23 @@ class Needs:
     nodes: float
     interfaces: int
     phases: int
+    copies: int = 1
 
     def coarser(self, times: float) -> Needs:
         """Return the same of elements so many times as large."""
         nodes = self.nodes * times ** (1 - self.punch.dim)
-        return Needs(self.punch.coarser(times), self.strip.coarser(times), nodes, self.interfaces, self.phases)
+        parts = (self.punch.coarser(times), self.strip.coarser(times))
+        return Needs(*parts, nodes, self.interfaces, self.phases, self.copies)
 
     @property
     def memory(self) -> float:
         """Bytes at the end of the set-up, and in the first half-cycles."""
-        contact = (self.interfaces * self.punch.dim + 2 * self.phases + 1) * self.nodes**2
-        return self.punch.memory + self.strip.memory + NUMBER * contact
+        return self.punch.memory + self.strip.memory + self.contact * self.copies
+
+    @property
+    def contact(self) -> float:
+        """Bytes of the whole contact, once."""
+        return NUMBER * (self.interfaces * self.punch.dim + 2 * self.phases + 1) * self.nodes**2
 
     @property
     def seconds(self) -> float:
@@ -163,12 +170,13 @@ class Needs:
         return None
 
 
-def needs(placed: Placed, frames: tuple[bool, bool, bool]) -> Needs:
+def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = False) -> Needs:
     """Return what condensing the bodies and joining them will need; collective.
 
     Args:
         placed: The bodies opposite each other.
         frames: Whether the strip moves as a whole, whether the contact frame stays, and whether the strip is flat.
+        shared: Whether ranks share the rows of the contact.
     """
     moves, fixed, flat = frames
     bodies, pair = placed.bodies, placed.pair
@@ -178,7 +186,7 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool]) -> Needs:
     one = not moves or (fixed and flat)
     of_strip = _body(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
     interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
-    return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs))
+    return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs), 1 if shared else placed.comm.size)
 
 
 def _body(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> BodyNeeds:

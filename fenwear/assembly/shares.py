@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fenwear.assembly.needs import BodyNeeds, Needs, duration
+from fenwear.assembly.needs import NUMBER, BodyNeeds, Needs, duration
 from fenwear.assembly.placed import Placed
+from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import SPREAD, entries
 from fenwear.bodies.response import Request
@@ -18,14 +19,27 @@ DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular sol
 def shares_text(placed: Placed, wanted: Needs) -> list[str]:
     """Return a line for each body: how it is condensed, which ranks do it, and what each takes; collective.
 
+    One more says how ranks share a large contact.
+
     Args:
         placed: The bodies.
         wanted: What they need in all.
     """
     bodies = (placed.bodies.punch, placed.bodies.strip)
     own = (wanted.punch, wanted.strip)
-    return [_text(body, need, 1 - number, heat=placed.heat is not None) for number, (body, need) in
-            enumerate(zip(bodies, own, strict=True))]  # fmt: skip
+    lines = [
+        _text(body, need, 1 - number, heat=placed.heat is not None)
+        for number, (body, need) in enumerate(zip(bodies, own, strict=True))
+    ]
+    rows = shared_rows(placed)
+    if rows is not None:
+        whole = wanted.contact
+        lines.append(
+            f"contact: {rows.comm.size} ranks share the rows of its {wanted.nodes:,.0f} nodes, "
+            f"{memory_size(whole / rows.comm.size)} each; what needs all of them, such as the steady state, gathers "
+            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on each"
+        )
+    return lines
 
 
 def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> str:

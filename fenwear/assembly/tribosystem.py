@@ -118,7 +118,7 @@ class Tribosystem(Placed):
 
 def needs_of(placed: Placed) -> Needs:
     """Return what the set-up of placed bodies will take; collective."""
-    return needs(placed, _frame(placed))
+    return needs(placed, _frame(placed), shared=shared_rows(placed) is not None)
 
 
 def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:

@@ -51,10 +51,21 @@ class Key:
         return f"{self.path}{kind}: {self.meaning}\n    {self.values}{unit}{default}"
 
 
+# Keys that name files, in whose place the schema has what they hold.
+READ_FIRST = {
+    key.path: key
+    for key in (
+        Key("base", "", "text", "", "a built-in case, or a .toml beside this file: its keys hold where none is given"),
+        Key("program.file", "", "text", "", "in place of steps: a CSV file beside this file, a step in each line"),
+    )
+}
+
+
 def all_keys() -> list[Key]:
     """Return every key of a case file, tables before what is in them."""
-    about = "a built-in case, or a .toml beside this file: its keys hold where none is given"
-    return [Key("base", "", "text", "", about), *_keys(Case, "", "")]
+    found = [READ_FIRST["base"], *_keys(Case, "", "")]
+    place = next(n for n, key in enumerate(found) if key.path == "program") + 1
+    return [*found[:place], READ_FIRST["program.file"], *found[place:]]
 
 
 def find_keys(path: str) -> list[Key]:
@@ -77,19 +88,6 @@ def find_keys(path: str) -> list[Key]:
         raise CaseError(InputError(path, f"no such key{hint}"))
     below = [key for key in keys if any(f.table and key.path.startswith(f"{f.path}.") for f in found)]
     return [*found, *below]
-
-
-def json_schema() -> dict[str, Any]:
-    """Return the JSON schema of a case file, for editors; what is missing may stand in the base."""
-    schema = _without_required(Case.model_json_schema(mode="validation"))
-    schema["properties"] = {"base": {"type": "string", "description": all_keys()[0].meaning}, **schema["properties"]}
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def _without_required(node: Any) -> Any:
-    if isinstance(node, dict):
-        return {k: _without_required(v) for k, v in node.items() if not (k == "required" and isinstance(v, list))}
-    return [_without_required(v) for v in node] if isinstance(node, list) else node
 
 
 def _matches(pattern: str, path: str) -> bool:

@@ -51,6 +51,6 @@ def info_command(
 @app.command("schema")
 def schema_command() -> None:
     """Print the JSON schema of case files, by which editors complete and check them."""
-    from fenwear.case.keys import json_schema
+    from fenwear.case.editors import json_schema
 
     print_json(json_schema())

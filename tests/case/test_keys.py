@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
+import tomllib
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from fenwear.case import builtin_cases, load_case
-from fenwear.case.keys import all_keys, find_keys, json_schema
+from fenwear.case.editors import json_schema
+from fenwear.case.keys import all_keys, find_keys
 from fenwear.case.units import convert
 from fenwear.errors import CaseError
+
+ROOT = Path(__file__).parents[2]
 
 
 def _leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -61,8 +67,36 @@ def test_schema_takes_cases_and_nothing_else() -> None:
     for name in builtin_cases():
         assert list(check.iter_errors(load_case(name).resolved())) == []
     assert list(check.iter_errors({"base": "example1", "motion": {"kind": "reciprocating", "amplitude": 2}})) == []
-    for wrong in ({"titel": "x"}, {"model": {"plane": "stres"}}, {"motion": {"kind": "one-way", "amplitude": 2}}):
+    for right in (
+        {"motion": {"period": 0.5}},
+        {"motion": {"speed": 3}},
+        {"program": {"file": "steps.csv", "levels": 5}},
+    ):
+        assert list(check.iter_errors({"base": "example1", **right})) == []
+    for wrong in (
+        {"titel": "x"},
+        {"model": {"plane": "stres"}},
+        {"motion": {"kind": "one-way", "amplitude": 2}},
+        {"motion": {"kind": "circular"}},
+        {"motion": {"perod": 0.5}},
+        {"program": {"fil": "steps.csv"}},
+    ):
         assert list(check.iter_errors({"base": "example1", **wrong})) != []
+    (error,) = check.iter_errors({"base": "example1", "motion": {"kind": "reciprocating", "amplitud": 2}})
+    assert "'amplitud' was unexpected" in error.message  # of the key, not of the table
+
+
+def test_schema_takes_the_cases_of_the_pages() -> None:
+    """Every case that a page shows, but for what it shows to be wrong."""
+    jsonschema = pytest.importorskip("jsonschema")
+    check, found = jsonschema.Draft202012Validator(json_schema()), 0
+    for page in (ROOT / "docs").rglob("*.md"):
+        for text in re.findall(r"^```toml\n(.*?)^```$", page.read_text("utf-8"), re.MULTILINE | re.DOTALL):
+            case = tomllib.loads(text)
+            if page.name != "editor.md":
+                assert [f"{page}: {error.message}" for error in check.iter_errors(case)] == []
+                found += 1
+    assert found > 10
 
 
 def test_commands(fenwear: Callable[..., Any]) -> None:

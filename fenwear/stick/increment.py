@@ -10,6 +10,7 @@ import scipy.optimize
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.stick.equations import Found, Guess, Step
+from fenwear.stick.full import FullStep
 from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.state import Imposed, StickState
 
@@ -46,7 +47,7 @@ def advance(
     """
     position = position or interface.middle
     if near is not None:
-        step = Step(interface, position, before, end, friction)
+        step = _step(interface, position, before, end, friction)
         try:
             return _from(step, _piece(*near, friction), FEW)
         except ConvergenceError:
@@ -57,6 +58,11 @@ def advance(
         if end.force is not None:
             _check_force(interface, position, before, start, end, friction)
         raise
+
+
+def _step(interface: OppositeBodies, position: Position, before: StickState, end: Imposed, friction: Array) -> Step:
+    """Return the equations of a time step, on all displacements where the bodies are wanted whole."""
+    return (FullStep if interface.full else Step)(interface, position, before, end, friction)
 
 
 def _check_force(
@@ -93,7 +99,7 @@ def _advance(
     friction: Array,
     halvings: int,
 ) -> StickState:
-    step = Step(interface, position, before, end, friction)
+    step = _step(interface, position, before, end, friction)
     try:
         return _newton(step)
     except ConvergenceError:
@@ -144,7 +150,7 @@ def _piece(pressure: Array, trial: Array, friction: Array) -> Guess:
 
 def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
     """Return the piece in which the rig's displacement gives an imposed force, found by bisection; None for none."""
-    held = Step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
+    held = _step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
     last = guess
 
     def missing(displacement: float) -> float:

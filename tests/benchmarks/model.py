@@ -282,7 +282,7 @@ def main() -> None:
                   f"| {found['memory'] / memory:.2f} |", flush=True)  # fmt: skip
     print("\nComputed, not run: 10,000,000 unknowns and 20,000 contact nodes in the plane, s and GiB of each rank")
     print(
-        "| ranks | own cells | joining | surface | sent to all | together | GiB of bodies | GiB of the contact | wear step |"
+        "| ranks | own cells | joining | surface | sent | together | GiB of bodies | GiB of the contact | wear step |"
     )
     print("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     computed(rate)

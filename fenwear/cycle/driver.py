@@ -11,6 +11,7 @@ from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError, InterruptedRunError
+from fenwear.parallel import agreed
 from fenwear.sliding.wear import Worn
 
 BLOCK = 200  # half-cycles
@@ -97,7 +98,8 @@ def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> I
         periodic = state.periodic_phases
         for one in recorded:
             recorder.add(one.number, one.phases, one.worn, one.totals, one.heat, one.load)
-            repeats = course.periodic_within is not None and recorder.change() < course.periodic_within
+            limit = course.periodic_within
+            repeats = limit is not None and agreed(system.comm, recorder.change() < limit)
             periodic = periodic + 1 if repeats else 0
         state = replace(after, periodic_phases=periodic)
         finished = periodic >= system.motion.half_cycles or course.leave(state)

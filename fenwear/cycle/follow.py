@@ -25,6 +25,7 @@ from fenwear.compat import interpolation_points
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
 from fenwear.heat.field import HeatState
+from fenwear.parallel import agreed
 
 # Runs a system from a state, or the beginning, and leaves at the first state for which it is told to.
 Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
@@ -60,7 +61,7 @@ def follow(
             system = adapt(warmed_system(system, state.temperature))
 
         def leave(now: RunState, own: Tribosystem = system) -> bool:
-            return own.outworn(now.worn) or _is_warm(own, now)
+            return agreed(own.comm, own.outworn(now.worn)) or _is_warm(own, now)
 
         for block in integrate(system, state, leave):
             yield block

@@ -16,6 +16,7 @@ from fenwear.cycle.jump_error import ORDER
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.parallel import agreed
 from fenwear.remedies import SHORTER_JUMPS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
@@ -83,9 +84,10 @@ class _Jumps:
                 stepper.system.remedies.note(SHORTER_JUMPS)
                 length = max(1, tried // 4)
                 continue
-            factor = SAFETY * (tolerance / max(estimate.largest, 1e-300)) ** (1 / (ORDER + 1))
+            largest = agreed(stepper.system.comm, estimate.largest)  # the length of the next one is all ranks'
+            factor = SAFETY * (tolerance / max(largest, 1e-300)) ** (1 / (ORDER + 1))
             warmed = tried > 1 and property_change(stepper.system, end.temperature) > WARMED
-            if (estimate.largest <= tolerance and not warmed) or tried == 1:
+            if (largest <= tolerance and not warmed) or tried == 1:
                 break
             # A half is half made already.
             length = max(1, int(tried * min(0.5, max(LEAST, factor))))

@@ -16,6 +16,7 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
+from fenwear.parallel import agreed
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -91,6 +92,7 @@ class PhaseStep:
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
+            pressure = agreed(self.system.comm, pressure)  # a shared contact is solved by all ranks, or by none
             wear = self._update(pressure, temperature, worn, half_cycles)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
@@ -104,7 +106,9 @@ class PhaseStep:
         contact, after, heat, wear = fixed_point(
             solve,
             mean if before is None else before.pressure[0],
-            lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
+            lambda change, pressure: agreed(
+                self.system.comm, bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure))
+            ),
             COEFFICIENTS_FAIL,
         )
         return self._end(contact, after, heat, before, wear)

@@ -47,7 +47,7 @@ def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> s
     topology = elastic.body.mesh.topology
     cells: Sequence[int] = comm.allgather(topology.index_map(topology.dim).size_local)
     request, columns = Request(elastic, elastic.surface.spread), f"{need.columns:,.0f} columns"
-    if not heat and request.in_substructures:
+    if not heat and need.solver == "factor" and request.in_substructures:
         boundary = comm.allgather(len(elastic.boundary.numbers))
         shared = []
         for rank, (n, edge) in enumerate(zip(cells, boundary, strict=True)):
@@ -55,13 +55,16 @@ def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> s
             part = replace(need, unknowns=need.unknowns * share, matrix=need.matrix * share)
             shared.append(f"rank {rank}: {n:,} cells, {edge:,} unknowns at their edge, {_taken(part, edge)}")
         return f"{name}: every rank eliminates its own cells down to the surface ({columns}); {'; '.join(shared)}"
-    if elastic.setup.way == "multigrid":
-        return f"{name}: conjugate gradients on all ranks, {columns} in blocks; no factor"
-    whole = [rank for rank, n in enumerate(cells) if n] if elastic.setup.reproducible else [owner % comm.size]
     taken = f"{duration(need.seconds)} and {memory_size(need.memory)}"
-    if not heat and request.by_surface:
+    if need.solver == "multigrid":
+        return f"{name}: conjugate gradients on all ranks, {columns} in blocks; no factor: {taken} in all"
+    if need.solver == "low-rank":
+        return f"{name}: a factor with blocks of low rank over all ranks, {columns}, refined: {taken} in all"
+    whole = [rank for rank, n in enumerate(cells) if n] if elastic.setup.reproducible else [owner % comm.size]
+    if not heat and request.by_surface and need.solver == "factor":
         return f"{name}: rank {whole[0]} eliminates all {sum(cells):,} cells down to the surface, {columns}: {taken}"
-    if comm.size > 1 and not elastic.setup.reproducible and 8 * entries(elastic.size, elastic.dim) > SPREAD:
+    large = need.solver == "spread factor" or 8 * entries(elastic.size, elastic.dim) > SPREAD
+    if comm.size > 1 and not elastic.setup.reproducible and large:
         return f"{name}: a factor over {comm.size} ranks, {columns} solved by all: {taken} in all"
     return f"{name}: rank {whole[0]} factors it and solves {columns}: {taken}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal
 
 import basix.ufl
 import numpy as np
@@ -21,6 +21,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector
 from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor, make_together
+from fenwear.bodies.low_rank import LowRank
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.bodies.multigrid import Multigrid
@@ -31,6 +32,8 @@ from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
 PREFIX = "fenwear_elasticity_"
+# A factor on one rank, or over all where it is large; over all in any case; compressed; conjugate gradients.
+Solver = Literal["factor", "spread factor", "low-rank", "multigrid"]
 BY_SIZE = Setup()
 
 
@@ -48,6 +51,7 @@ class ElasticBody:
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
         setup: How it is condensed.
+        solver: What solves for its columns; set before the first solution, by the memory that there is.
     """
 
     def __init__(
@@ -73,6 +77,9 @@ class ElasticBody:
             CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
         """
         self.body, self.law, self.thickness, self.setup = body, law, thickness, setup
+        self.solver: Solver = "factor"
+        if setup.way == "low-rank" or setup.way == "multigrid":  # noqa: PLR1714  (mypy does not narrow by "in")
+            self.solver = setup.way
         mesh = body.mesh
         dim = mesh.geometry.dim
         self.dim = dim
@@ -195,11 +202,16 @@ class ElasticBody:
             matrix = self.stiffness
             surface = self.surface_dofs if with_surface else None
             comm = self.body.mesh.comm
-            if self.setup.way == "multigrid":
-                self._factors.append(Multigrid(matrix, self._held.rigid_basis(), PREFIX, comm))
+            if self.solver in ("multigrid", "low-rank"):
                 del self.stiffness
+                low = self.solver == "low-rank"
+                rigid = self._held.rigid_basis()
+                self._factors.append(LowRank(matrix, PREFIX, comm) if low else Multigrid(matrix, rigid, PREFIX, comm))
                 return self._factors[0]
-            factor = Factor(matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface)
+            spread = self.solver == "spread factor"
+            factor = Factor(
+                matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface, spread=spread
+            )
             self._factors.append(factor)
             if not kept:  # all that needs it has it now
                 del self.stiffness

@@ -49,6 +49,7 @@ napoleon_use_ivar = True
 smartquotes = False  # commands and TOML are copied from tables, too
 
 html_theme = "furo"
+pygments_dark_style = "monokai"
 html_static_path = ["static"]
 html_css_files = ["formulas.css"]
 html_title = f"fenwear {version}"

@@ -231,3 +231,52 @@ plt.show()
 #
 # `fenwear run fretting-partial-slip` writes all of this to `history.nc` and draws it in a report, and `fenwear steady
 # fretting-partial-slip` prints the final shape. With a stroke as long as to slip as a whole there is none.
+
+# %% [markdown]
+# ## A sphere
+#
+# In solids traction and slip have two components. A sphere of 10 mm on a flat, `fretting-sphere`, sticks in a circle of the radius
+# $c = a\,(1 - Q / (\mu P))^{1/3}$ (Mindlin), around which it slips along the stroke; the traction is that of gross sliding
+# less that of a smaller contact, as in the plane.
+
+# %%
+across = 6 if COARSE else 8
+amplitude = 0.75  # µm
+settings = [f"geometry.parameters.across={across}", f"motion.amplitude={amplitude} um", "stick.steps=6"]
+case = load_case("fretting-sphere", settings)
+sphere = make_rig(case)
+records = Records.joined(sphere.cycle(sphere.beginning())[1])
+pair, weights = sphere.interface.middle.pair, sphere.weights
+along, over = pair.punch.x[:, 0], pair.punch.x[:, 1]
+
+load, radius, mu = 50.0, 10.0, case.contact.friction  # N, mm
+modulus = 210e3 / (2 * (1 - 0.3**2))
+a = (3 * load * radius / (4 * modulus)) ** (1 / 3)
+peak = 3 * load / (2 * np.pi * a**2)
+at = len(records) // 2 - 1  # the end of the first half-cycle
+c = a * (1 - abs(records.force[at]) / (mu * load)) ** (1 / 3)
+sticking, touching = records.sticking[at], records.pressure[at] > 0
+print(f"±{amplitude} µm: force {abs(records.force[at]):.1f} N of {mu * load:.0f}")
+for name, nodes, exact in (("contact", touching, a), ("stick zone", sticking, c)):
+    print(f"radius of the {name}: {1e3 * np.sqrt(weights[nodes].sum() / np.pi):.0f} µm, exact {1e3 * exact:.0f}; "
+          f"nodes every {1e3 * np.sqrt(np.median(weights)):.0f} µm")  # fmt: skip
+
+# %%
+traction = records.traction[at] * np.sign(records.traction[at, :, 0].sum())
+figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
+for nodes, colour, name in ((sticking, BLUE, "stick"), (touching & ~sticking, RED, "slip")):
+    axes[0].quiver(1e3 * along[nodes], 1e3 * over[nodes], *traction[nodes].T, color=colour, label=name, scale=9e3)
+turn = np.linspace(0, 2 * np.pi, 200)
+for size in (a, c):
+    axes[0].plot(1e3 * size * np.cos(turn), 1e3 * size * np.sin(turn), color=GREY, linewidth=0.8)
+axes[0].set(xlabel="x (µm)", ylabel="y (µm)", aspect="equal", title="Traction on the sphere; circles: exact")
+axes[0].legend(frameon=False, loc="upper right")
+line = np.abs(over) < 1e-6
+order = np.argsort(along[line])
+fine = np.linspace(-a, a, 401)
+exact = np.sqrt(1 - (fine / a) ** 2) - c / a * np.sqrt(np.maximum(1 - (fine / c) ** 2, 0))
+axes[1].plot(1e3 * along[line][order], traction[line, 0][order], "o", color=BLUE, label="fenwear")
+axes[1].plot(1e3 * fine, mu * peak * exact, color=GREY, label="Mindlin")
+axes[1].set(xlabel="x (µm)", ylabel="traction along x, at y = 0 (MPa)", xlim=(-1.3e3 * a, 1.3e3 * a), ylim=(0, None))
+axes[1].legend(frameon=False)
+plt.show()

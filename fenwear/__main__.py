@@ -32,6 +32,11 @@ def main() -> int:
     if np.dtype(PETSc.ScalarType).kind == "c":
         print("fenwear needs PETSc with real numbers: on Debian install python3-dolfinx-real", file=sys.stderr)
         return 1
+    from fenwear.compiled import ensure_folder
+
+    told = ensure_folder(comm)
+    if told is not None:
+        print(f"fenwear: {told}", file=sys.stderr)
     return _call(arguments, comm)
 
 

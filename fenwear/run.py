@@ -90,6 +90,8 @@ def run_case(
     else:
         touching, drive = found.system.check_touching, partial(_run, found.system)
         unit, reached = "half-cycle", checkpoint.reached
+    for line in [] if found.bodies is None else found.bodies.solved_by:
+        log(line)
     if not resume:
         touching()
     how = {"setup_seconds": time.perf_counter() - begin, **found.numbers}

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 
 from fenwear import CaseError, assemble, load_case
-from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem
-from fenwear.assembly import needs as module
+from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem, ways
 from fenwear.assembly.needs import BodyNeeds, Needs, needs
 from fenwear.memory import GIB, free_memory
 
@@ -80,11 +81,51 @@ def test_columns_of_frames() -> None:
 def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refused before anything is factored, with the mesh that would fit."""
     placed = place_case(load_case("ball-on-flat", COARSE))
-    monkeypatch.setattr(module, "SMALL", 0.0)
-    monkeypatch.setattr(module, "free_memory", lambda: needs_of(placed).memory / 3)
+    monkeypatch.setattr(ways, "SMALL", 0.0)
     monkeypatch.setattr(tribosystem, "condense_bodies", lambda _placed: pytest.fail("condensed all the same"))
-    with pytest.raises(CaseError, match=r"geometry: .* unknowns, .* are free; elements 1\.\d times as large would fit"):
-        elastic(placed)
+    expected = (
+        r"geometry: .* unknowns, .* are free, and no setup\.way would fit: .*; elements \d\.\d times as large would"
+    )
+    with pytest.raises(CaseError, match=expected):
+        elastic(placed, free=needs_of(placed, 1e15).memory / 3)
+
+
+def test_the_way_by_the_memory() -> None:
+    """A factor while it fits, one of low rank in the larger body, then in both, then conjugate gradients."""
+    small, large = (solid(size, 1000).punch for size in (1.5e6, 2e6))
+    whole, found = Needs(small, large, 1000, 1, 2), []
+    for memory in np.geomspace(1.1 * whole.memory, 0.3 * whole.memory, 200):
+        one = ways.first_fitting(whole, memory)
+        found.append((one.punch.solver, one.strip.solver))
+        assert one.memory <= memory or not ways.fits(one, memory)
+    assert list(dict.fromkeys(found)) == [
+        ("factor", "factor"),
+        ("factor", "low-rank"),
+        ("low-rank", "low-rank"),
+        ("low-rank", "multigrid"),
+        ("multigrid", "multigrid"),
+    ]
+    assert ways.first_fitting(whole, 2 * GIB) == whole  # nothing fits
+    assert ways.first_fitting(whole, None) == whole
+
+
+def test_another_way_would_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The refusal names it, with its memory; left to itself the set-up takes it, and check tells."""
+    wanted = solid(2e6, 1000)
+    monkeypatch.setattr(ways, "needs", lambda *_arguments, **_options: wanted)
+    punch, strip = (replace(body, solver="multigrid") for body in (wanted.punch, wanted.strip))
+    least = replace(wanted, punch=punch, strip=strip)
+    free = 1.01 * least.memory
+    by_columns, automatic = (
+        place_case(load_case("ball-on-flat", [*COARSE, f"setup.way={way}"])) for way in ("columns", "automatic")
+    )
+    with pytest.raises(CaseError, match=r"are free; setup\.way = 'multigrid' would take .* GiB; elements"):
+        ways.check_memory(by_columns, needs_of(by_columns, free), free)
+    found = needs_of(automatic, free)
+    assert found == least
+    assert all("conjugate gradients on all ranks" in line for line in shares_text(automatic, found)[:2])
+    ways.take(automatic, found)
+    assert automatic.bodies.punch.solver == "multigrid"
 
 
 def test_free_memory() -> None:
@@ -111,6 +152,7 @@ def test_check_tells(fenwear: Callable[..., subprocess.CompletedProcess[str]]) -
         ),
         ("elimination", r"rank 0 eliminates all \d+ cells down to the surface, 17 columns: "),
         ("columns", r"rank 0 factors it and solves 17 columns: "),
+        ("low-rank", r"a factor with blocks of low rank over all ranks, 17 columns, refined"),
         ("multigrid", r"conjugate gradients on all ranks, 17 columns in blocks; no factor"),
     ],
 )

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
-from fenwear import Tribosystem, assemble, load_case, make_case, steady
+from fenwear import Tribosystem, assemble, load_case, make_case, march, steady
 from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
 from fenwear.errors import MeshQualityError
@@ -22,10 +22,11 @@ from fenwear.report.page import page
 from fenwear.run import run_case
 from fenwear.stick.cycle import Records
 from fenwear.stick.setup import make_rig
-from fenwear.watch import elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
+from fenwear.watch import Watch, elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
 from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import contact_ends
 from fenwear.watch.rim import contact_rim
+from fenwear.watch.thickness import thickness
 
 Assembled = Callable[..., Tribosystem]
 FLAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
@@ -343,3 +344,32 @@ def test_what_is_no_chamfer(tmp_path: Path, kind: str) -> None:
     """One that is tagged, and sides that are nearly upright."""
     assert contact_chamfer(chamfered(tmp_path, kind, 0.3, tagged=True)) is None
     assert contact_chamfer(chamfered(tmp_path, kind, 3.9, 1.5)) is None
+
+
+def test_a_body_worn_through_is_told(assembled: Assembled) -> None:
+    """At 10 mm of a ring 10 mm high, by its volume in half-cycle 50; its meshes do not follow."""
+    settings = ("geometry.parameters.across=4", "geometry.degree=2", "wear.punch.coefficient=1e-3")
+    system = assembled("ring-on-ring", *settings, "geometry.follow_wear=never")
+    area = system.bodies.punch.thickness * system.bodies.punch.surface.weights.sum()
+    (block,) = march(system, 60, implicit=True)
+    first = int(block.half_cycle[block.totals.of("volume_punch") >= 10 * area][0])
+    watch = Watch(system)
+    (text,) = watch.see(block)
+    assert f"from half-cycle {first} on the punch is worn through: it has lost 10 mm where it was 10 mm thick" in text
+    assert watch.warnings() == [text]
+    assert not Watch(system).see(next(march(system, first - 1, implicit=True)))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("name", "punch", "strip"),
+    [
+        ("block-on-ring", 10.16, 10.0),  # a ring of 20 mm whose inner 10 mm are left out
+        ("ball-on-flat", 0.8, 1.6),  # at its lowest point
+    ],
+)
+def test_thickness(name: str, punch: float, strip: float) -> None:
+    """From the contact surface to where the normal leaves the body, also along the side of an upright pin."""
+    bodies = place_case(load_case(name)).bodies
+    assert thickness(bodies.punch).max() == pytest.approx(punch, rel=1e-9)
+    np.testing.assert_allclose(thickness(bodies.strip), strip, rtol=1e-5)

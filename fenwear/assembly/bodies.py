@@ -57,6 +57,16 @@ class Bodies:
         return self.punch.size + self.strip.size
 
     @property
+    def solved_by(self) -> list[str]:
+        """What is to be said of bodies whose columns no usual factor solves for."""
+        names = {"low-rank": "a factor with blocks of low rank", "multigrid": "conjugate gradients with a multigrid"}
+        return [
+            f"{body.body.name}: condensed by {names[body.solver]}, as no other factor fits or setup.way says so"
+            for body in (self.punch, self.strip)
+            if body.solver in names
+        ]
+
+    @property
     def last_resorts(self) -> list[str]:
         """What is to be said of elements that had better be others."""
         return [

@@ -16,12 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenwear.assembly.placed import Placed
-from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.response import SURFACE_SHARE
-from fenwear.errors import CaseError, InputError
+from fenwear.bodies.elasticity import ElasticBody, Solver
+from fenwear.bodies.response import BLOCK, SURFACE_SHARE
 from fenwear.heat.prepare import MANY
-from fenwear.memory import GIB, free_memory, memory_size
-from fenwear.parallel import on_root
+from fenwear.memory import GIB, memory_size
 
 NUMBER = 8  # bytes
 FACTORING = {2: 1e-8, 3: 8e-10}  # s over N^1.5 in a plane and N² in a solid
@@ -30,6 +28,9 @@ SOLVING = 6.5e10  # operations a second of many sparse solutions at once, four f
 HEATING = 1e-5  # s over temperatures and contact nodes
 LASTING = 160  # contact nodes whose answers take as long as those of all where they are many
 WORKING = 1.3  # of a factor: what it is made in
+LOW_RANK = 0.98  # of a factor's entries: measured with 76,000 unknowns of a solid; larger ones may shrink to less
+LEVELS, FIELDS = 1.5, 8  # of a multigrid: entries of its levels over those of the matrix; fields of a block of columns
+ITERATING = 4e-5  # s over unknowns and columns: measured with 33,000 unknowns
 SMALL = GIB  # below which no estimate refuses anything
 COARSEST = 20.0  # times larger elements
 
@@ -46,6 +47,7 @@ class BodyNeeds:
         patterns: Of force.
         temperatures: Degrees of freedom of the temperature; 0 without heat.
         surface: Degrees of freedom of the contact surface's displacement.
+        solver: What solves for the columns.
     """
 
     dim: int
@@ -55,6 +57,7 @@ class BodyNeeds:
     patterns: float
     temperatures: float
     surface: float
+    solver: Solver = "factor"
 
     def coarser(self, times: float) -> BodyNeeds:
         """Return the same of elements so many times as large."""
@@ -67,6 +70,7 @@ class BodyNeeds:
             self.patterns * surface,
             self.temperatures * volume,
             self.surface * surface,
+            self.solver,
         )
 
     @property
@@ -80,16 +84,27 @@ class BodyNeeds:
         """Bytes of stiffness, factor and answers."""
         answers = self.patterns * self.dim * self.columns + self.patterns * self.temperatures
         complement = 2 * self.surface**2 if self.by_surface else 0.0
-        return NUMBER * (1.5 * self.matrix + WORKING * self.factor + answers + complement)
+        return NUMBER * (1.5 * self.matrix + self.solving + answers + complement)
+
+    @property
+    def solving(self) -> float:
+        """Numbers that what solves for the columns has, at its making."""
+        if self.solver == "multigrid":
+            return LEVELS * self.matrix + FIELDS * BLOCK * self.unknowns
+        return WORKING * self.factor * (LOW_RANK if self.solver == "low-rank" else 1.0)
 
     @property
     def by_surface(self) -> bool:
         """Whether the body is eliminated down to its surface, and no column is solved for."""
+        if self.solver != "factor":
+            return False
         return self.temperatures == 0 and SURFACE_SHARE * self.surface**2 <= self.factor
 
     @property
     def seconds(self) -> float:
         """Time of one core."""
+        if self.solver == "multigrid":
+            return (ASSEMBLING[self.dim] + ITERATING * self.columns) * self.unknowns
         factoring = FACTORING[self.dim] * self.unknowns ** (1.5 if self.dim == 2 else 2.0)
         solving = 0.0 if self.by_surface else 4 * self.factor * self.columns / SOLVING
         return float(ASSEMBLING[self.dim] * self.unknowns + factoring + solving)
@@ -116,6 +131,7 @@ class Needs:
         nodes: Contact nodes.
         interfaces: Positions of the strip, and loads, that differ.
         phases: Of the motion.
+        copies: Of the contact: one on each rank, unless ranks share it.
     """
 
     punch: BodyNeeds
@@ -123,17 +139,23 @@ class Needs:
     nodes: float
     interfaces: int
     phases: int
+    copies: int = 1
 
     def coarser(self, times: float) -> Needs:
         """Return the same of elements so many times as large."""
         nodes = self.nodes * times ** (1 - self.punch.dim)
-        return Needs(self.punch.coarser(times), self.strip.coarser(times), nodes, self.interfaces, self.phases)
+        parts = (self.punch.coarser(times), self.strip.coarser(times))
+        return Needs(*parts, nodes, self.interfaces, self.phases, self.copies)
 
     @property
     def memory(self) -> float:
         """Bytes at the end of the set-up, and in the first half-cycles."""
-        contact = (self.interfaces * self.punch.dim + 2 * self.phases + 1) * self.nodes**2
-        return self.punch.memory + self.strip.memory + NUMBER * contact
+        return self.punch.memory + self.strip.memory + self.contact * self.copies
+
+    @property
+    def contact(self) -> float:
+        """Bytes of the whole contact, once."""
+        return NUMBER * (self.interfaces * self.punch.dim + 2 * self.phases + 1) * self.nodes**2
 
     @property
     def seconds(self) -> float:
@@ -163,12 +185,13 @@ class Needs:
         return None
 
 
-def needs(placed: Placed, frames: tuple[bool, bool, bool]) -> Needs:
+def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = False) -> Needs:
     """Return what condensing the bodies and joining them will need; collective.
 
     Args:
         placed: The bodies opposite each other.
         frames: Whether the strip moves as a whole, whether the contact frame stays, and whether the strip is flat.
+        shared: Whether ranks share the rows of the contact.
     """
     moves, fixed, flat = frames
     bodies, pair = placed.bodies, placed.pair
@@ -178,30 +201,14 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool]) -> Needs:
     one = not moves or (fixed and flat)
     of_strip = _body(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
     interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
-    return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs))
+    return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs), 1 if shared else placed.comm.size)
 
 
 def _body(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> BodyNeeds:
     size, surface = elastic.size, elastic.surface_dofs.size
     temperatures = size / elastic.dim if heat else 0.0
-    return BodyNeeds(elastic.dim, size, elastic.matrix_entries(), columns, patterns, temperatures, surface)
-
-
-def check_memory(placed: Placed, wanted: Needs) -> None:
-    """Make sure that the set-up fits into the memory that is free; collective.
-
-    Raises:
-        CaseError: it does not; says which mesh would.
-    """
-    free = on_root(placed.comm, free_memory)
-    if free is None or wanted.memory <= max(free, SMALL):
-        return
-    message = f"{wanted.text()}, but {memory_size(free)} are free"
-    found = wanted.fitting(0.9 * free)
-    if found is not None:
-        times, less = found
-        message += f"; elements {times:.2g} times as large would fit: {less.text()}"
-    raise CaseError(InputError("geometry", message))
+    entries, solver = elastic.matrix_entries(), elastic.solver
+    return BodyNeeds(elastic.dim, size, entries, columns, patterns, temperatures, surface, solver)
 
 
 def duration(seconds: float) -> str:

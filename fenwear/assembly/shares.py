@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from fenwear.assembly.needs import BodyNeeds, Needs, duration
+from fenwear.assembly.needs import NUMBER, BodyNeeds, Needs, duration
 from fenwear.assembly.placed import Placed
+from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import SPREAD, entries
 from fenwear.bodies.response import Request
@@ -18,14 +19,27 @@ DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular sol
 def shares_text(placed: Placed, wanted: Needs) -> list[str]:
     """Return a line for each body: how it is condensed, which ranks do it, and what each takes; collective.
 
+    One more says how ranks share a large contact.
+
     Args:
         placed: The bodies.
         wanted: What they need in all.
     """
     bodies = (placed.bodies.punch, placed.bodies.strip)
     own = (wanted.punch, wanted.strip)
-    return [_text(body, need, 1 - number, heat=placed.heat is not None) for number, (body, need) in
-            enumerate(zip(bodies, own, strict=True))]  # fmt: skip
+    lines = [
+        _text(body, need, 1 - number, heat=placed.heat is not None)
+        for number, (body, need) in enumerate(zip(bodies, own, strict=True))
+    ]
+    rows = shared_rows(placed)
+    if rows is not None:
+        whole = wanted.contact
+        lines.append(
+            f"contact: {rows.comm.size} ranks share the rows of its {wanted.nodes:,.0f} nodes, "
+            f"{memory_size(whole / rows.comm.size)} each; what needs all of them, such as the steady state, gathers "
+            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on each"
+        )
+    return lines
 
 
 def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> str:
@@ -33,7 +47,7 @@ def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> s
     topology = elastic.body.mesh.topology
     cells: Sequence[int] = comm.allgather(topology.index_map(topology.dim).size_local)
     request, columns = Request(elastic, elastic.surface.spread), f"{need.columns:,.0f} columns"
-    if not heat and request.in_substructures:
+    if not heat and need.solver == "factor" and request.in_substructures:
         boundary = comm.allgather(len(elastic.boundary.numbers))
         shared = []
         for rank, (n, edge) in enumerate(zip(cells, boundary, strict=True)):
@@ -41,13 +55,16 @@ def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> s
             part = replace(need, unknowns=need.unknowns * share, matrix=need.matrix * share)
             shared.append(f"rank {rank}: {n:,} cells, {edge:,} unknowns at their edge, {_taken(part, edge)}")
         return f"{name}: every rank eliminates its own cells down to the surface ({columns}); {'; '.join(shared)}"
-    if elastic.setup.way == "multigrid":
-        return f"{name}: conjugate gradients on all ranks, {columns} in blocks; no factor"
-    whole = [rank for rank, n in enumerate(cells) if n] if elastic.setup.reproducible else [owner % comm.size]
     taken = f"{duration(need.seconds)} and {memory_size(need.memory)}"
-    if not heat and request.by_surface:
+    if need.solver == "multigrid":
+        return f"{name}: conjugate gradients on all ranks, {columns} in blocks; no factor: {taken} in all"
+    if need.solver == "low-rank":
+        return f"{name}: a factor with blocks of low rank over all ranks, {columns}, refined: {taken} in all"
+    whole = [rank for rank, n in enumerate(cells) if n] if elastic.setup.reproducible else [owner % comm.size]
+    if not heat and request.by_surface and need.solver == "factor":
         return f"{name}: rank {whole[0]} eliminates all {sum(cells):,} cells down to the surface, {columns}: {taken}"
-    if comm.size > 1 and not elastic.setup.reproducible and 8 * entries(elastic.size, elastic.dim) > SPREAD:
+    large = need.solver == "spread factor" or 8 * entries(elastic.size, elastic.dim) > SPREAD
+    if comm.size > 1 and not elastic.setup.reproducible and large:
         return f"{name}: a factor over {comm.size} ranks, {columns} solved by all: {taken} in all"
     return f"{name}: rank {whole[0]} factors it and solves {columns}: {taken}"
 

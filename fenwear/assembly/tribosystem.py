@@ -14,8 +14,9 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import Needs, check_memory, needs
+from fenwear.assembly.needs import Needs
 from fenwear.assembly.placed import Placed
+from fenwear.assembly.ways import check_memory, chosen, free_on_ranks, take
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
 from fenwear.bodies.response import Request
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
@@ -116,12 +117,18 @@ class Tribosystem(Placed):
         )
 
 
-def needs_of(placed: Placed) -> Needs:
-    """Return what the set-up of placed bodies will take; collective."""
-    return needs(placed, _frame(placed))
+def needs_of(placed: Placed, free: float | None = None) -> Needs:
+    """Return what the set-up of placed bodies will take, in the way that fits into the memory; collective.
+
+    Args:
+        placed: The bodies.
+        free: Bytes that all ranks together may take; by default those that are free.
+    """
+    free = free_on_ranks(placed.comm) if free is None else free
+    return chosen(placed, _frame(placed), free, shared=shared_rows(placed) is not None)
 
 
-def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
+def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
     """Condense both bodies and join them in every phase; collective.
 
     Factors both stiffnesses, unless the bodies are kept on disk.
@@ -129,11 +136,15 @@ def elastic(placed: Placed, *, fresh: bool = False) -> Tribosystem:
     Args:
         placed: The bodies.
         fresh: Factor whatever is kept.
+        free: Bytes that all ranks together may take; by default those that are free.
 
     Raises:
         CaseError: there is not memory enough.
     """
-    check_memory(placed, needs_of(placed))
+    free = free_on_ranks(placed.comm) if free is None else free
+    wanted = needs_of(placed, free)
+    check_memory(placed, wanted, free)
+    take(placed, wanted)
     condensed = condense_bodies(placed, fresh=fresh)
     return joined(placed, condensed)
 

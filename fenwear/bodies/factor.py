@@ -61,6 +61,7 @@ class Factor:
         repeated: bool = False,
         owner: int = 0,
         surface: NDArray[np.int64] | None = None,
+        spread: bool = False,
     ) -> None:
         """Move a matrix to its owner; collective.
 
@@ -73,6 +74,7 @@ class Factor:
             repeated: Whether it solves thousands of times.
             owner: The rank that has it, unless it is spread, or one rank has the whole matrix.
             surface: Rows whose Schur complement is kept (m,).
+            spread: Over all ranks, however small it is.
         """
         self.comm, self._sizes = comm, matrix.getSizes()[0]
         self._rows: NDArray[np.int64] = np.asarray(matrix.getOwnershipRanges(), dtype=np.int64)
@@ -80,7 +82,7 @@ class Factor:
         whole = len(holders) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
         self.owner, self._prefix, self._kind = int(holders[0]) if whole else owner % self.comm.size, prefix, kind
         needed = 8 * entries(self._sizes[1], dim) * (2 if kind == "lu" else 1)
-        self.is_spread = self.comm.size > 1 and not whole and needed > SPREAD
+        self.is_spread = self.comm.size > 1 and not whole and (spread or needed > SPREAD)
         self._repeated = repeated and not self.is_spread
         self._surface = None if self.is_spread else surface
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False

@@ -89,6 +89,7 @@ class Request:
         way, surface = self.elastic.setup.way, self.elastic.surface_dofs.size
         small = surface**2 * SURFACE_SHARE <= entries(self.elastic.size, self.elastic.dim)
         chosen = way in ("substructures", "elimination") or (way == "automatic" and small)
+        chosen = chosen and self.elastic.solver == "factor"
         return self.thermal_coupling is None and chosen and available()
 
     @property

@@ -130,8 +130,8 @@ class Case(Part):
             problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
-        if kind != "plane" and self.contact.solver == "full":
-            problems.append("contact.solver: expected 'condensed' but in plane models")
+        if kind != "plane" and self.contact.solver == "full" and not self.sticks:
+            problems.append("contact.solver: expected 'condensed' but in plane models and with contact.law = 'coulomb'")
         return problems
 
     @property
@@ -256,7 +256,6 @@ class Case(Part):
         wrong = {
             "contact.friction: expected a constant": isinstance(self.contact.friction, Dependence),
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
-            "contact.solver: expected 'condensed'": self.contact.solver == "full",
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
             "heat.track: expected none": self.heat is not None and self.heat.track is not None,
             "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",

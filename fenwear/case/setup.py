@@ -8,8 +8,13 @@ from pydantic import Field
 
 from fenwear.case.quantities import Part
 
-Way = Literal["automatic", "substructures", "elimination", "columns", "multigrid"]
-OF_TEMPERATURES: tuple[Way, ...] = ("automatic", "columns", "multigrid")  # give displacements of whole bodies
+Way = Literal["automatic", "substructures", "elimination", "columns", "low-rank", "multigrid"]
+OF_TEMPERATURES: tuple[Way, ...] = (
+    "automatic",
+    "columns",
+    "low-rank",
+    "multigrid",
+)  # give displacements of whole bodies
 
 
 class Setup(Part):
@@ -17,9 +22,10 @@ class Setup(Part):
 
     way: Way = Field(
         default="automatic",
-        description="by the size of the factor, told by check; substructures: every rank eliminates its own cells; "
-        "elimination: each body on a rank of its own, down to its surface; columns: a factor, and a solution for "
-        "each column of forces; multigrid: the columns by conjugate gradients, without a factor",
+        description="by the size of the factor and the memory, told by check; substructures: every rank eliminates "
+        "its own cells; elimination: each body on a rank of its own, down to its surface; columns: a factor, and a "
+        "solution for each column of forces; low-rank: the columns by a compressed factor over all ranks, refined; "
+        "multigrid: the columns by conjugate gradients, without a factor",
     )
     reproducible: bool = Field(
         default=False,
@@ -37,7 +43,7 @@ class Setup(Part):
         if heat is not None and self.way not in OF_TEMPERATURES:
             names = ", ".join(f"'{way}'" for way in OF_TEMPERATURES)
             found.append(f"setup.way: expected one of {names} with heat: temperatures act inside the bodies")
-        if self.reproducible and self.way in ("substructures", "multigrid"):
+        if self.reproducible and self.way in ("substructures", "low-rank", "multigrid"):
             found.append(f"setup.reproducible: expected another way than '{self.way}', whose sums go over the ranks")
         if self.reproducible and contact == "full":
             found.append("setup.reproducible: expected contact.solver = 'condensed', whose sums stay on a rank")

@@ -12,10 +12,10 @@ open, such as the wear of the step they belong to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Operator, Phases
+from fenwear.contact.operators import Operator, Phases, Solve
 from fenwear.contact.spread import OwnRows, SpreadBlock, SpreadCompliance
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.parallel import Team
 from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedies
 
+T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
@@ -255,6 +256,19 @@ class CondensedContact:
         pressure[x[:, :n] <= ZERO] = 0.0
         gaps = f.reshape(m, -1)[:, :n] * self._gap_scale
         return ContactState(pressure, gaps, begun + x[:, n:] * self._rigid_scale, iterations)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self._offset.size)
+
+    def on_closed_contact(self, use: Callable[[Solve], T]) -> T:
+        """Return what `use` makes of the solution operator of (p, a) where all nodes touch, scaled; collective."""
+
+        def led() -> T:
+            return use(self._linear.factor(np.arange(self.size, dtype=np.int32)))
+
+        return led() if self._team is None else self._team.lead(led)
 
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int, str]:
         """Return the solution by the first way that finds it: unknowns, residual, iterations, and the remedy or ""."""

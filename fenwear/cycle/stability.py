@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
+from fenwear.contact import CondensedContact, SlidingContact
+from fenwear.contact.operators import Solve
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
@@ -34,40 +38,36 @@ def stability_number(system: Tribosystem) -> float:
     error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
     the phase that wears most.
     """
-    n, r = system.rigid.rigid_normal.shape
+    n = len(system.rigid.rigid_normal)
     uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
     wear = system.phases_wear
     slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
-    left, right = wear.border(uniform)
     ratios, directions = system.friction_ratios(), np.array(system.motion.directions)
-    scale, most = system.interface.elastic_length, slopes.max(axis=1)
-    largest = 0.0
+    most, largest = slopes.max(axis=1), 0.0
     for d in np.unique(directions):
         phase = int(np.argmax(np.where(directions == d, most, -1.0)))
-        if not right[phase].any():  # nothing wears
+        interface = system.interfaces[phase]
+        opened = system.wear.phases([system.conditions(phase)], [phase]).slopes(uniform[phase : phase + 1])[0]
+        if not opened.data.any():  # nothing wears
             continue
-        interface, ratio = system.interfaces[phase], ratios[phase]
-        matrix = np.zeros((n + r, n + r))
-        matrix[:n, :n] = interface.compliance(ratio) / scale
-        matrix[:n, n:] = interface.rigid.rigid_normal
-        matrix[n:, :n] = interface.rigid.equilibrium(ratio)
-        operator = _worn_response(scipy.linalg.lu_factor(matrix), left[phase] / scale, right[phase])
-        start = np.where(np.arange(n) % 2, 1.0, -1.0)  # the fastest mode alternates from node to node
-        values = eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)
-        largest = max(largest, float(np.abs(values).max()))
+        contact = CondensedContact([SlidingContact(interface, ratios[phase])])
+        worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
+        largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
     return largest / 2
 
 
-def _worn_response(factor: tuple[Array, Array], left: Array, right: Array) -> LinearOperator:
-    """Return W P: the gap (n,) worn open by the pressure that a gap takes away, W = left right."""
-    n = len(left)
-    none = np.zeros(len(factor[0]) - n)
+def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
+    """Return the largest eigenvalue of W P: the gap (n,) worn open by the pressure that a gap takes away."""
+    n = worn.shape[0]
 
     def apply(gap: Array) -> Array:
-        pressure = scipy.linalg.lu_solve(factor, np.concatenate([gap.ravel(), none]))[:n]
-        return left @ (right @ pressure)
+        right = np.zeros(size)
+        right[:n] = gap.ravel()
+        return np.asarray(worn @ solve(right)[:n])
 
-    return LinearOperator((n, n), matvec=apply, dtype=float)
+    start = np.where(np.arange(n) % 2, 1.0, -1.0)  # the fastest mode alternates from node to node
+    operator = LinearOperator((n, n), matvec=apply, dtype=float)
+    return float(np.abs(eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)).max())
 
 
 def growth_rate(system: Tribosystem, pressure: Array) -> float:

@@ -15,6 +15,8 @@ from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
 from fenwear.parallel import Rows, total
 
+EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
+
 
 @dataclass(frozen=True)
 class Interface:
@@ -26,6 +28,7 @@ class Interface:
             reaction on the strip (n, n, d), mm per N/mm in the plane; this rank's own rows where ranks share them.
         load_gap: g_load (n,), mm.
         own_by_force: Gap at each node from a unit force along each axis at itself (n, d).
+        by_even: Gap that a unit pressure everywhere opens without friction (n,), mm/MPa.
         rows: Of each rank; None where every rank has all.
     """
 
@@ -33,6 +36,7 @@ class Interface:
     gap_by_force: Array
     load_gap: Array
     own_by_force: Array
+    by_even: Array
     rows: Rows | None = None
 
     def compliance(self, friction_ratio: Array | float) -> Array:
@@ -44,14 +48,9 @@ class Interface:
         own = self._own_rows(friction_ratio)
         return own if self.rows is None else self.rows.gathered(own)
 
-    def _own_rows(self, friction_ratio: Array | float) -> Array:
+    def _own_rows(self, friction_ratio: Array | float, run: slice = EVERY) -> Array:
         traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
-        return np.einsum("ijd,jd->ij", self.gap_by_force, traction)
-
-    def opened(self, friction_ratio: Array | float, pressure: Array) -> Array:
-        """Return S p (n,), mm; collective where ranks share S."""
-        own: Array = self._own_rows(friction_ratio) @ pressure
-        return own if self.rows is None else self.rows.gathered(own)
+        return np.einsum("ijd,jd->ij", self.gap_by_force[run], traction)
 
     def compliance_of(self, friction_ratio: Array, nodes: NDArray[np.int64]) -> Array:
         """Return the columns of S of some nodes (n, k), mm/MPa; this rank's own rows where ranks share them."""
@@ -65,17 +64,20 @@ class Interface:
 
     @cached_property
     def elastic_length(self) -> float:
-        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps.
-
-        Collective at first use where ranks share S.
-        """
+        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps."""
         modes = self.rigid.rigid_normal
-        own = slice(None) if self.rows is None else self.rows.own
-        elastic = self._own_rows(0.0)
-        rigid = np.linalg.pinv(modes)[:, own] @ elastic
+        here = EVERY if self.rows is None else self.rows.own
+        own, inverse = modes[here], np.linalg.pinv(modes)[:, here]
+        runs = [slice(start, start + RUN) for start in range(0, len(own), RUN)]
+        elastic = (self._own_rows(0.0, run) for run in runs)
+        rigid: Array = np.zeros((modes.shape[1], len(modes)))
+        for run, part in zip(runs, elastic, strict=True):
+            rigid += inverse[:, run] @ part
         if self.rows is not None:
             rigid = total(self.rows.comm, rigid)
-        lengths = np.abs(elastic - modes[own] @ rigid).sum(axis=1)
+        elastic = (self._own_rows(0.0, run) for run in runs)
+        parts = [np.abs(part - own[run] @ rigid).sum(axis=1) for run, part in zip(runs, elastic, strict=True)]
+        lengths = np.concatenate([np.zeros(0), *parts])
         return float((lengths if self.rows is None else self.rows.gathered(lengths)).mean())
 
     @property
@@ -106,7 +108,13 @@ def join(
     load_gap = _along(pair.normal, punch.by_load) - _along(pair.normal_on_strip, by_load)
     by_force = punch.normal_response(pair.normal, None, own) + on_strip
     diagonal = by_force[np.arange(len(by_force)), np.arange(own.start, own.stop)]
-    return Interface(rigid, by_force, load_gap, diagonal if rows is None else rows.gathered(diagonal), rows)
+    even = np.einsum("ijd,jd->i", by_force, pair.normal * pair.weights[:, None])
+    if rows is not None:
+        diagonal, even = rows.gathered(diagonal), rows.gathered(even)
+    interface = Interface(rigid, by_force, load_gap, diagonal, even, rows)
+    if rows is not None:
+        _ = interface.elastic_length  # now, while all ranks are here
+    return interface
 
 
 def _along(normal: Array, vectors: Array) -> Array:

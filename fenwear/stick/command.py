@@ -43,7 +43,7 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
-        + "".join(f"\nwarning: {text}" for text in (fineness.text(), unique_text(records)) if text)
+        + "".join(f"\nwarning: {text}" for text in (fineness.text(), unique_text(records.unique.astype(bool))) if text)
     )
 
 

@@ -40,13 +40,22 @@ class Guess(NamedTuple):
     radius: Array
 
 
+class Moved(NamedTuple):
+    """What tractions alone move: the surfaces against each other (d n,), the punch's (n, d), the strip's (q, d)."""
+
+    jump: Array
+    on_punch: Array
+    on_strip: Array
+
+
 class Found(NamedTuple):
-    """The solution of a piece: all tractions (d n,), a, delta, and the sign of its determinant."""
+    """The solution of a piece: all tractions (d n,), a, delta, the sign of its determinant, what moves if known."""
 
     f: Array
     rigid: Array
     displacement: float
     sign: int
+    moved: Moved | None = None
 
 
 class Step:
@@ -86,10 +95,13 @@ class Step:
     def jumps(self, found: Found) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
         position = self.position
-        # C W^-1 is symmetric: rows of the few nodes that carry something, which lie together in memory.
-        loaded, weights = np.flatnonzero(found.f), position.weights
-        j = (weights[loaded] * found.f[loaded]) @ position.compliance[loaded] / weights
-        j += position.modes @ found.rigid - position.drive * found.displacement + self.free
+        if found.moved is not None:
+            j = found.moved.jump
+        else:
+            # C W^-1 is symmetric: rows of the few nodes that carry something, which lie together in memory.
+            loaded, weights = np.flatnonzero(found.f), position.weights
+            j = (weights[loaded] * found.f[loaded]) @ position.compliance[loaded] / weights
+        j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
     def solve(self, guess: Guess) -> Found:
@@ -171,9 +183,7 @@ class Step:
         stuck = guess.closed & (~guess.slipping | (np.abs(slip) <= rounding).all(axis=1))
         slip = np.where(stuck[:, None], 0.0, slip)
         f = np.concatenate([pressure, traction.T.ravel()])
-        force = position.in_space(f * position.weights)
-        interface = self.interface
-        back = position.reading.T @ position.pair.placement.back(force)
+        moved = found.moved or self._moved(f)
         return StickState(
             pressure,
             traction,
@@ -183,12 +193,20 @@ class Step:
             found.rigid,
             found.displacement,
             float(position.pull @ f),
-            self.free_punch + _displaced(interface.punch.response, force),
-            self.free_strip - _displaced(interface.strip.response, back),
+            self.free_punch + moved.on_punch,
+            self.free_strip + moved.on_strip,
             guess.trial,
             iterations,
             unique,
         )
+
+    def _moved(self, f: Array) -> Moved:
+        """Return what tractions (d n,) move; the jump, which is known then, is left out."""
+        position, interface = self.position, self.interface
+        force = position.in_space(f * position.weights)
+        back = position.reading.T @ position.pair.placement.back(force)
+        strip = -_displaced(interface.strip.response, back)
+        return Moved(np.zeros(0), _displaced(interface.punch.response, force), strip)
 
 
 def _displaced(response: Array, force: Array) -> Array:

@@ -10,6 +10,7 @@ import scipy.optimize
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.stick.equations import Found, Guess, Step
+from fenwear.stick.full import FullStep
 from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.state import Imposed, StickState
 
@@ -17,6 +18,11 @@ MOST = 60  # Newton steps
 FEW = 8  # from where it should take one or two
 CLOSE = 1e-10  # residual of the laws over the largest pressure
 HALVINGS = 6  # of a step that does not converge
+TOO_LARGE = "friction is so large that the step may have no or several answers; expected less friction"
+
+
+class ManyAnswersError(ConvergenceError):
+    """Newton's method met pieces of both orientations and found no answer."""
 
 
 def advance(
@@ -46,7 +52,7 @@ def advance(
     """
     position = position or interface.middle
     if near is not None:
-        step = Step(interface, position, before, end, friction)
+        step = _step(interface, position, before, end, friction)
         try:
             return _from(step, _piece(*near, friction), FEW)
         except ConvergenceError:
@@ -57,6 +63,11 @@ def advance(
         if end.force is not None:
             _check_force(interface, position, before, start, end, friction)
         raise
+
+
+def _step(interface: OppositeBodies, position: Position, before: StickState, end: Imposed, friction: Array) -> Step:
+    """Return the equations of a time step, on all displacements where the bodies are wanted whole."""
+    return (FullStep if interface.full else Step)(interface, position, before, end, friction)
 
 
 def _check_force(
@@ -93,21 +104,25 @@ def _advance(
     friction: Array,
     halvings: int,
 ) -> StickState:
-    step = Step(interface, position, before, end, friction)
+    step = _step(interface, position, before, end, friction)
     try:
         return _newton(step)
-    except ConvergenceError:
+    except ConvergenceError as error:
         if halvings == 0:
             raise
+        whole = error
     middle = start.towards(end, 0.5)
-    first = _advance(interface, position, before, start, middle, friction, halvings - 1)
-    second = _advance(interface, position, first, middle, end, friction, halvings - 1)
+    try:
+        first = _advance(interface, position, before, start, middle, friction, halvings - 1)
+        second = _advance(interface, position, first, middle, end, friction, halvings - 1)
+    except ConvergenceError as error:
+        raise (whole if isinstance(whole, ManyAnswersError) else error) from None
     return replace(
         second,
         slip=first.slip + second.slip,
         approach=first.approach + second.approach,
         iterations=first.iterations + second.iterations,
-        unique=first.unique and second.unique,
+        unique=first.unique and second.unique and not isinstance(whole, ManyAnswersError),
         parts=first.parts + second.parts,
     )
 
@@ -124,13 +139,14 @@ def _newton(step: Step) -> StickState:
     failure = ConvergenceError("the contact with stick did not converge")
     for guess in starts:
         try:
-            return _from(step, guess)
+            found = _from(step, guess)
+            return replace(found, unique=found.unique and not isinstance(failure, ManyAnswersError))
         except ConvergenceError as error:
-            failure = error
+            failure = failure if isinstance(failure, ManyAnswersError) else error
     if step.imposed.force is not None:
-        found = _by_displacement(step, starts[1], step.imposed.force)
-        if found is not None:
-            return _from(step, found)
+        piece = _by_displacement(step, starts[1], step.imposed.force)
+        if piece is not None:
+            return _from(step, piece)
     raise failure
 
 
@@ -144,7 +160,7 @@ def _piece(pressure: Array, trial: Array, friction: Array) -> Guess:
 
 def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
     """Return the piece in which the rig's displacement gives an imposed force, found by bisection; None for none."""
-    held = Step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
+    held = _step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
     last = guess
 
     def missing(displacement: float) -> float:
@@ -180,18 +196,21 @@ def _from(step: Step, guess: Guess, most: int = MOST) -> StickState:
 
 
 def _iterate(step: Step, guess: Guess, most: int = MOST) -> tuple[Found, int, bool]:
-    wrong = np.inf
+    wrong, signs = np.inf, set[int]()
     for iteration in range(1, most + 1):
         found = _solve(step, guess)
+        signs.add(found.sign)
         guess, wrong = step.look(found)
         if wrong < CLOSE:
-            return found, iteration, found.sign > 0
+            return found, iteration, min(signs) > 0
         if not guess.closed.any():
             guess = guess._replace(closed=np.ones_like(guess.closed))
-    raise ConvergenceError(
-        f"the contact with stick did not converge in {most} Newton steps, residual {wrong:.3g} of the largest "
-        "pressure: take more steps, or less friction"
+    failed = (
+        f"the contact with stick did not converge in {most} Newton steps, residual {wrong:.3g} of the largest pressure"
     )
+    if len(signs) > 1:
+        raise ManyAnswersError(f"{failed}: {TOO_LARGE}")
+    raise ConvergenceError(f"{failed}: take more steps, or less friction")
 
 
 def _solve(step: Step, guess: Guess) -> Found:

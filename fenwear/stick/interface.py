@@ -27,6 +27,7 @@ from fenwear.case import Case
 from fenwear.interface import ContactPair, RigidEquilibrium, check_distance, pair, rigid_equilibrium
 from fenwear.interface.placement import in_model
 from fenwear.sliding.field import SlidingField
+from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
 @dataclass(frozen=True)
@@ -107,6 +108,7 @@ class OppositeBodies:
     """
 
     moves = False
+    full = False  # whether each step is solved on all displacements
 
     def __init__(
         self, punch: CondensedBody, strip: CondensedBody, rigid: RigidEquilibrium, field: SlidingField
@@ -151,6 +153,7 @@ class StickInterface(OppositeBodies):
             as for slip that is small against the contact.
         keep: Whether the condensed bodies are kept on disk, and taken from there where they are.
         fresh: Condense them whatever is kept.
+        full: Whether each time step is solved on all displacements, nothing condensed.
     """
 
     def __init__(
@@ -162,9 +165,10 @@ class StickInterface(OppositeBodies):
         moves: bool = False,
         keep: bool = False,
         fresh: bool = False,
+        full: bool = False,
     ) -> None:
         self.bodies, self.sliding, self.case, self.moves = bodies, sliding, case, moves
-        self.keep, self.fresh = keep, fresh
+        self.keep, self.fresh, self.full = keep, fresh, full
         self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface)
@@ -175,6 +179,7 @@ class StickInterface(OppositeBodies):
         self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float, Loaded] = {}
+        self._whole: dict[int, WholeBodies] = {}  # of positions, which stay
 
     @cached_property
     def bulk(self) -> Array:
@@ -207,6 +212,12 @@ class StickInterface(OppositeBodies):
             middle = self.middle.pair
             self._positions[offset] = self._position(pair(middle.punch, middle.strip, self.field.placement(offset)))
         return self._positions[offset]
+
+    def whole(self, position: Position) -> WholeBodies:
+        """Return both bodies with nothing condensed in a position of these; collective where it is new."""
+        if id(position) not in self._whole:
+            self._whole[id(position)] = whole_bodies(self.bodies, position, moves=self.moves)
+        return self._whole[id(position)]
 
     def loaded(self, fraction: float | None) -> Loaded:
         """Return what the loads do at a fraction of the cycle, or their mean; collective where it is new."""

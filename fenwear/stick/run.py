@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import xarray
 
+from fenwear.arrays import Mask
 from fenwear.case import Case, doubts
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError
 from fenwear.parallel import on_root
@@ -18,7 +19,7 @@ from fenwear.report.stick import write_stick_report
 from fenwear.results.history import HISTORY, make_directory, write_case, write_summary
 from fenwear.signals import Signals
 from fenwear.stick import checkpoint
-from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.cycle import Rig
 from fenwear.stick.fineness import Fineness, fine_enough
 from fenwear.stick.interface import meshed
 from fenwear.stick.jump import Cycle, jump, march
@@ -80,6 +81,7 @@ class _Run:
         self.comm = comm = meshed(rig.interface).bodies.comm
         self.cycles = max(case.run.half_cycles // rig.program.half_cycles, 1)
         self.jumps = case.run.integration == "jump"
+        self.unique: list[bool] = []  # of the time steps of this run
         self.rig, self.resume = rig.watched(self._watch), resume
         self.last = checkpoint.load(directory, case, rig) if resume else None
         if self.last is not None and self.done >= self.cycles:
@@ -120,7 +122,8 @@ class _Run:
             none = f"no cycle was done: {failure}; {self.directory} can be removed"
             raise type(failure or ConvergenceError())(none) from failure
         self._save()
-        warnings = [*doubts(self.case), *_warnings(self.rig, self.last, fineness)]
+        several = [text for text in (unique_text(np.array(self.unique, dtype=bool)),) if text]
+        warnings = [*doubts(self.case), *_warnings(self.rig, self.last, fineness), *several]
         for warning in warnings:
             self.log(f"warning: {warning}")
         found = {**how, "cycles_seconds": time.perf_counter() - begin, "warnings": warnings}
@@ -141,6 +144,7 @@ class _Run:
     def _take(self, cycle: Cycle) -> None:
         """Keep a cycle; collective, so that every rank knows of an error."""
         self.last = cycle
+        self.unique.extend(bool(unique) for unique in cycle.records.unique)
         keep = self.jumps or cycle.number % self.case.output.every == 0
 
         def row() -> xarray.Dataset:
@@ -203,13 +207,14 @@ def check_touching(rig: Rig) -> None:
         raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
 
-def unique_text(records: Records) -> str:
-    """Say that friction is so large that there are no or several answers, and which was taken; "" if it is not."""
-    if records.unique.all():
+def unique_text(unique: Mask) -> str:
+    """Say that friction is so large that there may be several answers, and which was taken; "" if it is not."""
+    if unique.all():
         return ""
     return (
-        f"friction is so large that the contact has no or several answers in {int((~records.unique).sum())} of "
-        f"{len(records)} time steps; those taken are the ones that Newton's method came to from the step before"
+        f"friction is so large that the contact may have no or several answers in {int((~unique).sum())} of "
+        f"{len(unique)} time steps; those taken are the ones that Newton's method came to from the step before; "
+        "expected less friction"
     )
 
 
@@ -217,8 +222,6 @@ def _warnings(rig: Rig, last: Cycle, fineness: Fineness | None) -> list[str]:
     """Return what the user should know of the run."""
     found = [fineness.text()] if fineness is not None and not fineness.enough else []
     records = last.records
-    if not records.unique.all():
-        found.append(unique_text(records))
     slipping = (records.pressure > 0).any(axis=1) & ~records.sticking.any(axis=1)
     if slipping.any():
         share = float(np.mean(slipping))

@@ -64,7 +64,7 @@ class StickState:
         on_strip: Of what the strip was condensed onto (q, d), mm.
         trial: t - c s (n, m), MPa: where Newton starts from in the next step.
         iterations: Newton steps.
-        unique: Whether the answer of the step is the only one near, as far as the signs of determinants tell.
+        unique: Whether Newton's method met pieces of one orientation only; else there may be other answers.
         parts: Of the step: more than one where it did not converge as a whole; `slip` and `approach` are their sums.
     """
 

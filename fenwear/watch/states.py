@@ -6,6 +6,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
+from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
 from fenwear.cycle import Block, Steady
@@ -13,7 +14,9 @@ from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import ContactEnds, contact_ends, opened
 from fenwear.watch.rim import ContactRim, contact_rim
 from fenwear.watch.stroke import stroke_warnings
+from fenwear.watch.thickness import thickness, worn_through
 
+SHALLOW = 1e-3  # of the contact surface's extent: depths that no body is thin enough for
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
 
 
@@ -28,6 +31,7 @@ class Watch:
         self.system, self.limits, self.chamfer = system, contact_limits(system), contact_chamfer(system)
         self._texts: dict[str, str] = {}
         self._first_clipped = 0
+        self._thick: dict[str, Array] = {}
 
     def see(self, block: Block) -> list[str]:
         """Take the next block and return what is to be said of it that was not said of an earlier one."""
@@ -36,6 +40,11 @@ class Watch:
         if self.chamfer is not None:
             found["chamfer"] = self.chamfer.text(self.chamfer.widened(self.system, block.end.worn))
         found["pressed"] = pressed(case, float(mean_pressures(block.pressure, weights).max()))
+        for name, elastic, depths in (
+            ("punch", self.system.bodies.punch, block.wear),
+            ("strip", self.system.bodies.strip, block.wear_strip),
+        ):
+            found[f"worn through, {name}"] = self._worn_through(block, name, elastic, depths)
         if block.heat is not None:
             hottest = int(np.argmax(block.heat.max_temperature))
             when = f"in half-cycle {int(block.half_cycle[hottest]):,}"
@@ -45,6 +54,24 @@ class Watch:
         # The width that is needed grows with the scar; of the others the first time is what counts.
         self._texts = {**said, **self._texts, **{kind: said[kind] for kind in ("clipped", "chamfer") if kind in said}}
         return new
+
+    def _worn_through(self, block: Block, name: str, elastic: ElasticBody, depths: Array) -> str:
+        """Say that a body is worn through; "" if it is not."""
+        if depths.max(initial=0.0) < SHALLOW * elastic.surface.extent():
+            return ""
+        if name not in self._thick:
+            self._thick[name] = thickness(elastic)
+        thick = self._thick[name]
+        gone = worn_through(elastic, thick, depths)
+        if not gone.any():
+            return ""
+        first = int(np.argmax(gone))
+        deepest = int(np.argmax(depths[first] - thick))
+        return (
+            f"from half-cycle {int(block.half_cycle[first]):,} on the {name} is worn through: it has lost "
+            f"{depths[first, deepest]:.4g} mm where it was {thick[deepest]:.4g} mm thick, and what is computed from "
+            f"there on is of no body; expected fewer half-cycles, or a higher {name}"
+        )
 
     def warnings(self) -> list[str]:
         """Return what is to be said of all blocks so far."""

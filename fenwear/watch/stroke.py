@@ -20,8 +20,7 @@ def elastic_way(system: Tribosystem) -> float:
     if not system.normal_force:
         return 0.0
     weights = system.pair.weights
-    pressure = np.full(len(weights), system.rigid.mean_pressure)
-    pressed_in = float(weights @ system.interface.opened(0.0, pressure) / weights.sum())
+    pressed_in = float(weights @ system.interface.by_even / weights.sum()) * system.rigid.mean_pressure
     ratio = float(weights @ np.linalg.norm(system.friction_ratio(1), axis=1) / weights.sum())
     return ratio * max(pressed_in, 0.0)
 

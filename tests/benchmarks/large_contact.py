@@ -127,7 +127,9 @@ def grid(side: int) -> Interface:
     for k, i in enumerate(range(own.start, own.stop)):
         by_force[k, :, 0] = table[np.abs(at[0] - at[0][i]), np.abs(at[1] - at[1][i])]
     rigid = cast(RigidEquilibrium, Rigid(np.full(n, 1.0 / n)))
-    return Interface(rigid, by_force, np.zeros(n), np.full((n, 1), table[0, 0]), rows)
+    even = by_force[:, :, 0].mean(axis=1)
+    even = even if rows is None else rows.gathered(even)
+    return Interface(rigid, by_force, np.zeros(n), np.full((n, 1), table[0, 0]), even, rows)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
 from fenwear.arrays import Array
-from fenwear.bodies import elasticity
+from fenwear.bodies import supports
 from fenwear.bodies.condensation import CondensedBody, condense
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.interface import interpolation
@@ -121,7 +121,7 @@ def test_further_supports_carry_nothing(name: str, monkeypatch: pytest.MonkeyPat
         state = system.contact((1,)).solve(system.pair.initial_gap + 1e-4 * np.cos(system.pair.x))
         return set(system.bodies.punch.supported.tolist()), state.pressure, state.gap
 
-    best_rows = elasticity._best_rows
+    best_rows = supports._best_rows
     supported, pressure, gap = solve()
     assert (pressure == 0).any()
     assert gap.max() > 1e-6
@@ -130,7 +130,7 @@ def test_further_supports_carry_nothing(name: str, monkeypatch: pytest.MonkeyPat
         random = np.random.default_rng(3).uniform(0.01, 1, len(matrix)) ** 2
         return best_rows(matrix * random[:, None], count)
 
-    monkeypatch.setattr(elasticity, "_best_rows", other_rows)
+    monkeypatch.setattr(supports, "_best_rows", other_rows)
     others, other_pressure, other_gap = solve()
     assert others != supported
     np.testing.assert_allclose(other_pressure, pressure, rtol=0, atol=1e-8 * pressure.max())

@@ -319,3 +319,42 @@ def test_refused(edited: Edited) -> None:
     sinking = edited("example1-heat", composite(conductivity={"expression": "5 - 0.5 * T"}), *SMALL)
     with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -"):
         marched(assemble(sinking), 40)
+
+
+def test_jumps_over_a_program_follow_as_marches(edited: Edited) -> None:
+    """Load steps, a ramp and other surroundings: properties follow over all stages alike, jumped and marched.
+
+    Wear is that of load and distance exactly, and a stage begins with the properties that the stage before has left.
+    """
+    steps: list[dict[str, Any]] = [
+        {"cycles": 4, "load": "10 kN"},
+        {"cycles": 6, "load": ["10 kN", "20 kN"], "ambient": "20 K"},
+    ]
+
+    def program(tables: dict[str, Any]) -> None:
+        tables["materials"]["composite"]["conductivity"] = {"expression": "5 + 0.2 * T", "unit": "W/(m K)"}
+        tables["heat"]["property_tolerance"] = 0.2
+        tables["program"] = {"steps": steps}
+        tables["run"].pop("half_cycles")
+
+    case = edited("example1-heat", program, "geometry.degree=2", "geometry.parameters.elements_along_contact=4",
+                  "heat.steps=2", "geometry.follow_wear=never")  # fmt: skip
+    system = assemble(case, heat="reduced")
+    ends = []
+    for way in ("jump", "implicit"):
+        blocks = list(evolve(system, integration=way, tolerance=1e-3))
+        late = [block.system.bodies.warmed for block in blocks if block.half_cycle[0] > 8]
+        early = [block.system.bodies.warmed for block in blocks if block.half_cycle[-1] <= 8]
+        assert len({id(one) for one in late}) > 1
+        assert early[-1] is not None
+        assert late[0] is not None
+        last = blocks[-1]
+        assert last.half_cycle[-1] == 20
+        assert last.heat is not None
+        path = 6.0 * (4 * 10e3 + 6 * 15e3)  # a cycle slides 4 u0
+        worn = float(system.pair.weights @ last.wear[-1]) * system.bodies.punch.thickness
+        assert worn == pytest.approx(1.25 * np.pi * 1e-8 * path, rel=1e-9)
+        ends.append((last.heat.temperature_punch[-1], last.wear[-1]))
+    (warm, depth), (exact, exact_depth) = ends
+    np.testing.assert_allclose(warm, exact, atol=0.03 * exact.max())
+    assert (np.abs(depth - exact_depth) < exact_depth / 20).all()  # the wear of a half-cycle: what a march errs by

@@ -13,9 +13,10 @@ from scipy.sparse import bmat, coo_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 from fenwear import load_case
-from fenwear.assembly import build_bodies, make_sliding
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.stick import Imposed, StickInterface, advance, untouched
+from fenwear.stick.cycle import Records
+from fenwear.stick.setup import make_rig
 
 MU = 0.5
 CLOSE = 1e-8
@@ -146,10 +147,33 @@ def test_plane(unlike: Callable[[], StickInterface]) -> None:
     compare(unlike(), 200.0, [1e-3, 3e-3, 1e-3, -2e-3, 1e-3])
 
 
-@pytest.mark.slow
-def test_solid() -> None:
-    """A sphere on a flat."""
-    settings = ["geometry.parameters.across=2", "geometry.degree=2"]
-    case = load_case("fretting-sphere", settings)
-    interface = StickInterface(build_bodies(case), make_sliding(case), case)
-    compare(interface, 0.0, [0.5e-3])
+def cycles(name: str, *settings: str) -> tuple[Records, Records]:
+    """Return the first cycle of a case by its condensed bodies, and by contact.solver = "full"."""
+    found = []
+    for solver in ("condensed", "full"):
+        rig = make_rig(load_case(name, [*settings, "run.integration='explicit'", f"contact.solver='{solver}'"]))
+        found.append(Records.joined(rig.cycle(rig.beginning())[1]))
+    return found[0], found[1]
+
+
+COARSE = ("geometry.parameters.elements_along_contact=8", "motion.amplitude='3 um'", "stick.steps=4")
+SPHERE = ("geometry.parameters.across=2", "geometry.degree=1", "stick.steps=2", "stick.load_steps=1")
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("fretting-partial-slip", (*COARSE, "stick.force='60 N'", "motion.positions=3")),
+        ("fretting-sphere", SPHERE),
+    ],
+)
+@pytest.mark.mpi
+def test_by_the_case(name: str, settings: tuple[str, ...]) -> None:
+    """A whole cycle with nothing condensed, in as many Newton steps, with the same signs of determinants."""
+    condensed, full = cycles(name, *settings)
+    assert 0 < condensed.sticking.sum() < (condensed.pressure > 0).sum()
+    assert (full.iterations == condensed.iterations).all()
+    assert (full.unique == condensed.unique).all()
+    for what in ("pressure", "traction", "slip", "gap", "force", "displacement", "strain", "stored", "dissipated"):
+        one, other = getattr(condensed, what), getattr(full, what)
+        assert np.abs(one - other).max() < CLOSE * np.abs(one).max()

@@ -1,0 +1,107 @@
+"""What solves for the columns of each body, by the memory that there is.
+
+A factor on one rank where it fits its share of the memory, else over all ranks, else with blocks of low rank, else
+no factor but conjugate gradients with a multigrid: the first that fits, for the larger body before the smaller one.
+`setup.way` takes the place of the choice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from mpi4py import MPI
+
+from fenwear.assembly.needs import NUMBER, SMALL, WORKING, Needs, needs
+from fenwear.assembly.placed import Placed
+from fenwear.bodies.elasticity import Solver
+from fenwear.errors import CaseError, InputError
+from fenwear.memory import free_memory, memory_size
+
+SOLVERS: tuple[Solver, ...] = ("factor", "low-rank", "multigrid")  # by what they take, the most first
+
+
+def free_on_ranks(comm: MPI.Comm) -> float | None:
+    """Return the bytes that all ranks together may still take; None where a system does not tell; collective."""
+    node = comm.Split_type(MPI.COMM_TYPE_SHARED)
+    own = free_memory() if node.rank == 0 else 0.0
+    node.Free()
+    found = comm.allgather(own)
+    return None if any(one is None for one in found) else float(sum(one or 0.0 for one in found))
+
+
+def chosen(placed: Placed, frames: tuple[bool, bool, bool], free: float | None, *, shared: bool = False) -> Needs:
+    """Return what the set-up needs with what solves for the columns of each body; collective.
+
+    Args:
+        placed: The bodies; they take the choice over.
+        frames: As of `needs.needs`.
+        free: Bytes that all ranks together may take; None where that is not known.
+        shared: Whether ranks share the rows of the contact.
+    """
+    wanted = needs(placed, frames, shared=shared)
+    setup = placed.bodies.punch.setup
+    if setup.way == "automatic" and not setup.reproducible:
+        wanted = first_fitting(wanted, free)
+    if setup.way in ("automatic", "columns") and not setup.reproducible and free is not None and placed.comm.size > 1:
+        share = free / placed.comm.size
+        punch, strip = (
+            replace(body, solver="spread factor")
+            if body.solver == "factor" and NUMBER * WORKING * body.factor > max(share, SMALL)
+            else body
+            for body in (wanted.punch, wanted.strip)
+        )
+        wanted = replace(wanted, punch=punch, strip=strip)
+    return wanted
+
+
+def fits(wanted: Needs, free: float | None) -> bool:
+    """Return whether it fits into the memory."""
+    return free is None or wanted.memory <= max(free, SMALL)
+
+
+def first_fitting(wanted: Needs, free: float | None) -> Needs:
+    """Return the same with what fits into the memory; as it was where nothing does."""
+    return next((one for one in (wanted, *_less_and_less(wanted)) if fits(one, free)), wanted)
+
+
+def _less_and_less(wanted: Needs) -> Iterator[Needs]:
+    """Yield the same with what takes less memory, first in the larger body, then in both."""
+    for solver in SOLVERS[1:]:
+        punch, strip = (replace(one, solver=solver) for one in (wanted.punch, wanted.strip))
+        larger = wanted.punch.factor > wanted.strip.factor
+        yield replace(wanted, punch=punch) if larger else replace(wanted, strip=strip)
+        wanted = replace(wanted, punch=punch, strip=strip)
+        yield wanted
+
+
+def check_memory(placed: Placed, wanted: Needs, free: float | None) -> None:
+    """Make sure that the set-up fits into the memory that is free.
+
+    Raises:
+        CaseError: it does not; says which way, and which mesh would.
+    """
+    if free is None or fits(wanted, free):
+        return
+    setup = placed.bodies.punch.setup
+    message = f"{wanted.text()}, but {memory_size(free)} are free"
+    least = wanted
+    for least in _less_and_less(wanted):
+        if fits(least, free):
+            break
+    if fits(least, free) and not setup.reproducible:
+        way = least.strip.solver if least.strip.solver != "factor" else least.punch.solver
+        message += f"; setup.way = '{way}' would take {memory_size(least.memory)}"
+    elif setup.way == "automatic":
+        message += f", and no setup.way would fit: 'multigrid' takes {memory_size(least.memory)}"
+    found = wanted.fitting(0.9 * free)
+    if found is not None:
+        times, less = found
+        message += f"; elements {times:.2g} times as large would fit: {less.text()}"
+    raise CaseError(InputError("geometry", message))
+
+
+def take(placed: Placed, wanted: Needs) -> None:
+    """Give the bodies what was chosen, of all phases."""
+    for bodies in {id(one): one for one in (placed.bodies, *placed.loaded)}.values():
+        bodies.punch.solver, bodies.strip.solver = wanted.punch.solver, wanted.strip.solver

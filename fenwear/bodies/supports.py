@@ -1,0 +1,240 @@
+"""How a body is held: the components that its supports take, and the rigid modes that they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from fenwear import compat
+from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.case import Body, Kind, Support
+from fenwear.errors import CaseError, InputError
+
+# For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
+# with their names, then those in which friction would carry the body away.
+SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about z: hold it against turning"
+PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
+RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
+    "stress": PLANE,
+    "strain": PLANE,
+    "axisymmetric": ({1: "lambda_F"}, {}),
+    "solid": (
+        {2: "lambda_F", 3: "lambda_Mx", 4: "lambda_My"},
+        {0: SLIDE.format("x"), 1: SLIDE.format("y"), 5: SPIN},
+    ),
+}
+
+
+def axes(dim: int) -> dict[str, int]:
+    """Return the component of each axis in a model of `dim` dimensions; a plane one has no y."""
+    return {"x": 0, "z": 1} if dim == 2 else {"x": 0, "y": 1, "z": 2}
+
+
+class Supports:
+    """The supports of one body, and one more for each rigid mode R that they leave, which makes K regular.
+
+    Attributes:
+        conditions: All of them, as u = 0 on the degrees of freedom of a component.
+        held: The owned degrees of freedom that they hold.
+        pivot: The point about which rotations are taken, mm.
+        modes: Columns of R on the owned degrees of freedom; the displacement of each for a unit velocity.
+        names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
+    """
+
+    def __init__(
+        self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: NDArray[np.int64]
+    ) -> None:
+        """Find what is held; collective.
+
+        Args:
+            body: The mesh.
+            space: Vector space of the displacement, mm.
+            description: The supports and the pivot.
+            kind: The model.
+            contact: Owned nodes at the contact surface, from which the further supports keep away.
+
+        Raises:
+            CaseError: an unknown group, a support off the body, a body free to slide.
+        """
+        self.body, self.space, self.kind, self.contact = body, space, kind, contact
+        self.dim = body.mesh.geometry.dim
+        self.pivot = _pivot(body, description)
+        own = [*self._described(description.supports), *self._on_axis()]
+        self.modes, self.names = self._free_modes(own)
+        self.conditions = own + self._regularise()
+        self.held = self._owned(self.conditions)
+
+    def _described(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
+        key = f"{self.body.name}.supports"
+        return [
+            self._condition(component, self._support_dofs(support, component, f"{key}.{number}"))
+            for number, support in enumerate(supports)
+            for component in (self._component(axis, f"{key}.{number}.fix") for axis in support.fix)
+        ]
+
+    def _on_axis(self) -> list[fem.DirichletBC]:
+        """Return the support u_r = 0 at r = 0 of an axisymmetric body, without which u_r / r is not finite."""
+        if self.kind != "axisymmetric":
+            return []
+        collapsed, to_parent = compat.collapse(self.space.sub(0))
+        on_axis = collapsed.tabulate_dof_coordinates()[:, 0] < 1e-9 * self._size()
+        return [self._condition(0, to_parent[on_axis])]
+
+    def _component(self, axis: str, key: str) -> int:
+        known = axes(self.dim)
+        if axis not in known:
+            raise CaseError(InputError(key, f"expected {', '.join(known)}, got {axis!r}"))
+        return known[axis]
+
+    def _condition(self, component: int, dofs: NDArray[np.int32]) -> fem.DirichletBC:
+        return fem.dirichletbc(PETSc.ScalarType(0), dofs, self.space.sub(component))
+
+    def _support_dofs(self, support: Support, component: int, key: str) -> NDArray[np.int32]:
+        body, sub = self.body, self.space.sub(component)
+        if support.on in body.curves:
+            facets = body.facet_tags.find(body.curves[support.on])
+            return fem.locate_dofs_topological(sub, body.mesh.topology.dim - 1, facets)
+        points = _support_points(body, support, key)
+        collapsed, to_parent = compat.collapse(sub)
+        x = collapsed.tabulate_dof_coordinates()[:, : points.shape[1]]
+        distance = np.linalg.norm(x[:, None] - points[None], axis=2)
+        tolerance = 1e-6 * self._size()
+        found = body.mesh.comm.allreduce((distance < tolerance).any(axis=0).astype(int))
+        missing = points[found == 0]
+        if len(missing):
+            place = ", ".join("(" + ", ".join(f"{c:g}" for c in p) + ")" for p in missing)
+            raise CaseError(InputError(f"{key}.at", f"a pin off the {body.name}: no node of its mesh at {place} mm"))
+        return to_parent[(distance < tolerance).any(axis=1)]
+
+    def _size(self) -> float:
+        """Return the largest extent of the body, mm; collective."""
+        comm, x = self.body.mesh.comm, self.body.mesh.geometry.x
+        low = np.array([comm.allreduce(x[:, i].min(initial=np.inf), MPI.MIN) for i in range(3)])
+        high = np.array([comm.allreduce(x[:, i].max(initial=-np.inf), MPI.MAX) for i in range(3)])
+        return float((high - low).max())
+
+    def rigid_basis(self) -> NDArray[np.float64]:
+        """Return the translations and the rotations omega x (x - x_O) on the owned dofs (owned, modes).
+
+        A positive rotation about y lowers what lies at larger x:
+        u = (z - z_O, -(x - x_O)). These are the paper's signs of lambda_M.
+        """
+        owned = self.space.dofmap.index_map.size_local
+        x = self.space.tabulate_dof_coordinates()[:owned]
+        dim = self.dim
+        arm = x[:, :dim] - self.pivot
+        if dim == 2:
+            turns = np.stack([arm[:, 1], -arm[:, 0]], axis=1)[:, :, None]
+        else:
+            turns = np.stack([np.cross(axis, arm) for axis in np.eye(3)], axis=2)
+        shifts = np.broadcast_to(np.eye(dim), (owned, dim, dim))
+        return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, dim + turns.shape[2])
+
+    def _free_modes(self, supports: list[fem.DirichletBC]) -> tuple[list[NDArray[np.float64]], list[str]]:
+        """Return the rigid modes that the supports leave, and their names.
+
+        Raises:
+            CaseError: the body is free to slide along the contact, or to spin about its normal.
+        """
+        names, forbidden = RIGID_MODES[self.kind]
+        columns = [*names, *forbidden]
+        basis, comm = self.rigid_basis()[:, columns], self.body.mesh.comm
+        held = basis[self._owned(supports)]
+        gram = comm.allreduce(held.T @ held)
+        scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
+        eigenvalues, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
+        free = vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)] * scale[:, None]
+        # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
+        echelon, pivots = _column_echelon(free)
+        loose = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
+        if loose:
+            name = self.body.name
+            message = f"the {name} is free to {' and to '.join(loose)}, friction pulls it"
+            raise CaseError(InputError(f"{name}.supports", message))
+        return list((basis @ echelon).T.copy()), [names[columns[p]] for p in pivots]
+
+    def _owned(self, supports: list[fem.DirichletBC]) -> NDArray[np.int32]:
+        parts = [bc.dof_indices()[0][: bc.dof_indices()[1]] for bc in supports]
+        return np.unique(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int32)
+
+    def _regularise(self) -> list[fem.DirichletBC]:
+        """Return one further support for each rigid mode, away from the contact; collective."""
+        if not self.modes:
+            return []
+        comm, count = self.body.mesh.comm, len(self.modes)
+        scale = np.array([comm.allreduce(np.abs(m).max(initial=0)) for m in self.modes])
+        modes = np.array(self.modes).T / scale
+        modes.reshape(-1, self.dim, count)[self.contact] = 0.0
+        # Pivoted QR picks the rows that make R regular: here, then among all ranks' choices.
+        local = _best_rows(modes, count)
+        proposals = comm.allgather([(comm.rank, int(i), modes[i]) for i in local])
+        candidates = [c for proposal in proposals for c in proposal]
+        chosen = [candidates[i][:2] for i in _best_rows(np.array([c[2] for c in candidates]), count)]
+        mine = np.array([dof for rank, dof in chosen if rank == comm.rank], dtype=np.int32)
+        index_map = self.space.dofmap.index_map
+        # Ghosts of the chosen dofs are held too: mark them by a scattered function.
+        mark = fem.Function(self.space)
+        mark.x.array[mine] = 1.0
+        mark.x.scatter_forward()
+        known = self.dim * (index_map.size_local + index_map.num_ghosts)
+        held = np.flatnonzero(mark.x.array[:known]).astype(np.int32)
+        return [self._condition(component, held[held % self.dim == component]) for component in range(self.dim)]
+
+
+def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.float64]:
+    if support.at is not None:
+        return np.array([support.at])
+    if support.on not in body.points:
+        known = ", ".join(sorted({*body.curves, *body.points}))
+        entity = ENTITIES[body.mesh.topology.dim - 1]
+        message = f"no physical {entity} or point {support.on!r} on the {body.name}; the geometry has {known}"
+        raise CaseError(InputError(f"{key}.on", message))
+    return body.points[support.on]
+
+
+def _pivot(body: BodyMesh, description: Body) -> NDArray[np.float64]:
+    """Return the point O about which rotations are taken; by default the first support's centre."""
+    if description.pivot is not None:
+        return np.array(description.pivot)
+    for number, support in enumerate(description.supports):
+        if support.on is None or support.on in body.points:
+            return _support_points(body, support, f"{body.name}.supports.{number}").mean(axis=0)
+    return np.zeros(body.mesh.geometry.dim)
+
+
+def _column_echelon(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:
+    """Return the reduced column echelon form of a matrix with few columns, and its pivot rows."""
+    m = matrix.copy()
+    pivots: list[int] = []
+    for row in range(m.shape[0]):
+        column = len(pivots)
+        if column == m.shape[1]:
+            break
+        best = column + int(np.argmax(np.abs(m[row, column:])))
+        if abs(m[row, best]) < 1e-9 * max(np.abs(m).max(), 1e-300):
+            continue
+        m[:, [column, best]] = m[:, [best, column]]
+        m[:, column] /= m[row, column]
+        others = [c for c in range(m.shape[1]) if c != column]
+        m[:, others] -= np.outer(m[:, column], m[row, others])
+        pivots.append(row)
+    m[np.abs(m) < 1e-12 * np.abs(m).max(axis=0, initial=1e-300)] = 0.0
+    return m, pivots
+
+
+def _best_rows(matrix: NDArray[np.float64], count: int) -> list[int]:
+    """Return the rows that span best: each time the largest of what those before have left (QR with pivoting)."""
+    rest, chosen = np.array(matrix), []
+    for _ in range(min(count, len(rest))):
+        best = int(np.argmax(np.einsum("ij,ij->i", rest, rest)))
+        chosen.append(best)
+        length = float(np.linalg.norm(rest[best]))
+        if length > 0:
+            unit = rest[best] / length
+            rest -= np.outer(rest @ unit, unit)
+    return chosen

@@ -36,7 +36,6 @@ myst_heading_anchors = 3
 # docs/extensions/executed.py does.
 nb_execution_mode = "off"
 nb_render_markdown_format = "gfm"  # tables in what cells show
-nb_merge_streams = True
 copybutton_exclude = ".linenos, .gp, .go"
 
 autodoc_member_order = "bysource"

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, get_args
 
 from fenwear.case.keys import all_keys
 from fenwear.case.laws import Dependence
-from fenwear.case.motions import OneWay, Oscillation, Reciprocating, Rotation, Tabulated
+from fenwear.case.motions import Motions
 from fenwear.case.schema import Case, part_models
 from fenwear.case.units import shown
 from fenwear.errors import InputError
 
-MOTIONS: dict[str | int, type] = {
-    "reciprocating": Reciprocating,
-    "one-way": OneWay,
-    "table": Tabulated,
-    "rotation": Rotation,
-    "oscillation": Oscillation,
-}
+MOTIONS: dict[str | int, type] = {get_args(m.model_fields["kind"].annotation)[0]: m for m in get_args(Motions)}
 # What was expected, by the kind of an error of pydantic: its own words are those of Python.
 EXPECTED = {
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), "a table"),

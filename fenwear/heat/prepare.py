@@ -13,10 +13,11 @@ from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, HeatError, InputError
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.contact_response import contact_responses
-from fenwear.heat.exchange import HeatExchange, Side, StepPlan
+from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import FullField, ReducedField
 from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.reduction import ROUNDING, reduced_basis
+from fenwear.heat.side import Side, StepPlan
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
 from fenwear.parallel import total
@@ -62,15 +63,7 @@ def prepare_exchange(
         CaseError: the half-cycles of the motion last unequally long.
         HeatError: no basis gives temperatures that die out.
     """
-    if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
-        raise CaseError(InputError("motion", "expected half-cycles of equal duration with heat"))
-    count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
-    duration = motion.phases[0].duration / count
-    speeds = motion.mean_speeds(count)
-    signed = [[0.0 if at_rest else d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
-    velocities = sorted({velocity for row in signed for velocity in row})
-    of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
-    plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]
+    plans, velocities, duration = _plans(heat, motion, at_rest=at_rest)
     # Sliding to and fro brings back what it took away, unless the case says what comes instead.
     renewed = heat.inflow is not None or velocities[0] * velocities[-1] > 0
     cycles = [[getattr(step, body.body.name) for plan in plans for step in plan] for body in bodies]
@@ -96,6 +89,23 @@ def prepare_exchange(
             for step in steps:
                 step.free()
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
+
+
+def _plans(heat: Heat, motion: Motion, *, at_rest: bool) -> tuple[list[list[StepPlan]], list[float], float]:
+    """Return the steps of each phase, the velocities of the strip's material in them, and how long each lasts, s.
+
+    Raises:
+        CaseError: the half-cycles of the motion last unequally long.
+    """
+    if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
+        raise CaseError(InputError("motion", "expected half-cycles of equal duration with heat"))
+    count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
+    speeds = motion.mean_speeds(count)
+    signed = [[0.0 if at_rest else d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
+    velocities = sorted({velocity for row in signed for velocity in row})
+    of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
+    plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]
+    return plans, velocities, motion.phases[0].duration / count
 
 
 def prepare_steady(

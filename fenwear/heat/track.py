@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -22,10 +21,8 @@ from fenwear.arrays import Array
 from fenwear.case import Track
 from fenwear.heat.conduction import HeatStep
 from fenwear.heat.field import Functional, ReducedField, TrackBasis
+from fenwear.heat.side import Side
 from fenwear.parallel import total
-
-if TYPE_CHECKING:
-    from fenwear.heat.exchange import Side
 
 
 @dataclass(frozen=True)

@@ -51,6 +51,7 @@ class LeastSquares:
         """
         self.case, self.comm = case, comm
         self.model = Model(case)
+        self.model.check_constant()
         self.data = list(data)
         self.series = [series for one in data for series in one.series]
         self.unknowns = [scaled(case, unknown) for unknown in unknowns]

@@ -25,6 +25,7 @@ from fenwear.life.keys import with_values
 BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
 ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop
+WITHIN = 1e-9  # relative: what properties of the temperature may still change by in a steady state, for differences
 NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
 
 
@@ -110,19 +111,32 @@ class Model:
         if self.case.program is not None:
             message = "not followed here; expected a case of constant loads and motion, or `run`"
             raise CaseError(InputError("program", message))
-        for name, material in self.case.materials.items():
-            for key in material.dependent:
-                message = (
-                    "depends on the temperature, and is taken anew step by step: what comes of it is no smooth "
-                    "function of other keys; expected a constant, such as its value where `steady` finds the heat"
-                )
-                raise CaseError(InputError(f"materials.{name}.{key}", message))
         laws = {"contact.friction": self.case.contact.friction}
         for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
             laws[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
         for key, law in laws.items():
             if isinstance(law, Dependence) and law.passes:
                 raise CaseError(InputError(key, "depends on the worn depth or the distance slid: not followed here"))
+
+    @property
+    def warming(self) -> bool:
+        """Whether properties of materials depend on the temperature."""
+        return any(material.dependent for material in self.case.materials.values())
+
+    def check_constant(self) -> None:
+        """Refuse properties of the temperature where they are followed in steps.
+
+        Raises:
+            CaseError: there are some.
+        """
+        for name, material in self.case.materials.items():
+            for key in material.dependent:
+                message = (
+                    "depends on the temperature, and is taken anew step by step in a run: what comes of it is no "
+                    "smooth function of other keys; expected a quantity of the steady state, or a constant, such as "
+                    "its value where `steady` finds the heat"
+                )
+                raise CaseError(InputError(f"materials.{name}.{key}", message))
 
     def system(self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()) -> Tribosystem:
         """Return the assembled problem with keys at these values; what does not change is shared.
@@ -181,6 +195,7 @@ class Model:
             CaseError: a value is not possible.
             ConvergenceError: a jump did not converge.
         """
+        self.check_constant()
         system = self.system(values, settings)
         self.evaluations += 1
         strokes, case = system.motion.half_cycles, system.case
@@ -214,7 +229,7 @@ class Model:
                 return
 
     def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
-        """Return the cyclic steady state.
+        """Return the cyclic steady state, with properties of its own temperatures where they depend on them.
 
         Raises:
             CaseError: a value is not possible.
@@ -222,7 +237,7 @@ class Model:
         """
         system = self.system(values, settings)
         self.evaluations += 1
-        state = steady(system)
+        state = steady(system, properties_within=WITHIN if self.warming else None)
         return steady_snapshot(state.system, state.phase_pressure, state.velocity)
 
     def run_in(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
@@ -231,6 +246,7 @@ class Model:
         Raises:
             ConvergenceError: there is no steady state.
         """
+        self.check_constant()
         system = self.system(values, settings)
         self.evaluations += 1
         state = steady(system)
@@ -243,6 +259,7 @@ class Model:
         Raises:
             CaseError: the case has no heat.
         """
+        self.check_constant()
         system = self.system(values, settings)
         self.evaluations += 1
         return min(critical_speed(system, d) for d in sorted(set(system.motion.directions)))

@@ -326,6 +326,7 @@ def evaluate(
     """
     if quantity.kind == "steady":
         return quantity.of_snapshot(model.steady(values, settings)), Path()
+    model.check_constant()
     distance, period = model.cycle_measures(values, settings)
     if quantity.kind == "whole":
         return _whole(model, quantity, values, settings, distance), Path()

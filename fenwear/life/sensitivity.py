@@ -1,9 +1,9 @@
 """Derivatives of quantities of interest to keys of a case.
 
-Of a steady state by implicit differentiation; of a run, and of what is not differentiable so, by central
-differences of runs with the same jumps. Every difference is taken with two steps, h and h / 2, and
-extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; the error that is told is |D(h/2) - D(h)|, of the
-coarser order. Where it is too large the step is reduced.
+Of a steady state by implicit differentiation; of a run, and of what is not differentiable so, such as a steady
+state whose materials depend on its temperatures, by central differences of runs with the same jumps. Every
+difference is taken with two steps, h and h / 2, and extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; the
+error that is told is |D(h/2) - D(h)|, of the coarser order. Where it is too large the step is reduced.
 """
 
 from __future__ import annotations
@@ -163,8 +163,13 @@ def sensitivity(
     ]
 
 
+def _implicitly(model: Model) -> bool:
+    """Return whether steady states are differentiated implicitly: not where properties are of their own warmth."""
+    return not model.warming and differentiable(model.system())
+
+
 def _method(model: Model, quantity: Quantity, asked: Method | None) -> Method:
-    if quantity.kind == "steady" and asked != "differences" and differentiable(model.system()):
+    if quantity.kind == "steady" and asked != "differences" and _implicitly(model):
         return "implicit"
     if asked == "implicit":
         raise CaseError(

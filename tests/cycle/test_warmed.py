@@ -20,6 +20,8 @@ from fenwear.cycle.state import RunState, beginning
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.life.model import Model
+from fenwear.life.quantities import evaluate, parse_quantity
+from fenwear.life.sensitivity import _method
 from fenwear.sliding.wear import Worn
 
 HEIGHTS, FAR, SLOPE = (2.0, 3.0), (90.0, 20.0), 0.02
@@ -101,6 +103,27 @@ def test_kirchhoff() -> None:
     assert errors[2] < 1e-5
 
 
+def rubbing(mu: float, p: float, speed: float, degree: int = 3) -> Case:
+    """Return the two blocks with friction, one sliding on the other."""
+    materials = {
+        name: {"conductivity": growing(k0), "heat_capacity": 1.0}  # next to no heat is carried along
+        for name, k0 in zip(("upper", "lower"), K0, strict=True)
+    }
+    assert p == 4.0  # the load of the stack
+    case = stack(materials, 1.0, 2, reduction_tolerance=1e-7)
+    tables = case.model_dump(exclude_unset=True) | {
+        "contact": {"friction": mu},
+        "wear": {"punch": {"coefficient": 1e-9}},
+        "motion": {"kind": "one-way", "speed": speed, "direction": "rightward", "duration": 1.0},
+        "geometry": {
+            "file": "blocks.geo",
+            "degree": degree,
+            "parameters": {**case.geometry.parameters, "punch_layers": 4, "strip_layers": 4},
+        },
+    }
+    return make_case(tables)
+
+
 @pytest.mark.mpi
 def test_steady_heat_by_kirchhoff() -> None:
     """Friction heats both blocks: the whole fields of `steady` are those of Kirchhoff's transform, node by node.
@@ -109,22 +132,7 @@ def test_steady_heat_by_kirchhoff() -> None:
     with the same temperature at the contact. The error falls with the tolerance of the properties, to the mesh's.
     """
     mu, p, speed = 0.5, 4.0, 400.0  # 800 mW/mm²
-    materials = {
-        name: {"conductivity": growing(k0), "heat_capacity": 1.0}  # next to no heat is carried along
-        for name, k0 in zip(("upper", "lower"), K0, strict=True)
-    }
-    case = stack(materials, 1.0, 2, reduction_tolerance=1e-7)
-    tables = case.model_dump(exclude_unset=True) | {
-        "contact": {"friction": mu},
-        "wear": {"punch": {"coefficient": 1e-9}},
-        "motion": {"kind": "one-way", "speed": speed, "direction": "rightward", "duration": 1.0},
-        "geometry": {
-            "file": "blocks.geo",
-            "degree": 3,
-            "parameters": {**case.geometry.parameters, "punch_layers": 4, "strip_layers": 4},
-        },
-    }
-    system = assemble(make_case(tables), heat="reduced")
+    system = assemble(rubbing(mu, p, speed), heat="reduced")
 
     def kirchhoff(k0: float, t: Any) -> Any:
         return k0 * (t + SLOPE * t**2 / 2)
@@ -315,7 +323,7 @@ def test_refused(edited: Edited) -> None:
     with pytest.raises(ConvergenceError, match=r"where materials.composite.young depends on the temperature"):
         monotonic(assemble(warm, heat="none"))
     with pytest.raises(CaseError, match=r"materials.composite.young: depends on the temperature, and is taken anew"):
-        Model(warm)
+        evaluate(Model(warm), parse_quantity("depth after 10 cycles"), {})
     sinking = edited("example1-heat", composite(conductivity={"expression": "5 - 0.5 * T"}), *SMALL)
     with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -"):
         marched(assemble(sinking), 40)
@@ -358,3 +366,14 @@ def test_jumps_over_a_program_follow_as_marches(edited: Edited) -> None:
     (warm, depth), (exact, exact_depth) = ends
     np.testing.assert_allclose(warm, exact, atol=0.03 * exact.max())
     assert (np.abs(depth - exact_depth) < exact_depth / 20).all()  # the wear of a half-cycle: what a march errs by
+
+
+def test_derivative_of_a_warm_steady_state() -> None:
+    """dT/dmu of Kirchhoff's transform, (sum of k_i(T) / h_i) dT = p v dmu: properties of each state, by differences."""
+    mu, p, speed, step = 0.5, 4.0, 400.0, 5e-4
+    model, quantity = Model(rubbing(mu, p, speed, degree=2)), parse_quantity("steady temperature")
+    assert _method(model, quantity, None) == "differences"
+    low, high = (evaluate(model, quantity, {"contact.friction": mu + sign * step})[0] for sign in (-1, 1))
+    top = (low + high) / 2
+    exact = p * speed / sum(k0 * (1 + SLOPE * top) / h for k0, h in zip(K0, HEIGHTS, strict=True))
+    assert (high - low) / (2 * step) == pytest.approx(exact, rel=1e-5)

@@ -142,7 +142,7 @@ def test_steps_are_halved_where_it_counts() -> None:
     """The work of friction of the cycle tends to that of many equal steps as the tolerance falls, in fewer steps."""
     start = rig(LOAD, "stick.steps=8")
     case = load_case("fretting-partial-slip", [*SMALL, LOAD, "stick.steps=8"])
-    exact = first_cycle(with_steps(start, case, 160)).energy(start.weights)
+    exact = first_cycle(with_steps(start, case, 96)).energy(start.weights)
     errors, counts = [], []
     for tolerance in (0.1, 0.01):
         within = load_case(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from laws import check_energy, check_laws
 
 from fenwear import load_case
 from fenwear.contact import CondensedContact, SlidingContact
@@ -44,48 +45,6 @@ def pressed(interface: StickInterface, mu: float = MU) -> tuple[StickState, Impo
     return advance(interface, untouched(interface), start, end, np.full(len(end.opening), mu)), end
 
 
-def check(interface: StickInterface, before: StickState, state: StickState, end: Imposed, mu: float) -> None:
-    """All laws of a step, from the displacements of both bodies rather than the compliance that was solved with."""
-    position, n = interface.middle, len(end.opening)
-    p, t, s = state.pressure, state.traction[:, 0], state.slip[:, 0]
-    top = p.max()
-    assert (p >= 0).all()
-    assert (np.abs(t) <= mu * p * (1 + 1e-14)).all()
-    assert (state.gap >= -1e-10 * np.abs(state.gap).max()).all()
-    assert not (p * state.gap).any()
-    slipping = state.slipping if state.parts == 1 else np.zeros(n, dtype=bool)
-    assert np.abs(np.abs(t[slipping]) - mu * p[slipping]).max(initial=0) < 1e-9 * top
-    assert (t[slipping] * s[slipping] <= 0).all(), "slip goes against the traction"
-    jumps = []
-    for one in (before, state):
-        moved = position.in_frame(one.on_punch - position.reading @ one.on_strip)
-        jumps.append(moved + position.modes @ one.rigid - position.drive * one.displacement)
-    scale = np.abs(jumps[1]).max()
-    assert np.abs(jumps[1][:n] + end.opening - state.gap).max() < 1e-9 * scale
-    touched = state.closed
-    assert np.abs((jumps[1] - jumps[0])[n:][touched] - s[touched]).max() < 1e-9 * scale
-    f = np.concatenate([p, t])
-    assert np.abs(position.balance @ f + end.loaded.resultant).max() < 1e-9 * LOAD
-    assert state.force == pytest.approx(position.pair.weights @ t, abs=1e-9 * LOAD)
-
-
-def energy(interface: StickInterface, before: StickState, state: StickState, end: Imposed) -> None:
-    """Work of rig and load = what the bodies store + friction, all of the tractions at the end of the step."""
-    position = interface.middle
-    f = np.concatenate([state.pressure, state.traction[:, 0]])
-    force = position.in_space(f * position.weights)
-    back = position.reading.T @ force
-    stored = np.vdot(force, state.on_punch - before.on_punch) - np.vdot(back, state.on_strip - before.on_strip)
-    rubbed = -position.pair.weights @ (state.traction * state.slip)[:, 0]
-    closed = position.pair.weights @ (state.pressure * state.approach)
-    work = state.force * (state.displacement - before.displacement) + end.loaded.resultant @ (
-        state.rigid - before.rigid
-    )
-    scale = abs(work) + abs(stored) + rubbed + 1e-6 * LOAD * 1e-2
-    assert rubbed >= 0
-    assert abs(work - stored - rubbed + closed) < 1e-8 * scale
-
-
 paths = st.lists(st.tuples(st.floats(0.2, 1.5), st.floats(-0.9, 0.9), st.floats(-2e-4, 2e-4)), min_size=1, max_size=6)
 
 
@@ -105,9 +64,9 @@ def test_random_paths(unlike: Callable[[], StickInterface], path: list, mu: floa
         if by_force and abs(before.force) > 0.95 * mu * load * LOAD:
             continue  # on the way the force would be more than friction can hold
         state = advance(interface, before, start, end, friction)
-        check(interface, before, state, end, mu)
+        check_laws(interface.middle, before, state, end, mu, LOAD)
         if state.parts == 1:
-            energy(interface, before, state, end)
+            check_energy(interface.middle, before, state, end, LOAD)
         before, start = state, end
 
 

@@ -85,9 +85,8 @@ def prepare_exchange(
             field = FullField(body, steps, inflow)
         cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
         sides.append(_side(field, steps, around, pair, rows, cooled=cooled))
-        if reduced:  # what is left of them is in the small field
-            for step in steps:
-                step.free()
+        for step in steps if reduced else ():  # what is left of them is in the small field
+            step.free()
     return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
 
 

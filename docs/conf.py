@@ -36,7 +36,6 @@ myst_heading_anchors = 3
 # docs/extensions/executed.py does.
 nb_execution_mode = "off"
 nb_render_markdown_format = "gfm"  # tables in what cells show
-nb_merge_streams = True
 copybutton_exclude = ".linenos, .gp, .go"
 
 autodoc_member_order = "bysource"
@@ -49,6 +48,7 @@ napoleon_use_ivar = True
 smartquotes = False  # commands and TOML are copied from tables, too
 
 html_theme = "furo"
+pygments_dark_style = "monokai"
 html_static_path = ["static"]
 html_css_files = ["formulas.css"]
 html_title = f"fenwear {version}"

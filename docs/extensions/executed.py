@@ -87,6 +87,19 @@ def _outputs(notebook: Any) -> Iterator[tuple[int, Any]]:
             yield at, output
 
 
+def _join_streams(notebook: Any) -> None:
+    """Put what a cell prints bit by bit together."""
+    for cell in notebook.cells:
+        joined: list[Any] = []
+        for output in cell.get("outputs", []):
+            if joined and output.output_type == "stream" == joined[-1].output_type:
+                joined[-1].text += output.text
+            else:
+                joined.append(output)
+        if "outputs" in cell:
+            cell.outputs = joined
+
+
 def _stand_still(notebook: Any) -> None:
     """Put what sliders show at their start in the sliders' place: moving them takes a kernel."""
     kept = notebook.metadata.pop("widgets", {}).get(f"{WIDGET}state+json", {}).get("state", {})
@@ -127,6 +140,7 @@ def execute(path: Path, key: str) -> None:
     for at, output in _outputs(notebook):
         if output.output_type == "stream" and output.name == "stderr":
             raise _failed(path, f"cell {at} writes to standard error:\n{output.text}")
+    _join_streams(notebook)
     _stand_still(notebook)
     notebook.metadata[KEY] = key
     nbformat.write(notebook, PAGES / path.name)

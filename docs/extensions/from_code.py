@@ -28,7 +28,10 @@ class Written(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         """Return what the Markdown makes."""
-        return self.parse_text_to_nodes("\n".join(self.lines()))
+        made = self.parse_text_to_nodes("\n".join(self.lines()))
+        for table in (table for node in made for table in node.findall(nodes.table)):
+            table["classes"].append("from-code")
+        return made
 
     def lines(self) -> Iterable[str]:
         """Return the lines of Markdown."""

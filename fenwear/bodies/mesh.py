@@ -8,6 +8,7 @@ solid the regions are volumes and what meets are surfaces. An axisymmetric model
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -276,12 +277,24 @@ def _check_parameters(geometry: Geometry, path: Path) -> None:
     known = sorted({name for block in blocks for name in re.findall(r"(\w+)\s*=", block)})
     unknown = [name for name in geometry.parameters if name not in known]
     if unknown:
-        message = f"{path.name} has no such parameter; it has {', '.join(known)}"
-        raise CaseError([InputError(f"geometry.parameters.{name}", message) for name in unknown])
+        raise CaseError(
+            [InputError(f"geometry.parameters.{name}", _no_parameter(path, name, known)) for name in unknown]
+        )
+
+
+def _no_parameter(path: Path, name: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(name, known, n=1)
+    hint = f"did you mean {close[0]!r}? It" if close else "it"
+    return f"{path.name} has no such parameter; {hint} has {', '.join(known) or 'none'}"
 
 
 def _groups(gmsh: Any, dim: int) -> dict[str, int]:
     return {gmsh.model.getPhysicalName(dim, tag): tag for _, tag in gmsh.model.getPhysicalGroups(dim)}
+
+
+def _named(gmsh: Any, dim: int) -> str:
+    names = [name or "one without a name" for name in _groups(gmsh, dim)]
+    return f"it has {', '.join(names)}" if names else f"it has no physical {ENTITIES[dim]}"
 
 
 def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
@@ -290,9 +303,9 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
     for body in BODIES:
         regions = [name for name in _groups(gmsh, whole) if name.startswith(f"{body}_")]
         if not regions:
-            problems.append(f"{path.name} has no physical {region} named {body}_...")
+            problems.append(f"{path.name} has no physical {region} named {body}_...; {_named(gmsh, whole)}")
         if f"{body}_contact" not in _groups(gmsh, whole - 1):
-            problems.append(f"{path.name} has no physical {facet} named {body}_contact")
+            problems.append(f"{path.name} has no physical {facet} named {body}_contact; {_named(gmsh, whole - 1)}")
     if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
         problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
     for dim in (whole, whole - 1):

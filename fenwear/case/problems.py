@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, get_args
 
+from fenwear.case.keys import all_keys
 from fenwear.case.laws import Dependence
-from fenwear.case.motions import OneWay, Oscillation, Reciprocating, Rotation, Tabulated
+from fenwear.case.motions import Motions
 from fenwear.case.schema import Case, part_models
 from fenwear.case.units import shown
 from fenwear.errors import InputError
 
-MOTIONS: dict[str | int, type] = {
-    "reciprocating": Reciprocating,
-    "one-way": OneWay,
-    "table": Tabulated,
-    "rotation": Rotation,
-    "oscillation": Oscillation,
-}
+MOTIONS: dict[str | int, type] = {get_args(m.model_fields["kind"].annotation)[0]: m for m in get_args(Motions)}
 # What was expected, by the kind of an error of pydantic: its own words are those of Python.
 EXPECTED = {
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), "a table"),
@@ -47,7 +42,8 @@ def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noq
         case "missing":
             return [InputError(key, "missing, but required")]
         case "union_tag_not_found" | "union_tag_invalid":
-            return [InputError(f"{key}.kind", f"expected one of {', '.join(map(str, MOTIONS))}")]
+            expected = f"expected one of {', '.join(f'{kind!r}' for kind in MOTIONS)}"
+            return [InputError(f"{key}.kind", expected + _nearest(error.get("ctx", {}).get("tag"), expected))]
         case "too_short":
             return [InputError(key, f"expected {_entries('at least', error['ctx']['min_length'], error)}")]
         case "too_long":
@@ -109,4 +105,7 @@ def _suggestion(location: tuple[str | int, ...]) -> str:
     close = difflib.get_close_matches(str(location[-1]), names, n=1)
     if close:
         return f"; did you mean {close[0]!r}?"
+    elsewhere = [key.path for key in all_keys() if key.path.endswith(f".{location[-1]}")] if len(location) == 1 else []
+    if elsewhere:
+        return f"; did you mean {' or '.join(dict.fromkeys(elsewhere[:3]))}?"
     return f"; known here are {', '.join(names)}" if names else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -49,7 +50,9 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     if path.suffix != ".toml" and not path.exists():
         if source not in builtin_cases():
             known = ", ".join(builtin_cases())
-            raise CaseError(InputError(source, f"no such case file, nor a built-in case ({known})"))
+            close = difflib.get_close_matches(source, builtin_cases(), n=1)
+            hint = f"; did you mean {close[0]!r}?" if close else ""
+            raise CaseError(InputError(source, f"no such case file, nor a built-in case ({known}){hint}"))
         text, folder = (resources.files("fenwear") / "cases" / f"{source}.toml").read_text("utf-8"), None
     else:
         text, folder = _read_text(path), path.parent

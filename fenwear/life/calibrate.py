@@ -208,7 +208,7 @@ def calibrate(
     z = np.zeros(len(asked))
     result = None
     for number in range(ROUNDS):  # the jumps of the start are too long or too short for the end
-        problem.keep_jumps(z)
+        _begin(problem, z)
         if number == 0:
             problem.check_influence(problem.jacobian(z), z)
         progress(f"fit {number + 1} of {ROUNDS}")
@@ -224,6 +224,18 @@ def calibrate(
         raise ConvergenceError("the fit did not begin")
     problem.predicted(z, strict=True)  # raises what a trial may do, and a result may not
     return _calibration(problem, result)
+
+
+def _begin(problem: LeastSquares, z: Array) -> None:
+    """Run the model where a round of the fit begins; what fails there is told with the values."""
+    try:
+        problem.keep_jumps(z)
+    except ConvergenceError as error:
+        values = ", ".join(f"{key} = {value:.4g}" for key, value in problem.values(z).items())
+        raise type(error)(
+            f"{error}\nthis is at {values}, where the fit begins: expected a better start there, by --set KEY=VALUE; "
+            "worn volume over load and sliding distance is one of a wear coefficient"
+        ) from error
 
 
 def _calibration(problem: LeastSquares, result: Any) -> Calibration:

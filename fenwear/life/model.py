@@ -166,9 +166,9 @@ class Model:
     def cycle_measures(
         self, values: Mapping[str, float] | None = None, settings: Sequence[str] = ()
     ) -> tuple[float, float]:
-        """Return the distance slid in a cycle, mm, and its duration, s."""
-        motion = self.system(values, settings).motion
-        return float(sum(phase.distance for phase in motion.phases)), motion.period
+        """Return the distance slid in a cycle, mm, mean over the contact surface, and its duration, s."""
+        system = self.system(values, settings)
+        return _distance(system), system.motion.period
 
     def run(
         self,
@@ -278,6 +278,19 @@ def _surfaces(system: Tribosystem, depths: Mapping[str, Array] | None, pressure:
     return surfaces
 
 
+def _distance(system: Tribosystem, pressure: Array | None = None) -> float:
+    """Return the distance slid in a cycle, mm: mean over the load of pressures (k, n), or over the contact surface.
+
+    A turning strip's phases are angles: its surface slides them times its distance from the axis.
+    """
+    whole = 0.0
+    for number, (phase, pair) in enumerate(zip(system.motion.phases, system.pairs, strict=True)):
+        speed = np.linalg.norm(system.sliding.field.velocity(pair.opposite), axis=1)
+        load = pair.weights if pressure is None or not pressure[number].any() else pair.weights * pressure[number]
+        whole += phase.distance * float(speed @ load) / float(load.sum())
+    return whole
+
+
 def _snapshot(
     system: Tribosystem,
     cycle: float,
@@ -287,11 +300,11 @@ def _snapshot(
     velocity: Mapping[str, float],
 ) -> Snapshot:
     motion, weights = system.motion, system.pair.weights
-    lasts = np.array([phase.distance for phase in motion.phases])[:, None]
+    paths = np.array([phase.distance * slid for phase, slid in zip(motion.phases, system.slid, strict=True)])
     latest = None if temperature is None else (temperature[-1, 0], temperature[-1, 1])
     states = [system.conditions(k, np.asarray(pressure[k]), latest) for k in range(len(pressure))]
     mu = np.array([system.friction.values(state) for state in states])
-    carried = float((lasts * pressure * weights).sum())
+    carried = float((paths * pressure * weights).sum())
     return Snapshot(
         cycle,
         _surfaces(system, depths, pressure),
@@ -299,9 +312,9 @@ def _snapshot(
         weights,
         pressure,
         temperature,
-        float((lasts * mu * pressure * weights).sum()) / carried if carried > 0 else 0.0,
+        float((paths * mu * pressure * weights).sum()) / carried if carried > 0 else 0.0,
         velocity,
-        float(lasts.sum()),
+        _distance(system, pressure),
         motion.period,
         system.case.model.thickness,
     )

@@ -101,7 +101,10 @@ def test_pins(parameters: dict[str, float], points: set[tuple[float, float]]) ->
 @pytest.mark.parametrize(
     ("parameters", "expected"),
     [
-        ({"punch_with": 60}, "geometry.parameters.punch_with: .* has no such parameter; it has .*punch_width"),
+        (
+            {"punch_with": 60},
+            "geometry.parameters.punch_with: .* has no such parameter; did you mean .punch_width.. It has .*growth",
+        ),
         ({"pin_height_1": 101}, "a pin is off the punch"),
         ({"pin_height_1": 0}, "a pin is off the punch"),
         ({"punch_width": -1}, "must be positive"),

@@ -32,6 +32,14 @@ def test_volume_and_the_life_to_a_volume_are_archards(small: Callable[..., Case]
     assert value(case, "time until volume 3 mm^3") == pytest.approx(cycles * 2 * np.pi / 10, rel=1e-9)
 
 
+def test_distance_of_a_turning_strip(small: Callable[..., Case]) -> None:
+    """A ring's surface slides its angle times its radius under a block, of which nothing is known but the radius."""
+    case = small("block-on-ring")
+    distance, period = Model(case).cycle_measures()
+    radius, speed = case.geometry.parameters["radius"], case.motion.angular_speed
+    assert distance == pytest.approx(radius * speed * period, rel=1e-3)  # the facets are chords
+
+
 def test_a_life_is_where_a_run_to_it_reaches_the_level(small: Callable[..., Case]) -> None:
     """As near as the tolerance of jumps says, and nearer with a smaller one."""
     errors = []

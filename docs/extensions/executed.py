@@ -1,7 +1,8 @@
 """Executes the notebooks of demos/, so that their pages show what they print and draw.
 
 They run side by side, one on each core, the long ones first, and into docs/notebooks. What was executed stays valid
-until a notebook, the package or a mesh changes. A cell that fails or warns ends the build.
+until a notebook, the package or a mesh changes. This is the notebooks' test, too: a cell that fails or warns, a figure
+that is not drawn and a file left behind end the build.
 """
 
 from __future__ import annotations
@@ -118,7 +119,7 @@ def execute(path: Path, key: str) -> None:
     """Execute a notebook in a folder of its own and write it among the pages.
 
     Raises:
-        ExtensionError: a cell failed, or wrote to standard error.
+        ExtensionError: a cell failed or wrote to standard error, a figure is missing, or a file was left behind.
     """
     notebook = nbformat.read(path, as_version=4)
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
@@ -137,6 +138,12 @@ def execute(path: Path, key: str) -> None:
             client.execute(env=environment)
         except CellExecutionError as error:
             raise _failed(path, str(error)) from error
+        if left := os.listdir(folder):
+            raise _failed(path, f"leaves {', '.join(left)} behind")
+    figures = sum("image/png" in output.get("data", {}) for _, output in _outputs(notebook))
+    expected = sum(cell.source.count("plt.show()") for cell in notebook.cells if cell.cell_type == "code")
+    if not figures >= expected > 0:
+        raise _failed(path, f"draws {figures} figures, and shows {expected}")
     for at, output in _outputs(notebook):
         if output.output_type == "stream" and output.name == "stderr":
             raise _failed(path, f"cell {at} writes to standard error:\n{output.text}")

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import ufl
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -126,9 +127,9 @@ def test_further_supports_carry_nothing(name: str, monkeypatch: pytest.MonkeyPat
     assert (pressure == 0).any()
     assert gap.max() > 1e-6
 
-    def other_rows(matrix: NDArray[np.float64], count: int) -> list[int]:
+    def other_rows(matrix: NDArray[np.float64], count: int, comm: MPI.Comm) -> list[int]:
         random = np.random.default_rng(3).uniform(0.01, 1, len(matrix)) ** 2
-        return best_rows(matrix * random[:, None], count)
+        return best_rows(matrix * random[:, None], count, comm)
 
     monkeypatch.setattr(supports, "_best_rows", other_rows)
     others, other_pressure, other_gap = solve()

@@ -180,6 +180,38 @@ plt.show()
 # %% [markdown]
 # The energy ratio is the loop's area over $4\,Q_{max}\,\delta_{max}$; above 0.2 sliding is called gross (Fouvry).
 #
+# ## The running map
+#
+# Which of the three it is follows from load and stroke: the running map of a rig. A larger load holds a longer stroke, so
+# that the border of gross sliding, where nothing sticks all through the cycle, runs upwards.
+
+# %%
+loads, amplitudes = np.linspace(30, 210, 4 if COARSE else 7), np.linspace(0.5, 8, 6 if COARSE else 16)  # N/mm, µm
+stuck = np.zeros((len(loads), len(amplitudes)))
+for row, force in enumerate(loads):
+    pressed = [*settings, f'punch.loads=[{{on="punch_top", force=["0 N", "-{force} N"]}}]']
+    held = make_rig(load_case("fretting-partial-slip", pressed))
+    for column, amplitude in enumerate(amplitudes):
+        stroke = with_steps(
+            held, load_case("fretting-partial-slip", [*pressed, f"motion.amplitude={amplitude} um"]), 40
+        )
+        records = Records.joined(stroke.cycle(stroke.beginning())[1])
+        touches = weights @ (records.pressure > 0).any(axis=0)
+        stuck[row, column] = weights @ records.sticking.all(axis=0) / touches
+
+figure, ax = plt.subplots(figsize=(6.5, 3.8), layout="constrained")
+shown = ax.pcolormesh(amplitudes, loads, 100 * stuck, cmap="viridis", vmin=0, vmax=100)
+ax.text(0.97, 0.06, "gross sliding", color="white", ha="right", transform=ax.transAxes)
+ax.set(xlabel="amplitude of the stroke (µm)", ylabel="load (N/mm)")
+figure.colorbar(shown, label="of the contact: sticks all through (%)")
+plt.show()
+border = [amplitudes[row > 0].max() for row in stuck]
+print(
+    "longest stroke that sticks anywhere:",
+    ", ".join(f"±{b:.1f} µm at {p:.0f} N/mm" for b, p in zip(border, loads, strict=True)),
+)
+
+# %% [markdown]
 # ## Partial slip wears a scar beside the stick zone
 #
 # `jump` takes many cycles in one step of controlled error, with the stroke of ±3 µm of the case. `final_shape` finds the

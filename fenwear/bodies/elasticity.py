@@ -205,8 +205,9 @@ class ElasticBody:
             if self.solver in ("multigrid", "low-rank"):
                 del self.stiffness
                 low = self.solver == "low-rank"
-                rigid = self._held.rigid_basis()
-                self._factors.append(LowRank(matrix, PREFIX, comm) if low else Multigrid(matrix, rigid, PREFIX, comm))
+                self._factors.append(
+                    LowRank(matrix, PREFIX, comm) if low else Multigrid(matrix, self._held.rigid_basis(), PREFIX, comm)
+                )
                 return self._factors[0]
             spread = self.solver == "spread factor"
             factor = Factor(

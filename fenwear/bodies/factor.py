@@ -199,6 +199,24 @@ def factored(
     return factor
 
 
+class Approximate(Factor):
+    """What solves like a factor that all ranks share, but comes near only, and so needs the matrix to improve on it."""
+
+    def __init__(self, matrix: PETSc.Mat, prefix: str, comm: MPI.Comm) -> None:
+        """Take what it is made from.
+
+        Args:
+            matrix: Symmetric and positive definite; kept.
+            prefix: Of PETSc's options.
+            comm: The ranks.
+        """
+        self.comm, self.owner, self._prefix = comm, 0, prefix
+        self._sizes = matrix.getSizes()[0]
+        self.is_spread, self.is_moved, self.is_made = True, False, False
+        self.schur = None
+        self._matrix = matrix
+
+
 def make_together(factors: Sequence[Factor]) -> None:
     """Compute factors, each where it is solved, at once; collective.
 

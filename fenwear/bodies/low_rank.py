@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import times
-from fenwear.bodies.factor import Factor, solved, without_factor
+from fenwear.bodies.factor import Approximate, solved, without_factor
 from fenwear.errors import ConvergenceError
 
 COMPRESSED = 1e-7  # accuracy of the blocks
@@ -21,22 +21,13 @@ ACCURACY = 1e-13  # residual over the right-hand side
 STEPS = 10
 
 
-class LowRank(Factor):
+class LowRank(Approximate):
     """A factor that all ranks share, whose blocks are compressed: `make_together` computes it."""
 
     def __init__(self, matrix: PETSc.Mat, prefix: str, comm: MPI.Comm) -> None:
-        """Take what it is made from.
-
-        Args:
-            matrix: Symmetric and positive definite; kept.
-            prefix: Of PETSc's options.
-            comm: The ranks.
-        """
-        self.comm, self.owner, self._prefix = comm, 0, prefix
-        self._sizes = matrix.getSizes()[0]
-        self.is_spread, self.is_moved, self.is_made = True, False, False
-        self.schur = None
-        self._matrix, self._solver = matrix, None
+        """Take what it is made from, as `Approximate`."""
+        super().__init__(matrix, prefix, comm)
+        self._solver = None
         self.steps = 0
 
     def compute(self) -> None:

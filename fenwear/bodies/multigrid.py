@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import destroy, times
-from fenwear.bodies.factor import Factor, solved, without_factor
+from fenwear.bodies.factor import Approximate, solved, without_factor
 from fenwear.errors import ConvergenceError
 from fenwear.parallel import total
 
@@ -59,23 +59,18 @@ class _Level:
         return found
 
 
-class Multigrid(Factor):
+class Multigrid(Approximate):
     """What solves like a factor that all ranks share, without being one: `make_together` makes its levels."""
 
     def __init__(self, matrix: PETSc.Mat, rigid: Array, prefix: str, comm: MPI.Comm) -> None:
-        """Take what it is made from.
+        """Take what it is made from, as `Approximate`.
 
         Args:
-            matrix: Symmetric and positive definite; kept.
+            matrix, prefix, comm: As there.
             rigid: Rigid motions of this rank's own rows (owned, modes).
-            prefix: Of PETSc's options.
-            comm: The ranks.
         """
-        self.comm, self.owner, self._prefix = comm, 0, prefix
-        self._sizes = matrix.getSizes()[0]
-        self.is_spread, self.is_moved, self.is_made = True, False, False
-        self.schur = None
-        self._matrix, self._rigid = matrix, rigid
+        super().__init__(matrix, prefix, comm)
+        self._rigid = rigid
         self._levels: list[_Level] = []  # the finest first
         self._coarsest: PETSc.Mat | None = None
         self._ksp: PETSc.KSP | None = None

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear.results.reading import load_history
+
 Run = Callable[..., Any]
 SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 CASES = {
@@ -60,7 +62,7 @@ def run(run_python: Run, tmp_path: Path) -> Callable[..., Histories]:
         folder = tmp_path / f"{ranks} {len(list(tmp_path.iterdir()))}"
         done = run_python("-m", "mpi4py", "-c", ALL, folder, json.dumps(cases), ranks=ranks)
         assert done.returncode == 0, done.stderr
-        return {name: xarray.load_dataset(folder / name / "history.nc", engine="h5netcdf") for name in cases}
+        return {name: load_history(folder / name) for name in cases}
 
     return run
 

@@ -167,6 +167,11 @@ class ElasticBody:
         """K as substructures, where they are made."""
         return next((one for one in self._substructures if one.is_made), None)
 
+    @property
+    def is_factored(self) -> bool:
+        """Whether what solves for its columns is made."""
+        return self.substructures is not None or any(factor.is_made for factor in self._factors)
+
     @cached_property
     def boundary(self) -> Boundary:
         """What this rank's cells share with others and with the contact surface; collective at first use."""

@@ -32,8 +32,8 @@ def shares_text(placed: Placed, wanted: Needs) -> list[str]:
         whole = wanted.contact
         lines.append(
             f"contact: {rows.comm.size} ranks share the rows of its {wanted.nodes:,.0f} nodes, "
-            f"{memory_size(whole / rows.comm.size)} each; what needs all of them, such as the steady state, gathers "
-            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on each"
+            f"{memory_size(whole / rows.comm.size)} each; jumps in which all nodes touch gather "
+            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on rank 0"
         )
     return lines
 

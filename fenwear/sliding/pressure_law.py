@@ -33,9 +33,14 @@ class PressureLaw:
         return cls(law.pressure_exponent, law.pressure_threshold, cap)
 
     @property
+    def power(self) -> bool:
+        """Whether it is p^b and no more."""
+        return self.threshold == 0 and self.cap == np.inf
+
+    @property
     def linear(self) -> bool:
         """Whether wear is in proportion to the pressure."""
-        return self.exponent == 1 and self.threshold == 0 and self.cap == np.inf
+        return self.power and self.exponent == 1
 
     def value(self, pressure: Array) -> Array:
         """Return q^b (...), MPa^b, of pressures."""

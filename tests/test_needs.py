@@ -14,6 +14,7 @@ from mpi4py import MPI
 from fenwear import CaseError, assemble, load_case
 from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem, ways
 from fenwear.assembly.needs import BodyNeeds, Needs, needs
+from fenwear.bodies.condensation import deal
 from fenwear.memory import GIB, free_memory
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
@@ -107,6 +108,50 @@ def test_the_way_by_the_memory() -> None:
     ]
     assert ways.first_fitting(whole, 2 * GIB) == whole  # nothing fits
     assert ways.first_fitting(whole, None) == whole
+
+
+def test_further_ranks_share_columns() -> None:
+    """Each goes to the body that takes longer, while it saves a tenth and its factor fits."""
+    body = solid(155_000, 2401).punch
+    for ranks, holders in ((1, (1, 1)), (2, (1, 1)), (3, (2, 1)), (4, (2, 2)), (6, (3, 3))):
+        found = ways.dealt(Needs(body, body, 2401, 1, 2), ranks, None)
+        assert (found.punch.holders, found.strip.holders) == holders
+    small = replace(body, columns=300.0, patterns=300.0)
+    found = ways.dealt(Needs(small, body, 2401, 1, 2), 64, None)
+    assert found.punch.holders == 1  # its columns take less than the other's factor
+    few = found.strip
+    assert few.on_holder <= 0.9 * replace(few, holders=few.holders - 1).on_holder
+    assert replace(few, holders=few.holders + 1).on_holder > 0.9 * few.on_holder
+    whole = Needs(body, body, 2401, 1, 2)
+    most = replace(whole, strip=replace(body, holders=2)).memory
+    counts = [ways.dealt(whole, 64, times * most) for times in (0.99, 1.01)]
+    assert [one.punch.holders + one.strip.holders for one in counts] == [2, 3]
+    for solver in ("spread factor", "low-rank", "multigrid"):
+        other = replace(body, solver=solver)
+        assert ways.dealt(Needs(other, other, 2401, 1, 2), 4, None).strip.holders == 1
+
+
+def test_an_owner_for_each_body_and_then_the_rest() -> None:
+    """No rank holds two factors while there are ranks without one."""
+    assert deal([1, 1], 1) == [[0], [0]]
+    assert deal([1, 1], 2) == [[0], [1]]
+    assert deal([2, 3], 4) == [[0, 2], [1, 3]]
+    assert deal([2, 3], 8) == [[0, 2], [1, 3, 4]]
+    assert deal([3], 2) == [[0, 1]]
+
+
+@pytest.mark.mpi
+def test_all_ranks_are_told_of() -> None:
+    """Of many columns, on as many ranks as there are."""
+    placed = place_case(load_case("example1", [*COARSE, "setup.way=columns"]))
+    wanted = needs_of(placed)
+    ranks = placed.comm.size
+    many = replace(wanted, punch=replace(wanted.punch, columns=1e6), strip=replace(wanted.strip, columns=1e6))
+    lines = shares_text(placed, ways.dealt(many, ranks, None))[:2]
+    told = [
+        int(rank) for line in lines for rank in re.findall(r"\d+", re.split("factor", line.partition("rank")[2])[0])
+    ]
+    assert sorted(told) == (list(range(ranks)) if ranks > 1 else [0, 0])
 
 
 def test_another_way_would_fit(monkeypatch: pytest.MonkeyPatch) -> None:

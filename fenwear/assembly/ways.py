@@ -2,22 +2,27 @@
 
 A factor on one rank where it fits its share of the memory, else over all ranks, else with blocks of low rank, else
 no factor but conjugate gradients with a multigrid: the first that fits, for the larger body before the smaller one.
-`setup.way` takes the place of the choice.
+`setup.way` takes the place of the choice. Ranks that would have nothing to do hold a factor of their own and solve a
+share of its columns, while the memory lasts.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 from mpi4py import MPI
 
-from fenwear.assembly.needs import NUMBER, SMALL, WORKING, Needs, needs
+from fenwear.assembly.needs import NUMBER, SMALL, WORKING, BodyNeeds, Needs, needs
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.elasticity import Solver
+from fenwear.bodies.factor import SPREAD
 from fenwear.errors import CaseError, InputError
 from fenwear.memory import free_memory, memory_size
+from fenwear.parallel import agreed
 
+GAIN = 0.1  # of a body's time that a further rank has to save to be worth a factor of its own
 SOLVERS: tuple[Solver, ...] = ("factor", "low-rank", "multigrid")  # by what they take, the most first
 
 
@@ -43,15 +48,37 @@ def chosen(placed: Placed, frames: tuple[bool, bool, bool], free: float | None, 
     setup = placed.bodies.punch.setup
     if setup.way == "automatic" and not setup.reproducible:
         wanted = first_fitting(wanted, free)
-    if setup.way in ("automatic", "columns") and not setup.reproducible and free is not None and placed.comm.size > 1:
-        share = free / placed.comm.size
-        punch, strip = (
-            replace(body, solver="spread factor")
-            if body.solver == "factor" and NUMBER * WORKING * body.factor > max(share, SMALL)
-            else body
-            for body in (wanted.punch, wanted.strip)
-        )
+    ranks = placed.comm.size
+    if setup.way in ("automatic", "columns") and not setup.reproducible and ranks > 1:
+        most = math.inf if free is None else max(free / ranks, SMALL)
+        punch, strip = (_spread(body, most) for body in (wanted.punch, wanted.strip))
         wanted = replace(wanted, punch=punch, strip=strip)
+    return agreed(placed.comm, dealt(wanted, ranks, free))
+
+
+def _spread(body: BodyNeeds, most: float) -> BodyNeeds:
+    """Return the same with its factor over all ranks where one rank cannot have it in so many bytes, or it is large."""
+    large = NUMBER * body.factor > SPREAD or NUMBER * WORKING * body.factor > most
+    return replace(body, solver="spread factor") if body.solver == "factor" and large and not body.together else body
+
+
+def dealt(wanted: Needs, ranks: int, free: float | None) -> Needs:
+    """Return the same with the ranks beyond the two owners dealt out, each to the body that takes longer.
+
+    A factor more has to fit into the memory, and to take away a part of that body's time.
+
+    Args:
+        wanted: What solves for the columns of each body.
+        ranks: Number of ranks.
+        free: Bytes that all ranks together may take.
+    """
+    for _ in range(ranks - 2):
+        name, longer = max((("punch", wanted.punch), ("strip", wanted.strip)), key=lambda one: one[1].on_holder)
+        more = replace(longer, holders=longer.holders + 1)
+        after = replace(wanted, punch=more) if name == "punch" else replace(wanted, strip=more)
+        if longer.solver != "factor" or more.on_holder > (1 - GAIN) * longer.on_holder or not fits(after, free):
+            break
+        wanted = after
     return wanted
 
 
@@ -104,4 +131,5 @@ def check_memory(placed: Placed, wanted: Needs, free: float | None) -> None:
 def take(placed: Placed, wanted: Needs) -> None:
     """Give the bodies what was chosen, of all phases."""
     for bodies in {id(one): one for one in (placed.bodies, *placed.loaded)}.values():
-        bodies.punch.solver, bodies.strip.solver = wanted.punch.solver, wanted.strip.solver
+        for body, own in ((bodies.punch, wanted.punch), (bodies.strip, wanted.strip)):
+            body.solver, body.holders = own.solver, own.holders

@@ -17,7 +17,7 @@ import numpy as np
 
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.elasticity import ElasticBody, Solver
-from fenwear.bodies.response import BLOCK, SURFACE_SHARE
+from fenwear.bodies.response import BLOCK, SURFACE_SHARE, Request
 from fenwear.heat.prepare import MANY
 from fenwear.memory import GIB, memory_size
 
@@ -48,6 +48,10 @@ class BodyNeeds:
         temperatures: Degrees of freedom of the temperature; 0 without heat.
         surface: Degrees of freedom of the contact surface's displacement.
         solver: What solves for the columns.
+        holders: Ranks that each have the factor and solve a share of the columns.
+        way: What `setup.way` says.
+        together: Whether all ranks eliminate it down to its surface, each its own cells.
+        made: Whether its factor, or what stands for it, is there already.
     """
 
     dim: int
@@ -58,19 +62,22 @@ class BodyNeeds:
     temperatures: float
     surface: float
     solver: Solver = "factor"
+    holders: int = 1
+    way: str = "automatic"
+    together: bool = False
+    made: bool = False
 
     def coarser(self, times: float) -> BodyNeeds:
         """Return the same of elements so many times as large."""
         volume, surface = times**-self.dim, times ** (1 - self.dim)
-        return BodyNeeds(
-            self.dim,
-            self.unknowns * volume,
-            self.matrix * volume,
-            self.columns * surface,
-            self.patterns * surface,
-            self.temperatures * volume,
-            self.surface * surface,
-            self.solver,
+        return replace(
+            self,
+            unknowns=self.unknowns * volume,
+            matrix=self.matrix * volume,
+            columns=self.columns * surface,
+            patterns=self.patterns * surface,
+            temperatures=self.temperatures * volume,
+            surface=self.surface * surface,
         )
 
     @property
@@ -84,7 +91,10 @@ class BodyNeeds:
         """Bytes of stiffness, factor and answers."""
         answers = self.patterns * self.dim * self.columns + self.patterns * self.temperatures
         complement = 2 * self.surface**2 if self.by_surface else 0.0
-        return NUMBER * (1.5 * self.matrix + self.solving + answers + complement)
+        if self.made:
+            return NUMBER * (answers + complement)
+        each = self.matrix + self.solving
+        return NUMBER * (0.5 * self.matrix + self.holders * each + answers + complement)
 
     @property
     def solving(self) -> float:
@@ -96,18 +106,33 @@ class BodyNeeds:
     @property
     def by_surface(self) -> bool:
         """Whether the body is eliminated down to its surface, and no column is solved for."""
-        if self.solver != "factor":
+        if self.solver != "factor" or self.temperatures or self.way == "columns":
             return False
-        return self.temperatures == 0 and SURFACE_SHARE * self.surface**2 <= self.factor
+        return self.way != "automatic" or SURFACE_SHARE * self.surface**2 <= self.factor
 
     @property
     def seconds(self) -> float:
         """Time of one core."""
         if self.solver == "multigrid":
             return (ASSEMBLING[self.dim] + ITERATING * self.columns) * self.unknowns
-        factoring = FACTORING[self.dim] * self.unknowns ** (1.5 if self.dim == 2 else 2.0)
-        solving = 0.0 if self.by_surface else 4 * self.factor * self.columns / SOLVING
-        return float(ASSEMBLING[self.dim] * self.unknowns + factoring + solving)
+        if self.made:
+            return self.by_columns
+        return ASSEMBLING[self.dim] * self.unknowns + self.factoring + self.by_columns
+
+    @property
+    def factoring(self) -> float:
+        """Time of one core for the factor."""
+        return float(FACTORING[self.dim] * self.unknowns ** (1.5 if self.dim == 2 else 2.0))
+
+    @property
+    def by_columns(self) -> float:
+        """Time of one core for the columns, by a factor."""
+        return 0.0 if self.by_surface else 4 * self.factor * self.columns / SOLVING
+
+    @property
+    def on_holder(self) -> float:
+        """Time of each rank that has the factor, for the factor and its share of the columns."""
+        return self.factoring + self.by_columns / self.holders
 
     @property
     def heating(self) -> float:
@@ -197,18 +222,28 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = Fal
     bodies, pair = placed.bodies, placed.pair
     n, dim = len(pair.weights), pair.punch.dim
     on_strip = len(pair.strip.trace) if moves else n
-    of_punch = _body(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
+    of_punch = body_needs(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
     one = not moves or (fixed and flat)
-    of_strip = _body(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
+    of_strip = body_needs(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
     interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
     return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs), 1 if shared else placed.comm.size)
 
 
-def _body(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> BodyNeeds:
+def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool = False) -> BodyNeeds:
+    """Return what condensing a body will need; collective.
+
+    Args:
+        elastic: The body.
+        patterns: Of force.
+        columns: Solutions.
+        heat: Whether its answer to temperatures is asked for, too.
+    """
     size, surface = elastic.size, elastic.surface_dofs.size
     temperatures = size / elastic.dim if heat else 0.0
     entries, solver = elastic.matrix_entries(), elastic.solver
-    return BodyNeeds(elastic.dim, size, entries, columns, patterns, temperatures, surface, solver)
+    way, together = elastic.setup.way, not heat and Request(elastic, elastic.surface.spread).in_substructures
+    known = (elastic.dim, size, entries, columns, patterns, temperatures, surface, solver)
+    return BodyNeeds(*known, way=way, together=together, made=elastic.is_factored)
 
 
 def duration(seconds: float) -> str:

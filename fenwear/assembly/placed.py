@@ -330,7 +330,7 @@ class Placed:
         wear = self.phases_wear
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
-        bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.exponent == exponent]
+        bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.law.exponent == exponent]
         on_track = self.sliding.track is not None and wear.strip is not None
         rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
         ratio, phases = self.friction_ratio(direction), len(self.motion.phases)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.needs import NUMBER, BodyNeeds, Needs, duration
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.tribosystem import shared_rows
+from fenwear.bodies.condensation import deal
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.bodies.factor import SPREAD, entries
-from fenwear.bodies.response import Request
+from fenwear.bodies.schur import available
 from fenwear.memory import memory_size
 
 DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular solutions of dense matrices
@@ -25,29 +26,33 @@ def shares_text(placed: Placed, wanted: Needs) -> list[str]:
         placed: The bodies.
         wanted: What they need in all.
     """
-    bodies = (placed.bodies.punch, placed.bodies.strip)
-    own = (wanted.punch, wanted.strip)
-    lines = [
-        _text(body, need, 1 - number, heat=placed.heat is not None)
-        for number, (body, need) in enumerate(zip(bodies, own, strict=True))
-    ]
+    lines = body_lines(placed.bodies, wanted)
     rows = shared_rows(placed)
     if rows is not None:
         whole = wanted.contact
         lines.append(
             f"contact: {rows.comm.size} ranks share the rows of its {wanted.nodes:,.0f} nodes, "
-            f"{memory_size(whole / rows.comm.size)} each; what needs all of them, such as the steady state, gathers "
-            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on each"
+            f"{memory_size(whole / rows.comm.size)} each; jumps in which all nodes touch gather "
+            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on rank 0"
         )
     return lines
 
 
-def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> str:
+def body_lines(bodies: Bodies, wanted: Needs) -> list[str]:
+    """Return a line for each body, as `shares_text`; collective."""
+    own = (wanted.punch, wanted.strip)
+    dealt = reversed(deal([need.holders for need in reversed(own)], bodies.comm.size))
+    return [
+        _text(body, need, ranks) for body, need, ranks in zip((bodies.punch, bodies.strip), own, dealt, strict=True)
+    ]
+
+
+def _text(elastic: ElasticBody, need: BodyNeeds, holders: list[int]) -> str:
     comm, name = elastic.body.mesh.comm, elastic.body.name
     topology = elastic.body.mesh.topology
     cells: Sequence[int] = comm.allgather(topology.index_map(topology.dim).size_local)
-    request, columns = Request(elastic, elastic.surface.spread), f"{need.columns:,.0f} columns"
-    if not heat and need.solver == "factor" and request.in_substructures:
+    columns = f"{need.columns:,.0f} columns"
+    if need.solver == "factor" and need.together:
         boundary = comm.allgather(len(elastic.boundary.numbers))
         shared = []
         for rank, (n, edge) in enumerate(zip(cells, boundary, strict=True)):
@@ -60,13 +65,20 @@ def _text(elastic: ElasticBody, need: BodyNeeds, owner: int, *, heat: bool) -> s
         return f"{name}: conjugate gradients on all ranks, {columns} in blocks; no factor: {taken} in all"
     if need.solver == "low-rank":
         return f"{name}: a factor with blocks of low rank over all ranks, {columns}, refined: {taken} in all"
-    whole = [rank for rank, n in enumerate(cells) if n] if elastic.setup.reproducible else [owner % comm.size]
-    if not heat and request.by_surface and need.solver == "factor":
-        return f"{name}: rank {whole[0]} eliminates all {sum(cells):,} cells down to the surface, {columns}: {taken}"
-    large = need.solver == "spread factor" or 8 * entries(elastic.size, elastic.dim) > SPREAD
-    if comm.size > 1 and not elastic.setup.reproducible and large:
+    if need.solver == "spread factor":
         return f"{name}: a factor over {comm.size} ranks, {columns} solved by all: {taken} in all"
-    return f"{name}: rank {whole[0]} factors it and solves {columns}: {taken}"
+    if need.by_surface and available():
+        return f"{name}: rank {holders[0]} eliminates all {sum(cells):,} cells down to the surface, {columns}: {taken}"
+    return f"{name}: {_by_columns(need, holders, columns, taken)}"
+
+
+def _by_columns(need: BodyNeeds, holders: list[int], columns: str, taken: str) -> str:
+    """Say who solves for columns with a factor of its own."""
+    if len(holders) == 1:
+        return f"rank {holders[0]} factors it and solves {columns}: {taken}"
+    ranks = f"{', '.join(map(str, holders[:-1]))} and {holders[-1]}"
+    each, memory = duration(need.on_holder), memory_size(need.memory)
+    return f"ranks {ranks} factor it, each by itself, and share its {columns}: {each} each, {memory} in all"
 
 
 def _taken(part: BodyNeeds, edge: int) -> str:

@@ -14,9 +14,9 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import Needs
+from fenwear.assembly.needs import Needs, needs
 from fenwear.assembly.placed import Placed
-from fenwear.assembly.ways import check_memory, chosen, free_on_ranks, take
+from fenwear.assembly.ways import chosen, free_on_ranks, settle
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
 from fenwear.bodies.response import Request
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
@@ -139,7 +139,11 @@ def needs_of(placed: Placed, free: float | None = None) -> Needs:
         free: Bytes that all ranks together may take; by default those that are free.
     """
     free = free_on_ranks(placed.comm) if free is None else free
-    return chosen(placed, _frame(placed), free, shared=shared_rows(placed) is not None)
+    return chosen(_needs_as_is(placed), placed.bodies.punch.setup, placed.comm, free)
+
+
+def _needs_as_is(placed: Placed) -> Needs:
+    return needs(placed, _frame(placed), shared=shared_rows(placed) is not None)
 
 
 def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
@@ -155,19 +159,24 @@ def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -
     Raises:
         CaseError: there is not memory enough.
     """
-    free = free_on_ranks(placed.comm) if free is None else free
-    wanted = needs_of(placed, free)
-    check_memory(placed, wanted, free)
-    take(placed, wanted)
-    condensed = condense_bodies(placed, fresh=fresh)
-    return joined(placed, condensed)
+    return joined(placed, condense_bodies(placed, fresh=fresh, free=free))
 
 
-def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
-    """Condense both bodies onto what the phases of the motion ask for; collective.
+def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Condensed:
+    """Condense both bodies onto what the phases of the motion ask for, in the way that fits the memory; collective.
 
     They are kept on disk, but with properties of temperatures that no other run has.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
+        free: Bytes that all ranks together may take; by default those that are free.
+
+    Raises:
+        CaseError: there is not memory enough.
     """
+    loaded = {id(one): one for one in (placed.bodies, *placed.loaded)}
+    settle(list(loaded.values()), _needs_as_is(placed), free)
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
     if bodies.heat is not None:

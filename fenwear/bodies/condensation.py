@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,7 +109,7 @@ def condense(
 
 
 def condense_together(requests: Sequence[Request], *, keep: bool = False, fresh: bool = False) -> list[CondensedBody]:
-    """Condense bodies onto patterns of force, each on a rank of its own at once; collective.
+    """Condense bodies onto patterns of force, each on ranks of its own at once; collective.
 
     One elimination gives the Schur complement of the surface, or one factor a solution for each pattern
     and direction. With the coupling G of thermal expansion the solutions give B^T K^-1 G, as K is symmetric.
@@ -144,7 +145,7 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
     """Factor and solve; collective.
 
     One rank has nothing to do at once. A large factor beside a response to temperature is freed: what prepares the
-    heat takes as much memory, and none of it needs the factor.
+    heat takes as much memory, and none of it needs the factor. Nor does anything need more than one of a body then.
     """
     if not requests:
         return []
@@ -152,6 +153,8 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
         return [_condensed([one])[0] for one in requests]
     _eliminate(requests)
     found = respond_together(requests)
+    for one in requests:
+        one.elastic.leave_factor_to_owner()
     loads = _under_loads([one.elastic for one in requests])
     condensed = []
     for one, (response, by_temperature), load in zip(requests, found, loads, strict=True):
@@ -167,15 +170,31 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
 
 
 def _eliminate(requests: Sequence[Request]) -> None:
-    """Eliminate bodies in substructures by all ranks, or factor each on a rank of its own, all at once; collective."""
+    """Eliminate bodies in substructures by all ranks, or factor each on ranks of its own, all at once; collective."""
     substructures, factors = [], []
-    for owner, one in enumerate(reversed(requests)):  # the first rank gets the last one
+    comm, ordered = requests[0].elastic.body.mesh.comm, list(reversed(requests))  # the first rank gets the last one
+    dealt = deal([one.elastic.holders for one in ordered], comm.size)
+    for number, (one, holders) in enumerate(zip(ordered, dealt, strict=True)):
         if one.in_substructures:
-            substructures.append(one.elastic.begin_substructures(backwards=owner % 2 == 1))
+            substructures.append(one.elastic.begin_substructures(backwards=number % 2 == 1))
         else:
-            factors.append(one.elastic.begin_factor(owner, with_surface=one.by_surface))
+            factors.append(one.elastic.begin_factor(holders, with_surface=one.by_surface))
     make_substructures(substructures)
     make_together(factors)
+
+
+def deal(counts: Sequence[int], ranks: int) -> list[list[int]]:
+    """Return the ranks that hold the factor of each body: an owner each, then as many others as asked for.
+
+    Args:
+        counts: How many for each body.
+        ranks: Number of ranks; where there are less bodies than ranks, each rank holds one factor at most.
+    """
+    dealt = [[owner % ranks] for owner in range(len(counts))]
+    left = iter(range(len(counts), ranks))
+    for holders, count in zip(dealt, counts, strict=True):
+        holders.extend(islice(left, count - 1))
+    return dealt
 
 
 def _symmetric(response: Array, along: Array) -> Array:

@@ -52,6 +52,7 @@ class ElasticBody:
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
         setup: How it is condensed.
         solver: What solves for its columns; set before the first solution, by the memory that there is.
+        holders: How many ranks have its factor at once and share its columns; set likewise.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class ElasticBody:
         """
         self.body, self.law, self.thickness, self.setup = body, law, thickness, setup
         self.solver: Solver = "factor"
+        self.holders = 1
         if setup.way == "low-rank" or setup.way == "multigrid":  # noqa: PLR1714  (mypy does not narrow by "in")
             self.solver = setup.way
         mesh = body.mesh
@@ -165,6 +167,11 @@ class ElasticBody:
         """K as substructures, where they are made."""
         return next((one for one in self._substructures if one.is_made), None)
 
+    @property
+    def is_factored(self) -> bool:
+        """Whether what solves for its columns is made."""
+        return self.substructures is not None or any(factor.is_made for factor in self._factors)
+
     @cached_property
     def boundary(self) -> Boundary:
         """What this rank's cells share with others and with the contact surface; collective at first use."""
@@ -190,11 +197,11 @@ class ElasticBody:
             make_together([factor])
         return factor
 
-    def begin_factor(self, owner: int = 0, *, with_surface: bool = False) -> Factor:
+    def begin_factor(self, holders: Sequence[int] = (0,), *, with_surface: bool = False) -> Factor:
         """Return the factor of K, made or yet to be made; collective at first use.
 
         Args:
-            owner: The rank that gets it at first use.
+            holders: The ranks that get it at first use, its owner first.
             with_surface: Whether it keeps the Schur complement of the surface's degrees of freedom.
         """
         if not self._factors:
@@ -211,7 +218,7 @@ class ElasticBody:
                 return self._factors[0]
             spread = self.solver == "spread factor"
             factor = Factor(
-                matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, owner=owner, surface=surface, spread=spread
+                matrix, PREFIX, "cholesky", comm=comm, dim=self.dim, holders=holders, surface=surface, spread=spread
             )
             self._factors.append(factor)
             if not kept:  # all that needs it has it now
@@ -219,6 +226,11 @@ class ElasticBody:
                 if factor.is_moved:
                     matrix.destroy()
         return self._factors[0]
+
+    def leave_factor_to_owner(self) -> None:
+        """Free its factor on all ranks but its owner, or those that share it."""
+        for factor in self._factors:
+            factor.leave_to_owner()
 
     def free_factor(self) -> None:
         """Free its factor, of all bodies that differ by their loads; the next solution makes it again; collective."""

@@ -3,7 +3,8 @@
 A factor that is spread over the ranks adds up what they send as it arrives, so that its last bits are
 others in every run. A matrix whose factor fits one rank is moved to one, its owner, and factored there,
 which is also faster for it; larger ones are spread. Factors of different owners are made at once, and
-solve at once.
+solve at once. Where there are many columns to solve for, several ranks hold the factor: each makes it by itself,
+from the same numbers in the same order, so that it does not matter to the bits which of them solves for a column.
 """
 
 from __future__ import annotations
@@ -47,6 +48,7 @@ class Factor:
         is_spread: Whether all ranks share it; else its owner has it.
         is_moved: Whether the matrix is another one than that which was given.
         is_made: Whether it is computed.
+        holders: The ranks that have it, its owner first, unless all share it.
         schur: On its owner the Schur complement of the surface (m, m), where it was asked for; else None.
     """
 
@@ -59,11 +61,11 @@ class Factor:
         comm: MPI.Comm,
         dim: int,
         repeated: bool = False,
-        owner: int = 0,
+        holders: Sequence[int] = (0,),
         surface: NDArray[np.int64] | None = None,
         spread: bool = False,
     ) -> None:
-        """Move a matrix to its owner; collective.
+        """Move a matrix to those that are to hold its factor; collective.
 
         Args:
             matrix: Square; for "cholesky" symmetric and positive definite.
@@ -72,32 +74,41 @@ class Factor:
             comm: Its ranks: PETSc frees its own communicator with the last of its objects.
             dim: Number of space dimensions, for its size.
             repeated: Whether it solves thousands of times.
-            owner: The rank that has it, unless it is spread, or one rank has the whole matrix.
-            surface: Rows whose Schur complement is kept (m,).
+            holders: The ranks that have it, its owner first, unless it is spread; a rank that has the whole matrix
+                is the owner.
+            surface: Rows whose Schur complement is kept (m,), by the owner alone.
             spread: Over all ranks, however small it is.
         """
         self.comm, self._sizes = comm, matrix.getSizes()[0]
         self._rows: NDArray[np.int64] = np.asarray(matrix.getOwnershipRanges(), dtype=np.int64)
-        holders = np.flatnonzero(np.diff(self._rows))
-        whole = len(holders) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
-        self.owner, self._prefix, self._kind = int(holders[0]) if whole else owner % self.comm.size, prefix, kind
+        having = np.flatnonzero(np.diff(self._rows))
+        whole = len(having) == 1  # a matrix that one rank has is not spread: the same bits on any number of ranks
+        self._prefix, self._kind = prefix, kind
+        self.owner = int(having[0]) if whole else holders[0] % self.comm.size
+        others = () if surface is not None else (rank % self.comm.size for rank in holders[1:])
+        self.holders = tuple(dict.fromkeys((self.owner, *others)))
         needed = 8 * entries(self._sizes[1], dim) * (2 if kind == "lu" else 1)
         self.is_spread = self.comm.size > 1 and not whole and (spread or needed > SPREAD)
         self._repeated = repeated and not self.is_spread
         self._surface = None if self.is_spread else surface
         self.is_moved, self.is_made = self.comm.size > 1 and not self.is_spread, False
-        self._matrix: PETSc.Mat | None = _moved(matrix, self.owner, kind) if self.is_moved else matrix
+        self._matrix: PETSc.Mat | None = _moved(matrix, self.holders, kind) if self.is_moved else matrix
         self._solver: PETSc.Mat | None = None
         self.schur: Array | None = None
         self._schur_factor: Array | None = None
 
     @property
     def is_here(self) -> bool:
-        """Whether this rank solves."""
+        """Whether this rank has it, or a part of it."""
+        return self.is_spread or self.comm.rank in self.holders
+
+    @property
+    def answers(self) -> bool:
+        """Whether this rank solves where all ask: its owner, or all that share it."""
         return self.is_spread or self.comm.rank == self.owner
 
     def compute(self) -> None:
-        """Factor the matrix, on the ranks that solve; collective where it is spread.
+        """Factor the matrix, on the ranks that have it; collective where it is spread.
 
         Raises:
             ConvergenceError: it has no factor.
@@ -122,7 +133,7 @@ class Factor:
         if self.is_spread or self.comm.size == 1:
             return right
         columns = right.shape[1]
-        whole: Array = np.empty((self._sizes[1] if self.is_here else 0, columns))
+        whole: Array = np.empty((self._sizes[1] if self.answers else 0, columns))
         counts: Any = np.diff(self._rows) * columns
         self.comm.Gatherv(np.ascontiguousarray(right), (whole, counts), root=self.owner)
         return whole
@@ -139,12 +150,12 @@ class Factor:
     def solve_here(self, right: Array) -> Array:
         """Return the solutions of right-hand sides (rows, k) where they are solved; collective where it is spread."""
         factor = self._solver
-        if factor is None:
+        if factor is None or not self.answers:
             return right
         return solved(factor, right, self._sizes if self.is_spread else None)
 
     def solve_sparse(self, right: csr_array) -> Array:
-        """Return the solutions (n, k) for the rows of a sparse matrix (k, n), on the owner alone.
+        """Return the solutions (n, k) for the rows of a sparse matrix (k, n), on a rank that has the factor.
 
         MUMPS leaves out what the zeros of a right-hand side do not reach.
         """
@@ -172,8 +183,14 @@ class Factor:
                 raise without_factor(self._prefix, "not positive") from error
         return np.asarray(scipy.linalg.cho_solve((self._schur_factor, True), right))
 
+    def leave_to_owner(self) -> None:
+        """Free its memory on all other ranks that have it; what shares the columns is done."""
+        if self.is_here and not self.answers:
+            self.free()
+        self.holders = self.holders[:1]
+
     def free(self) -> None:
-        """Free its memory: it solves no more; collective."""
+        """Free its memory: it solves no more; collective where it is spread."""
         for one in (self._solver, self._matrix if self.is_moved else None):
             if one is not None:
                 one.destroy()
@@ -210,7 +227,7 @@ class Approximate(Factor):
             prefix: Of PETSc's options.
             comm: The ranks.
         """
-        self.comm, self.owner, self._prefix = comm, 0, prefix
+        self.comm, self.owner, self.holders, self._prefix = comm, 0, (0,), prefix
         self._sizes = matrix.getSizes()[0]
         self.is_spread, self.is_moved, self.is_made = True, False, False
         self.schur = None
@@ -287,10 +304,10 @@ def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[A
     ]
 
 
-def moved(matrix: PETSc.Mat, owner: int) -> PETSc.Mat | None:
-    """Return the whole of a distributed matrix on its owner; None on other ranks; collective."""
+def moved(matrix: PETSc.Mat, ranks: Sequence[int]) -> PETSc.Mat | None:
+    """Return the whole of a distributed matrix on some ranks; None on others; collective."""
     comm = matrix.comm.tompi4py()
-    here = comm.rank == owner
+    here = comm.rank in ranks
     # General index sets: those of a stride give wrong values.
     rows, columns = (
         PETSc.IS().createGeneral(np.arange(size if here else 0, dtype=PETSc.IntType), comm=PETSc.COMM_SELF)
@@ -305,8 +322,8 @@ def moved(matrix: PETSc.Mat, owner: int) -> PETSc.Mat | None:
     return None
 
 
-def _moved(matrix: PETSc.Mat, owner: int, kind: str) -> PETSc.Mat | None:
-    whole = moved(matrix, owner)
+def _moved(matrix: PETSc.Mat, ranks: Sequence[int], kind: str) -> PETSc.Mat | None:
+    whole = moved(matrix, ranks)
     if whole is not None:
         whole.setOption(PETSc.Mat.Option.SPD, kind == "cholesky")
     return whole

@@ -1,13 +1,14 @@
-"""How the contact surfaces of bodies answer to forces on them, each body solved on a rank of its own.
+"""How the contact surfaces of bodies answer to forces on them, each body solved on ranks of its own.
 
 Where the surface is small against the body, the Schur complement S of its degrees of freedom has all of
 the answer, (K^-1)_ss = S^-1. Else each column of forces is solved for: sparse right-hand sides, of which
-MUMPS leaves out what their zeros do not reach.
+MUMPS leaves out what their zeros do not reach. Columns are solved for in blocks, the same on any ranks, which those
+that hold a body's factor share.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +30,7 @@ SURFACE_SHARE = 10  # entries of the factor for each of the Schur complement, fr
 BOUNDARY_SHARE = 0.5  # of the factor's operations that joining the ranks' boundaries may take
 
 Columns = NDArray[np.int64]
+Found = tuple[Array, Array | None]  # what solves for columns: the response, and that to temperature
 
 
 @dataclass(frozen=True)
@@ -106,15 +108,14 @@ class Request:
 def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | None]]:
     """Return the response (q, d, q a) and that to temperature (q, owned), or None, of each body; collective.
 
-    They are factored, or eliminated in substructures. Each owner solves a block of columns of its body, then
-    all share what they have found: bodies of different owners are solved at once.
+    They are factored, or eliminated in substructures. Each holder of a body's factor solves a block of its columns,
+    then all share what they have found: bodies of different holders are solved at once.
     """
     answers = [_Answer(one) for one in requests]
-    for number in range(max(len(answer.blocks) for answer in answers)):
-        working = [answer for answer in answers if number < len(answer.blocks)]
-        found = [answer.solve(answer.blocks[number]) for answer in working]
-        for answer, one in zip(working, found, strict=True):
-            answer.share(answer.blocks[number], one)
+    for number in range(max(answer.rounds for answer in answers)):
+        found = [answer.solve(number) for answer in answers]
+        for answer, one in zip(answers, found, strict=True):
+            answer.share(number, one)
     return [answer.gathered() for answer in answers]
 
 
@@ -141,21 +142,34 @@ class _Answer:
         self._temperatures: NDArray[np.int64] | None = None
         if coupling is not None:
             self._temperatures = np.append(0, np.cumsum(self.comm.allgather(coupling.getLocalSize()[1])))
-            self._coupling = _rows(coupling) if self.factor.is_spread else _rows(moved(coupling, self.factor.owner))
-        self._response: list[Array] = []
+            self._coupling = _rows(coupling) if self.factor.is_spread else _rows(moved(coupling, self.factor.holders))
+        q, d = request.patterns.shape[1], elastic.dim
+        self._response: Array = np.empty((q, d, count if request.kept is None else 0))
+        self._parts: list[Array] = []  # of the response, where ranks share it
         # Of each rank the columns that it keeps, where ranks share them.
         mine = None if request.kept is None else (request.kept[:, None] * a + np.arange(a)).ravel()
         self._keeping: list[Columns] | None = None if mine is None else self.comm.allgather(mine)
         self._by_temperature: Array | None = None  # (q, owned): as large as a factor, so there once
         self._filled = 0
 
-    def solve(self, columns: Columns) -> tuple[Array, Array | None] | None:
-        """Return the response to some columns and G^T times their solutions, where they are solved.
+    @property
+    def rounds(self) -> int:
+        """How many blocks a holder of the factor solves, at most."""
+        return -(-len(self.blocks) // len(self.factor.holders))
 
-        Collective where the factor is spread.
-        """
-        if not self.factor.is_here:
-            return None
+    def _round(self, number: int) -> Iterator[tuple[int, Columns]]:
+        """Yield what is solved in a round: the ranks and their blocks."""
+        count = len(self.factor.holders)
+        yield from zip(self.factor.holders, self.blocks[number * count : (number + 1) * count], strict=False)
+
+    def solve(self, number: int) -> Found | None:
+        """Return what this rank solves in a round, if anything; collective where the factor is spread."""
+        own = (one for rank, one in self._round(number) if self.factor.is_spread or rank == self.comm.rank)
+        columns = next(own, None)
+        return None if columns is None else self._solved(columns)
+
+    def _solved(self, columns: Columns) -> Found:
+        """Return the response to some columns and G^T times their solutions."""
         elastic, forces = self.request.elastic, self.request.forces(columns)
         at_surface = forces.reshape(-1, len(columns))
         at_surface[self._held] = 0.0
@@ -178,12 +192,17 @@ class _Answer:
         warm = None if self._coupling is None else np.asarray(self._coupling.T @ solution)
         return self.request.seen(displacement.reshape(forces.shape)), warm
 
-    def share(self, columns: Columns, found: tuple[Array, Array | None] | None) -> None:
-        """Keep what was found for a block, and give each rank its part of the response to temperature; collective."""
+    def share(self, number: int, found: Found | None) -> None:
+        """Keep what was found in a round; collective."""
+        for holder, columns in self._round(number):
+            self._share(holder, columns, found if self.factor.is_spread or holder == self.comm.rank else None)
+
+    def _share(self, holder: int, columns: Columns, found: Found | None) -> None:
+        """Keep what a rank found for a block, and give each its part of the response to temperature; collective."""
         if self._keeping is not None:
-            self._hand_out(self._keeping, columns, None if found is None else found[0])
+            self._hand_out(self._keeping, holder, columns, None if found is None else found[0])
         elif found is not None:
-            self._response.append(found[0])
+            self._response[:, :, _run(columns)] = found[0]
         if self._temperatures is None:
             return
         warm = None if found is None else found[1]
@@ -196,15 +215,15 @@ class _Answer:
         own = np.empty((counts[self.comm.rank], len(columns)))
         sizes: Any = counts * len(columns)
         sent = None if warm is None else (np.ascontiguousarray(warm), sizes)
-        self.comm.Scatterv(sent, own, root=self.factor.owner)
+        self.comm.Scatterv(sent, own, root=holder)
         self._fill(own)
 
-    def _hand_out(self, keeping: list[Columns], columns: Columns, found: Array | None) -> None:
+    def _hand_out(self, keeping: list[Columns], holder: int, columns: Columns, found: Array | None) -> None:
         """Give each rank what it keeps of a block's response (q, d, k); collective."""
-        rank, owner = self.comm.rank, self.factor.owner
+        rank = self.comm.rank
         shares = [np.flatnonzero(np.isin(columns, mine)) for mine in keeping]
         if found is not None:
-            self._response.append(found[:, :, shares[rank]])
+            self._parts.append(found[:, :, shares[rank]])
             if self.factor.is_spread:  # all ranks have it
                 return
             for other, share in enumerate(shares):
@@ -212,8 +231,8 @@ class _Answer:
                     self.comm.Send(np.ascontiguousarray(found[:, :, share]), other)
         elif len(shares[rank]):
             part = np.empty((self.request.patterns.shape[1], self.request.elastic.dim, len(shares[rank])))
-            self.comm.Recv(part, owner)
-            self._response.append(part)
+            self.comm.Recv(part, holder)
+            self._parts.append(part)
 
     def _fill(self, warm: Array) -> None:
         """Keep this rank's part of the response to temperature for a block (owned, k)."""
@@ -225,12 +244,19 @@ class _Answer:
 
     def gathered(self) -> tuple[Array, Array | None]:
         """Return the response, all of it on every rank or what each keeps, and that to temperature; collective."""
-        q, d = self.request.patterns.shape[1], self.request.elastic.dim
-        count = self.request.count if self._keeping is None else 0
-        response = np.concatenate(self._response, axis=2) if self._response else np.empty((q, d, count))
-        if self.comm.size > 1 and self._keeping is None:  # where it is spread, equal to the last bit on all ranks
-            self.comm.Bcast(response, root=self.factor.owner)
-        return response, self._by_temperature
+        if self._keeping is not None:
+            return np.concatenate([self._response, *self._parts], axis=2), self._by_temperature
+        for number in range(self.rounds if self.comm.size > 1 else 0):
+            for holder, columns in self._round(number):  # where it is spread, equal to the last bit on all ranks
+                part = np.ascontiguousarray(self._response[:, :, _run(columns)])
+                self.comm.Bcast(part, root=holder)
+                self._response[:, :, _run(columns)] = part
+        return self._response, self._by_temperature
+
+
+def _run(columns: Columns) -> slice:
+    """Return the same columns, which follow one another, as a slice."""
+    return slice(int(columns[0]), int(columns[-1]) + 1)
 
 
 def _rows(matrix: PETSc.Mat | None) -> csr_array | None:

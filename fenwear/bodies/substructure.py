@@ -152,6 +152,7 @@ class Substructures:
 
     Attributes:
         owner: The rank that has the Schur complement of the contact surface.
+        holders: The same, as of a factor.
         is_made: Whether it is computed.
         is_spread: False: its owner answers for the surface.
         schur: On its owner that Schur complement (m, m), in the order of the surface; else None.
@@ -184,17 +185,13 @@ class Substructures:
         self._form, self._bcs, self._boundary, self._surface = form, bcs, boundary, surface
         self._prefix, self.comm, self._backwards = prefix, comm, backwards
         self.owner, self.is_made = (comm.size - 1 if backwards else 0), False
+        self.holders = (self.owner,)
         self._factor: PETSc.Mat | None = None
         self._joints: list[tuple[int, Joint]] = []  # with the ranks that the other parts came from
         self._above: int | None = None  # the rank that the part was sent to
         self._part: Part | None = None
         self.schur: Array | None = None
         self._surface_factor: Array | None = None
-
-    @property
-    def is_here(self) -> bool:
-        """Whether this rank answers for the surface."""
-        return self.comm.rank == self.owner
 
     def eliminate(self) -> None:
         """Eliminate the inside of this rank's own cells; collective.

@@ -139,7 +139,7 @@ class Contact(Part):
         "nothing goes against it, else gross-sliding",
     )
     friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
-        default=0.0, description="mu"
+        default=0.0, description="coefficient of friction mu"
     )
     transverse_friction: Number = Field(
         default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"

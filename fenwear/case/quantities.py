@@ -12,6 +12,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainSeriali
 
 from fenwear.case.units import convert, quantity_text
 
+UNIT = "x-unit"  # where the JSON schema made by pydantic has the unit of a number
+
 
 @dataclass(frozen=True)
 class Unit:
@@ -21,7 +23,7 @@ class Unit:
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         """Return the schema of a number with this unit."""
-        return {"anyOf": [handler(core), {"type": "string"}]}
+        return {"anyOf": [handler(core), {"type": "string"}], UNIT: self.symbol}
 
 
 def quantity(unit: str) -> Any:

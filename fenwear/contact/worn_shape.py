@@ -18,6 +18,7 @@ the preconditioner: 15 to 20 iterations for any number of nodes and of phases.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -33,21 +34,16 @@ ENOUGH = 2e-12  # residual, scaled to 1, that ends the iterations
 WHOLE = 600
 
 
-@dataclass(frozen=True)
-class ShapeEquations:
-    """What contact and equilibrium give, linear in the unknowns and scaled.
+class ShapeRows(ABC):
+    """The rows of all unknowns, without what wears.
 
     Attributes:
-        compliances: S_k of each phase (n, n); phases may share one array.
         modes: H (n, r), the gap that each rigid mode opens.
         balances: E_k (m, r, n), what each node's pressure puts on each mode.
-        coupling: C (m n, m n), the gap that the pressures of all phases open by heat; None without.
     """
 
-    compliances: Sequence[Array]
     modes: Array
     balances: Array
-    coupling: Array | None = None
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -67,12 +63,9 @@ class ShapeEquations:
         p, omega, a, velocity = np.split(x, [m * n, (m + 1) * n, len(x) - r])
         return p.reshape(m, n), omega, a.reshape(m - 1, r), velocity
 
+    @abstractmethod
     def gaps(self, pressure: Array) -> Array:
         """Return what pressures open in all phases (m, n)."""
-        found = np.array([own @ p for own, p in zip(self.compliances, pressure, strict=True)])
-        if self.coupling is not None:
-            found += (self.coupling @ pressure.ravel()).reshape(pressure.shape)
-        return found
 
     def multiply(self, x: Array) -> Array:
         """Return the left side of all rows, without wear."""
@@ -81,6 +74,30 @@ class ShapeEquations:
         gaps[1:] += a @ self.modes.T
         forces = np.einsum("krn,kn->kr", self.balances, p)
         return np.concatenate([gaps.ravel(), self.modes @ velocity, forces.ravel()])
+
+
+@dataclass(frozen=True)
+class ShapeEquations(ShapeRows):
+    """What contact and equilibrium give, linear in the unknowns and scaled.
+
+    Attributes:
+        compliances: S_k of each phase (n, n); phases may share one array.
+        modes: H (n, r), the gap that each rigid mode opens.
+        balances: E_k (m, r, n), what each node's pressure puts on each mode.
+        coupling: C (m n, m n), the gap that the pressures of all phases open by heat; None without.
+    """
+
+    compliances: Sequence[Array]
+    modes: Array
+    balances: Array
+    coupling: Array | None = None
+
+    def gaps(self, pressure: Array) -> Array:
+        """Return what pressures open in all phases (m, n)."""
+        found = np.array([own @ p for own, p in zip(self.compliances, pressure, strict=True)])
+        if self.coupling is not None:
+            found += (self.coupling @ pressure.ravel()).reshape(pressure.shape)
+        return found
 
     def matrix(self) -> Array:
         """Return the same as one matrix (size, size)."""

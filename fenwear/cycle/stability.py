@@ -20,6 +20,7 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import PhasesWear
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
@@ -306,7 +307,7 @@ def _picked(heat: CycleHeat | None, n: int) -> Array:
 def _opened(wear: PhasesWear, slope: Array) -> Array:
     """Return the gap (n, n) that depths worn off punch and strip open, for each unit at a node `slope` (2, n)."""
     punch, strip = (
-        None if body is None else replace(body, rate=slope[k : k + 1], exponent=1.0)
+        None if body is None else replace(body, rate=slope[k : k + 1], law=PressureLaw())
         for k, body in enumerate((wear.punch, wear.strip))
     )
     if punch is None and strip is None:

@@ -25,6 +25,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import linprog
+from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key
@@ -287,18 +288,17 @@ def _steady_heat(heat: CycleHeat, solved: Solved, middle: slice) -> SteadyHeat |
 def _uniform_wear_exists(system: Tribosystem) -> bool:
     """Return whether any pressures of the phases wear the whole contact by a rigid motion (b = 1)."""
     n, r = system.rigid.rigid_normal.shape
-    m = len(system.motion.phases)
-    lengths = system.mode_lengths
-    equality = np.zeros((n + m * r, m * n + r))
-    target = np.zeros(n + m * r)
-    equality[:n, m * n :] = -system.rigid.rigid_normal / lengths
-    for k, (own, friction_ratio) in enumerate(zip(system.interfaces, system.friction_ratios(), strict=True)):
-        equality[:n, k * n : (k + 1) * n] = np.eye(n)
-        rows = slice(n + k * r, n + (k + 1) * r)
-        equality[rows, k * n : (k + 1) * n] = own.rigid.equilibrium(friction_ratio) / lengths[:, None]
-        target[rows] = -own.rigid.resultant / lengths
+    m, lengths = len(system.motion.phases), system.mode_lengths
+    balances: list[Array] = []
+    target: list[Array] = [np.zeros(n)]
+    for own, friction_ratio in zip(system.interfaces, system.friction_ratios(), strict=True):
+        balances.append(own.rigid.equilibrium(friction_ratio) / lengths[:, None])
+        target.append(-own.rigid.resultant / lengths)
+    motion = -system.rigid.rigid_normal / lengths
+    uniform = hstack([eye_array(n)] * m + [motion])
+    equality = vstack([uniform, hstack([block_diag(balances), csr_array((m * r, r))])], format="csr")
     bounds = [(0, None)] * (m * n) + [(None, None)] * r
-    return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=target, bounds=bounds).status != 2)
+    return bool(linprog(np.zeros(m * n + r), A_eq=equality, b_eq=np.concatenate(target), bounds=bounds).status != 2)
 
 
 def _rigid_part(system: Tribosystem, values: Array, where: Mask) -> Array:

@@ -10,14 +10,17 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
+from fenwear.contact.by_runs import SpreadPhases
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator
+from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.friction import ContactConditions
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
+LARGE = 4000  # nodes from which on no matrix of them is made
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
 
@@ -65,16 +68,19 @@ class SteadyInequality:
 
     def _slide(self, ratios: Sequence[Array]) -> None:
         """Take friction."""
-        made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
-        compliances, balances = [], []
-        for own, ratio in zip(self.system.interfaces, ratios, strict=True):
-            key = (id(own.gap_by_force), np.asarray(ratio + own.pair.normal).tobytes())
-            if key not in made:
-                made[key] = own.compliance(ratio) * (self.p_scale / self.gap_scale)
-            compliances.append(made[key])
-            balances.append(own.rigid.equilibrium(ratio) * self.p_scale / self.moment)
-        modes = self.system.rigid.rigid_normal / self.lengths
-        self.equations = ShapeEquations(compliances, modes, np.array(balances))
+        interfaces, scale = self.system.interfaces, self.p_scale / self.gap_scale
+        modes, pairs = self.system.rigid.rigid_normal / self.lengths, list(zip(interfaces, ratios, strict=True))
+        balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
+        self.equations: ShapeEquations | SpreadShape
+        if self.system.heat is None and (self.n >= LARGE or interfaces[0].rows is not None):
+            self.equations = SpreadShape(SpreadPhases(interfaces, ratios, scale), modes, balances)
+        else:
+            made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
+            keys = [(id(own.gap_by_force), np.asarray(ratio + own.pair.normal).tobytes()) for own, ratio in pairs]
+            for key, (own, ratio) in zip(keys, pairs, strict=True):
+                if key not in made:
+                    made[key] = own.compliance(ratio) * scale
+            self.equations = ShapeEquations([made[key] for key in keys], modes, balances)
         self._known: tuple[list[csr_array], Array, Operator] | None = None  # the last derivative, and what it is of
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
@@ -115,32 +121,45 @@ class SteadyInequality:
         if thermal is not None:
             self.offset = self._cold.copy()
             self.offset[: m * n] += thermal.ravel() / self.gap_scale
-        if coupling is not None or self.equations.coupling is not None:
+        if isinstance(self.equations, ShapeEquations) and (coupling is not None or self.equations.coupling is not None):
             scale = self.p_scale / self.gap_scale
             by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
             self.equations, self._known = self.equations.with_heat(by_heat), None
-        if self.m == 1 or not self._solved:
-            self.x = self._touching(self.x)
-        self.x = self._newton()
+        found = self._found
+        if isinstance(self.equations, SpreadShape):
+            self.x, f, iterations, self.peak_without_cap, failure = self.equations.phases.team.lead(found)
+        else:
+            self.x, f, iterations, self.peak_without_cap, failure = found()
+        if failure is not None:
+            raise failure
         self._solved = True
-        f = self.inequality.residual
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
-        return ContactState(pressure, gap, np.zeros((m, self.r)), self.inequality.iterations)
+        return ContactState(pressure, gap, np.zeros((m, self.r)), iterations)
 
-    def _newton(self) -> Array:
-        """Return the solution; where wear is capped by the solutions of ever harder caps, from none at all.
+    def _found(self) -> tuple[Array, Array, int, float, ConvergenceError | None]:
+        """Return unknowns, their residual, Newton iterations, the largest pressure without a cap, and what failed."""
+        x, failure = self.x, None
+        if self.m == 1 or not self._solved:
+            x = self._touching(x)
+        try:
+            x = self._newton(x)
+        except ConvergenceError as error:  # raised where all ranks know how far it came
+            failure = error
+        return x, self.inequality.residual, self.inequality.iterations, self.peak_without_cap, failure
+
+    def _newton(self, x: Array) -> Array:
+        """Return the solution from a start; where wear is capped by those of ever harder caps, from none at all.
 
         At nodes beyond the cap the balance of wear says nothing of the pressure: from afar it holds nothing.
         """
         capped = self.wear
         if capped.cap == np.inf:
-            return self.inequality.solve(self.x, near=self._solved)
+            return self.inequality.solve(x, near=self._solved)
         if self._solved:
             try:
-                return self.inequality.solve(self.x, near=True)
+                return self.inequality.solve(x, near=True)
             except ConvergenceError:
                 pass
-        x = self.x
         try:
             for share in SOFTENED:
                 self.wear, self._known = capped.softened(share), None

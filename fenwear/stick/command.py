@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.assembly import Bodies
+from fenwear.assembly import Bodies, body_lines
 from fenwear.case import Case
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import fine_enough
+from fenwear.stick.interface import meshed
 from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
 
@@ -29,6 +30,8 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
         ConvergenceError: a time step did not converge.
     """
     rig = make_rig(case, bodies=bodies)
+    both = meshed(rig.interface)
+    setup = "\n".join((both.needs.text(), *body_lines(both.bodies, both.needs)))
     check_touching(rig)
     rig, fineness = fine_enough(rig, case)
     records = Records.joined(rig.cycle(rig.beginning())[1])
@@ -39,6 +42,7 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
     if stuck == closed:
         regime = "full stick"
     return (
+        f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,6 +39,26 @@ def test_contract() -> None:
                "strip_free": 1080, "strip_bottom": 1140, "strip_ends": 200}  # fmt: skip
     for name, length in lengths.items():
         assert integral(punch if name in punch.curves else strip, curve=name) == pytest.approx(length, rel=1e-12)
+
+
+@pytest.mark.parametrize("file", sorted(meshes_folder().glob("*.geo")), ids=lambda file: file.stem)
+def test_every_ready_geometry(file: Path) -> None:
+    """Parameters, one a line; groups of the two bodies and no others, each with a region and a contact."""
+    import gmsh
+
+    assert re.search(r"^DefineConstant\[\n( +\w+ = [^,\n]+,?( +// .*)?\n)+\];$", file.read_text("utf-8"), re.MULTILINE)
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(file))
+        dim = gmsh.model.getDimension()
+        groups = {gmsh.model.getPhysicalName(*group): group[0] for group in gmsh.model.getPhysicalGroups()}
+    finally:
+        gmsh.finalize()
+    assert all(name.startswith(("punch_", "strip_")) for name in groups)
+    for body in ("punch", "strip"):
+        assert groups[f"{body}_contact"] == dim - 1
+        assert dim in [groups[name] for name in groups if name.startswith(body)]
 
 
 def integral(body: BodyMesh, region: str | None = None, curve: str | None = None) -> float:

@@ -7,12 +7,15 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear import Tribosystem, assemble, load_case
+from fenwear.assembly import place_case
 from fenwear.bodies import factor, response, substructure
 from fenwear.bodies.assembly import times
-from fenwear.bodies.condensation import CondensedBody
+from fenwear.bodies.condensation import CondensedBody, condense_together
+from fenwear.bodies.response import Request
 from fenwear.errors import ConvergenceError
 
 SMALL = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
@@ -77,6 +80,36 @@ def test_each_rank_has_the_same_bits(way: str, monkeypatch: pytest.MonkeyPatch) 
             assert len(set(system.comm.allgather(values.tobytes()))) == 1
 
 
+@pytest.mark.parametrize("name", ["example1-heat", "ball-on-flat"])
+@pytest.mark.mpi
+def test_who_solves_for_a_column_does_not_matter(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All ranks hold the factor of one body, or one does: the same to the last bit, in as many solutions."""
+    monkeypatch.setattr(response, "BLOCK", 5)
+    settings = SMALL if name.startswith("example") else BALL
+    solved: list[int] = []
+    solve = factor.Factor.solve_sparse
+    monkeypatch.setattr(factor.Factor, "solve_sparse", lambda self, rows: (solved.append(1), solve(self, rows))[1])
+    found = []
+    for holders in (1, MPI.COMM_WORLD.size):
+        placed = place_case(load_case(name, (*settings, "setup.way=columns")))
+        strip, heat = placed.bodies.strip, placed.bodies.heat
+        strip.holders = holders
+        coupling = None if heat is None else strip.thermal_coupling(heat[1].space)
+        normals = np.broadcast_to(np.eye(strip.dim)[-1], strip.surface.x.shape)
+        mine = None if heat else np.arange(placed.comm.rank, len(normals), placed.comm.size)  # ranks share the response
+        solved.clear()
+        (one,) = condense_together([Request(strip, strip.surface.spread, normals, coupling, mine)])
+        shares = placed.comm.allgather(len(solved))
+        assert sum(shares) == -(-len(strip.surface.x) // 5)
+        assert sum(share > 0 for share in shares) == holders
+        assert max(shares) - min(shares) <= 1 or holders == 1
+        found.append((one, strip.solve(strip.load)))
+    (one, displacement), (other, same) = found
+    for name_of, values in one.arrays().items():
+        np.testing.assert_array_equal(values, other.arrays()[name_of])
+    np.testing.assert_array_equal(displacement, same)
+
+
 @pytest.mark.parametrize("way", ["substructures", "columns"])
 def test_one_factor_for_the_loads_of_all_phases(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Bodies that differ by their loads share it, whichever is asked first."""
@@ -123,6 +156,6 @@ def test_a_body_without_a_factor_is_told_on_every_rank(
     monkeypatch.setattr(factor.Factor, "compute", fails)
     for owner in range(system.comm.size):
         matrix = system.bodies.punch.stiffness
-        one = factor.Factor(matrix, "fenwear_test_", "cholesky", comm=system.comm, dim=2, owner=owner)
+        one = factor.Factor(matrix, "fenwear_test_", "cholesky", comm=system.comm, dim=2, holders=(owner,))
         with pytest.raises(ConvergenceError, match="no factor"):
             factor.make_together([one])

@@ -14,6 +14,7 @@ import pytest
 from fenwear.case import builtin_cases, load_case
 from fenwear.case.editors import json_schema
 from fenwear.case.keys import all_keys, find_keys
+from fenwear.case.laws import Dependence
 from fenwear.case.units import convert
 from fenwear.errors import CaseError
 
@@ -82,8 +83,26 @@ def test_schema_takes_cases_and_nothing_else() -> None:
         {"program": {"fil": "steps.csv"}},
     ):
         assert list(check.iter_errors({"base": "example1", **wrong})) != []
+    for low in ({"contact": {"friction": -0.1}}, {"materials": {"steel": {"young": 0}}}, {"motion": {"period": -1}}):
+        assert list(check.iter_errors({"base": "example1", **low})) != []
     (error,) = check.iter_errors({"base": "example1", "motion": {"kind": "reciprocating", "amplitud": 2}})
     assert "'amplitud' was unexpected" in error.message  # of the key, not of the table
+
+
+def test_editors_find_the_meaning_of_every_key() -> None:
+    """Where they look, which is in each alternative of a key: its meaning, the unit of a bare number; and no null."""
+    schema = json_schema()
+    tables = {"": schema["properties"]} | {name: table["properties"] for name, table in schema["$defs"].items()}
+    for table, keys in tables.items():
+        for name, key in keys.items():
+            places = [part for part in key.get("anyOf", [key]) if "$ref" not in part and part]
+            assert all(part.get("description") or table == "" for part in places), (table, name)
+            assert sum(part.get("type") != "array" for part in places) <= 1, (table, name)
+    assert "null" not in json.dumps(schema)
+    assert "x-unit" not in json.dumps(schema)
+    assert set(tables["Dependence"]) == set(Dependence.model_fields)
+    assert tables["Reciprocating"]["amplitude"]["description"].endswith("; in mm where it has no unit")
+    assert tables["Support"]["at"]["description"].endswith("; in mm where it has no unit")  # of a list's entries
 
 
 def test_schema_takes_the_cases_of_the_pages() -> None:

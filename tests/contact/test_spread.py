@@ -12,8 +12,9 @@ from mpi4py import MPI
 from fenwear import ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady, vary
 from fenwear.arrays import Array
 from fenwear.assembly import needs_of, shares_text, tribosystem
-from fenwear.contact import CondensedContact, SlidingContact, spread
+from fenwear.contact import CondensedContact, SlidingContact, phase_rows, spread
 from fenwear.cycle import stability_number
+from fenwear.interface import Interface
 from fenwear.parallel import Rows, Team
 
 COMM = MPI.COMM_WORLD
@@ -54,20 +55,26 @@ def test_runs_are_the_same(name: str, settings: tuple[str, ...], monkeypatch: py
 
 @several
 @pytest.mark.mpi
-def test_what_needs_all_of_it_gathers_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The steady state, and a variant of another friction and stroke; the explicit limit does without; check tells."""
+def test_steady_states_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With another friction and stroke, and none where there is none; the explicit limit, too; check tells."""
     whole = assemble(load_case("example1", SMALL))
-    needed = needs_of(whole).memory
+    needed, changes = needs_of(whole).memory, ("contact.friction=0.2", "motion.amplitude=2")
+    expected = [steady(vary(whole, change)).phase_pressure for change in changes]
     monkeypatch.setattr(tribosystem, "SHARED", 0)
+    monkeypatch.setattr(phase_rows, "RUN", 30)
     shared = assemble(load_case("example1", SMALL))
     few = needs_of(shared).memory
     assert stability_number(shared) == pytest.approx(stability_number(whole), rel=1e-6)
     lines = shares_text(shared, needs_of(shared))
     assert any(f"{COMM.size} ranks share the rows of its {len(shared.pair.weights)} nodes" in line for line in lines)
     assert few < needed
-    for change in ("contact.friction=0.2", "motion.amplitude=2"):
-        one, other = (steady(vary(system, change)).phase_pressure for system in (whole, shared))
+    monkeypatch.setattr(Interface, "compliance", None)  # no matrix of all nodes is made
+    for change, one in zip(changes, expected, strict=True):
+        other = steady(vary(shared, change)).phase_pressure
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-9 * one.max())
+        np.testing.assert_array_equal(other, COMM.bcast(other))
+    with pytest.raises(ConvergenceError, match="friction tips the punch so far"):
+        steady(vary(shared, "contact.friction=0.9"))
 
 
 def alone(system: Tribosystem, direction: int) -> CondensedContact:

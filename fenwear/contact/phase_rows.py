@@ -1,0 +1,157 @@
+"""This rank's rows of the compliances of all phases of a motion, and of what comes near the inverse.
+
+Phases in one place of the strip share one matrix, of which friction takes other tractions: the products of all of them
+take one pass through it, and no matrix of a phase is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array, Mask
+from fenwear.contact.operators import Solve, eliminate
+
+RUN = 1500  # unknowns of neighbouring nodes that are eliminated together
+FEW = 0.5  # of all nodes: where no more touch in any phase, what they open at each other is copied
+
+
+@dataclass(frozen=True)
+class PhaseRows:
+    """What the pressures of some phases at some nodes open at some of this rank's nodes.
+
+    Attributes:
+        by_force: Gap at this rank's nodes from a unit force along each axis at each node (own, n, d), one for each
+            place of the strip.
+        traction: Of unit pressures with their friction, times the nodes' weights and the scale, (phases, n, d) each.
+        phases: Which have each place.
+    """
+
+    by_force: Sequence[Array]
+    traction: Sequence[Array]
+    phases: Sequence[NDArray[np.int64]]
+
+    @property
+    def count(self) -> int:
+        """How many phases there are."""
+        return sum(map(len, self.phases))
+
+    def multiply(self, pressure: Array) -> Array:
+        """Return the gaps (m, own) from pressures (m, n)."""
+        found: Array = np.empty((self.count, len(self.by_force[0])))
+        for by_force, traction, which in zip(self.by_force, self.traction, self.phases, strict=True):
+            forces = (traction * pressure[which][:, :, None]).reshape(len(which), -1)
+            found[which] = forces @ by_force.reshape(len(by_force), -1).T
+        return found
+
+    def of(self, rows: NDArray[np.int64], nodes: NDArray[np.int64]) -> PhaseRows:
+        """Return the same of some rows, given by their place among this rank's, and of some nodes."""
+        cut = np.ix_(rows, nodes)
+        return PhaseRows([one[cut] for one in self.by_force], [one[:, nodes] for one in self.traction], self.phases)
+
+    def matrices(self) -> Array:
+        """Return the matrix of each phase (m, own, n)."""
+        found: Array = np.empty((self.count, *self.by_force[0].shape[:2]))
+        for by_force, traction, which in zip(self.by_force, self.traction, self.phases, strict=True):
+            for k, own in zip(which, traction, strict=True):
+                found[k] = np.einsum("ijd,jd->ij", by_force, own)
+        return found
+
+
+class OwnPhases:
+    """This rank's rows of all phases, and runs of neighbouring nodes that are eliminated with what they wear.
+
+    With z_k the gaps of the phases and z_w the balance of wear at the nodes of a run,
+
+        [S_k, 1; -M_k, D] (p, omega) = (z_k, z_w),
+
+    where S_k is what the run's own nodes open at each other and M_k what they wear.
+
+    Args:
+        own: This rank's nodes.
+        rows: What all nodes open at these.
+    """
+
+    def __init__(self, own: slice, rows: PhaseRows) -> None:
+        self._first, self._last = own.start, own.stop
+        self._rows = rows
+        none: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._nodes = self._own = none  # that are prepared, and own ones among them
+        self._within: PhaseRows | None = None
+        self._runs: dict[int, tuple[bytes, Solve]] = {}
+        self._cuts: list[tuple[NDArray[np.int64], Mask, Solve]] = []
+
+    def multiply(self, pressure: Array) -> Array:
+        """Return the gaps of all phases at own nodes (m, own) from pressures (m, n)."""
+        return self._rows.multiply(pressure)
+
+    def multiply_within(self, pressure: Array) -> Array:
+        """Return the same at those of the prepared nodes that are own, from pressures there alone."""
+        if self._within is not None:
+            return self._within.multiply(pressure)
+        whole = np.zeros((len(pressure), self._rows.by_force[0].shape[1]))
+        whole[:, self._nodes] = pressure
+        return self._rows.multiply(whole)[:, self._own]
+
+    def prepare(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> bool:
+        """Take the nodes that are solved for, and eliminate their runs; return whether all can be.
+
+        Args:
+            nodes: Ascending (c,).
+            free: Which of the pressures of each phase are free, and which shapes (m + 1, c).
+            wear: Diagonals of M_k (m, c).
+            held: D (c,).
+        """
+        begin, end = np.searchsorted(nodes, [self._first, self._last])
+        if not np.array_equal(nodes, self._nodes):
+            self._nodes, self._own = nodes, nodes[begin:end] - self._first
+            few = len(nodes) <= FEW * self._rows.by_force[0].shape[1]
+            self._within = self._rows.of(self._own, nodes) if few else None
+        return self._eliminate(nodes, int(begin), free[:, begin:end], wear[:, begin:end], held[begin:end])
+
+    def _eliminate(self, nodes: NDArray[np.int64], begin: int, free: Mask, wear: Array, held: Array) -> bool:
+        """Eliminate the runs of own nodes; those whose unknowns and wear have stayed keep their factors."""
+        m, count = wear.shape
+        length = max(RUN // (m + 1), 1)
+        cuts = np.append(np.flatnonzero(np.diff(nodes[begin : begin + count] // length, prepend=-1)), count)
+        kept, self._cuts, self._runs = self._runs, [], {}
+        for first, last in pairwise(cuts):
+            some, chosen = nodes[begin + first : begin + last], free[:, first:last]
+            run, parts = int(some[0]) // length, (some, chosen, wear[:, first:last], held[first:last])
+            key = b"".join(np.ascontiguousarray(part).tobytes() for part in parts)
+            found = kept.get(run)
+            if found is None or found[0] != key:
+                try:
+                    found = key, eliminate(self._matrix(some, chosen, wear[:, first:last], held[first:last]))
+                except np.linalg.LinAlgError:
+                    return False
+            self._runs[run] = found
+            self._cuts.append((np.arange(begin + first, begin + last), chosen, found[1]))
+        return True
+
+    def _matrix(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> Array:
+        """Return the matrix of a run's free unknowns."""
+        m, count = wear.shape
+        whole: Array = np.zeros(((m + 1) * count, (m + 1) * count))
+        view, here = whole.reshape(m + 1, count, m + 1, count), np.arange(count)
+        for k, matrix in enumerate(self._rows.of(nodes - self._first, nodes).matrices()):
+            view[k, :, k, :] = matrix
+            view[k, here, m, here] = 1.0
+            view[m, here, k, here] = -wear[k]
+        # What nothing wears and nothing holds stays where it is.
+        view[m, here, m, here] = np.where((wear * free[:m]).any(axis=0), held, np.where(held > 0, held, 1.0))
+        kept = np.flatnonzero(free)
+        return whole[np.ix_(kept, kept)]
+
+    def near(self, v: Array) -> Array:
+        """Return own columns of the solution of all runs (m + 1, own, q) for (m + 1, c, q) on the prepared nodes."""
+        found = [np.zeros((v.shape[0], 0, v.shape[2]))]
+        for at, free, solve in self._cuts:
+            part = np.zeros((v.shape[0], len(at), v.shape[2]))
+            part[free] = solve(v[:, at][free])
+            found.append(part)
+        return np.concatenate(found, axis=1)

@@ -37,6 +37,11 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
     return Team.of(comm).lead(function)
 
 
+def agreed(comm: MPI.Comm, found: T) -> T:
+    """Return what rank 0 has found, on every rank: what decides over further collective calls; collective."""
+    return Team.of(comm).lead(lambda: found)
+
+
 def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the sum over the ranks, equal to the last bit on all of them; collective."""
     result = np.empty(partial.shape)

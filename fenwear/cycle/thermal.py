@@ -20,6 +20,7 @@ from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import HeatState
+from fenwear.parallel import agreed
 
 MAX_ITERATIONS = 200
 SPLIT_ADVICE = 'lower heat.relaxation, take more heat.steps, or set heat.coupling = "implicit"'
@@ -96,10 +97,10 @@ class ThermalContact:
             free = gap + exchange.gap(after) - response.gap @ pressure
             contact = self._contact.solve(free, contact, layer, response.gap[None, :, None, :])
             change = contact.pressure[0] - pressure
-            if self._agreed(bool(np.abs(change).max() < CLOSE * mean)):
+            if agreed(self.system.comm, bool(np.abs(change).max() < CLOSE * mean)):
                 return contact, after, self._heat(after, terms, iteration)
             exact = exact and np.array_equal(exchange.conductance(contact.pressure[0]), conductance, equal_nan=True)
-            if self._agreed(exact):
+            if agreed(self.system.comm, exact):
                 after = exchange.at(after.values + response.state @ change)
                 return contact, after, self._heat(after, terms + response.terms @ change, iteration)
             if iteration > 20:  # nodes that open and close in turn: go half way
@@ -118,7 +119,7 @@ class ThermalContact:
         heat = self.system.heat
         costly = heat is not None and (heat.operator == "full" or heat.conductance_per_pressure is not None)
         near = known is not None and (known.conductance.tobytes() == key or (costly and self._repeats < WORTH_IT))
-        if known is not None and self._agreed(near):
+        if known is not None and agreed(self.system.comm, near):
             return known
         state, terms = self.exchange.change(self.phase, conductance, pressure=np.eye(len(conductance)))
         self._response = _Response(conductance, state, terms, self.exchange.gap_change(state))
@@ -140,17 +141,13 @@ class ThermalContact:
                 raise ConvergenceError(f"{error}; in iteration {iteration} of the split: {SPLIT_ADVICE}") from error
             before, volume = volume, gap_volume(self.system, free)
             pressure = pressure + relaxation * (contact.pressure[0] - pressure)
-            if self._agreed(bool(abs(volume - before) < tolerance * volume)):
+            if agreed(self.system.comm, bool(abs(volume - before) < tolerance * volume)):
                 return contact, after, self._heat(after, terms, iteration)
-            if self._agreed(not np.isfinite(volume)):
+            if agreed(self.system.comm, not np.isfinite(volume)):
                 break
         raise ConvergenceError(
             f"the operator split of heat and contact did not converge in {iteration} iterations: {SPLIT_ADVICE}"
         )
-
-    def _agreed(self, found: bool) -> bool:
-        """Return what rank 0 has found, where temperatures of all nodes are spread over the ranks."""
-        return self.system.team.lead(lambda: found)
 
     def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:
         punch, strip = self.exchange.contact_temperatures(state)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -27,6 +27,7 @@ from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium, join
 from fenwear.parallel import Rows, lasting
 
+T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
 SHARED = 2000  # contact nodes from which on ranks share the rows of their compliance
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
@@ -77,6 +78,19 @@ class Tribosystem(Placed):
     interfaces: tuple[Interface, ...]
     exchange: HeatExchange | None = None
 
+    @property
+    def replicated(self) -> bool:
+        """Whether every rank could go on alone: no temperatures of all nodes, no contact on all displacements."""
+        return self.solver == "condensed" and (self.exchange is None or self.exchange.reduced)
+
+    def led(self, function: Callable[[], T]) -> T:
+        """Call what goes on from prepared bodies, on rank 0 for all where that can be, else on every rank; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        return self.team.lead(function) if self.replicated else function()
+
     def contact(self, directions: Sequence[int]) -> ContactSolver:
         """Return the contact in the middle position under the mean loads.
 
@@ -93,7 +107,7 @@ class Tribosystem(Placed):
     def _contact(self, phases: list[SlidingContact]) -> ContactSolver:
         if self.solver == "full":
             return FullContact(self.bodies.punch, self.bodies.strip, phases[0].interface, phases[0].friction_ratio)
-        return CondensedContact(phases, self.remedies)
+        return CondensedContact(phases, self.remedies, self.team)
 
     def check_touching(self) -> None:
         """Make sure that the surfaces touch in some phase; collective.

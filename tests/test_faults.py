@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear.results.reading import load_history
+
 Run = Callable[..., Any]
 SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 pytestmark = pytest.mark.process
@@ -107,8 +109,7 @@ def _state(pid: int) -> str:
 
 def check_history(folder: Path) -> int:
     """Check that history.nc is whole and consistent; return its last half-cycle."""
-    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as opened:
-        history = opened.load()
+    history = load_history(folder)
     assert (np.diff(history.half_cycle) > 0).all()
     for name, variable in history.variables.items():
         assert name == "periodicity" or np.isfinite(variable.values).all(), name
@@ -338,7 +339,7 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
     for folder, ranks, extra in ((resumed, 2, ["--resume"]), (whole, 1, [])):
         done = fenwear("run", case, "-o", folder, *words, *extra, ranks=ranks)
         assert done.returncode == 0, done.stderr
-    one, other = (xarray.load_dataset(folder / "history.nc", engine="h5netcdf") for folder in (resumed, whole))
+    one, other = (load_history(folder) for folder in (resumed, whole))
     np.testing.assert_array_equal(one.half_cycle, other.half_cycle)
     for variable in sorted(set(other.data_vars) - {"equilibrium_error", "heat_balance_error", "periodicity"}):
         measure = {"gap": "wear"}.get(variable, "heat_friction" if str(variable).startswith("heat_") else variable)

@@ -26,6 +26,7 @@ from fenwear.interface import (
 )
 from fenwear.interface.placement import in_model, in_space
 from fenwear.optimum import Optimum, check_equilibrium, optimum, optimum_on_track
+from fenwear.parallel import Team
 from fenwear.remedies import Remedies
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
@@ -97,6 +98,11 @@ class Placed:
     def comm(self) -> MPI.Comm:
         """The ranks."""
         return self.bodies.comm
+
+    @property
+    def team(self) -> Team:
+        """The ranks, of which one leads."""
+        return Team.of(self.comm)
 
     @property
     def case(self) -> Case:

@@ -40,7 +40,7 @@ class SpreadPhases:
 
     def __init__(self, interfaces: Sequence[Interface], ratios: Sequence[Array], scale: float) -> None:
         rows = interfaces[0].rows or Rows.equal(MPI.COMM_SELF, len(interfaces[0].pair.weights))
-        self.team = Team(rows.comm)
+        self.team = Team.of(rows.comm)
         places = list({id(own.gap_by_force): own.gap_by_force for own in interfaces}.values())
         which = [np.flatnonzero([own.gap_by_force is place for own in interfaces]) for place in places]
         traction = [
@@ -48,19 +48,19 @@ class SpreadPhases:
             for own, ratio in zip(interfaces, ratios, strict=True)
         ]
         phases = PhaseRows(places, [np.array([traction[k] for k in one]) for one in which], which)
-        self.team.serve(0, OwnPhases(rows.own, phases))
+        self.own = self.team.serve(OwnPhases(rows.own, phases))
 
     def multiply(self, pressure: Array) -> Array:
         """Return what pressures open in all phases (m, n)."""
-        return np.concatenate(self.team.call(0, "multiply", pressure), axis=1)
+        return np.concatenate(self.team.call(self.own, "multiply", pressure), axis=1)
 
     def multiply_within(self, pressure: Array) -> Array:
         """Return the same among the prepared nodes (m, c)."""
-        return np.concatenate(self.team.call(0, "multiply_within", pressure), axis=1)
+        return np.concatenate(self.team.call(self.own, "multiply_within", pressure), axis=1)
 
     def near(self, v: Array) -> Array:
         """Return the solution of all runs of the prepared nodes (m + 1, c, q)."""
-        return np.concatenate(self.team.call(0, "near", v), axis=1)
+        return np.concatenate(self.team.call(self.own, "near", v), axis=1)
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class ByRuns:
         idle = self._free[-1] & (worn == 0) & (self._held == 0)  # shapes that nothing of their balance holds
         if idle.sum() > self._opened[-1].any(axis=0).sum():
             raise np.linalg.LinAlgError("singular matrix")
-        if not all(phases.team.call(0, "prepare", nodes, self._free, diagonals, self._held)):
+        if not all(phases.team.call(phases.own, "prepare", nodes, self._free, diagonals, self._held)):
             raise np.linalg.LinAlgError("singular matrix")
         self._followed = phases.near(self._opened)
         self._solve_beside: Solve = eliminate(np.einsum("qkn,knj->qj", self._balance, self._followed[:-1]))

@@ -51,7 +51,7 @@ def stability_number(system: Tribosystem) -> float:
         opened = system.wear.phases([system.conditions(phase)], [phase]).slopes(uniform[phase : phase + 1])[0]
         if not opened.data.any():  # nothing wears
             continue
-        contact = CondensedContact([SlidingContact(interface, ratios[phase])])
+        contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
         worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
         largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
     return largest / 2

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.assembly import Bodies
+from fenwear.assembly import Bodies, body_lines
 from fenwear.case import Case
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
@@ -31,6 +31,8 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
         ConvergenceError: a time step did not converge.
     """
     rig = make_rig(case, bodies=bodies)
+    both = meshed(rig.interface)
+    setup = "\n".join((both.needs.text(), *body_lines(both.bodies, both.needs)))
     check_touching(rig)
     rig, fineness = fine_enough(rig, case)
     interface = meshed(rig.interface)
@@ -44,6 +46,7 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
         regime = "full stick"
     warnings = (*sizes, fineness.text(), unique_text(records.unique.astype(bool)))
     return (
+        f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "

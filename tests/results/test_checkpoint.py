@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear.results.reading import load_history
+
 Run = Callable[..., Any]
 SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.steps=2")
 
@@ -24,8 +26,7 @@ def options(*settings: str) -> list[str]:
 
 
 def history(folder: Path) -> xarray.Dataset:
-    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as opened:
-        return opened.load()
+    return load_history(folder)
 
 
 def check_equal(resumed: Path, whole: Path) -> None:

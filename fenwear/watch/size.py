@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 
 from fenwear.assembly import Bodies
 from fenwear.bodies.elasticity import ElasticBody
@@ -85,5 +84,5 @@ def _size(elastic: ElasticBody) -> float:
     mesh = elastic.body.mesh
     x = mesh.geometry.x
     low, high = (x.min(axis=0), x.max(axis=0)) if len(x) else (np.full(3, np.inf), np.full(3, -np.inf))
-    ends = [mesh.comm.allreduce(end, op=op) for end, op in ((low, MPI.MIN), (high, MPI.MAX))]
-    return float((ends[1] - ends[0]).max())
+    ends = np.array(mesh.comm.allgather((low, high)))
+    return float((ends[:, 1].max(axis=0) - ends[:, 0].min(axis=0)).max())

@@ -312,10 +312,10 @@ def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = 
 
 
 def preparation(system: Tribosystem) -> Preparation:
-    """Return how the heat of a system was prepared."""
-    if system.exchange is None:
+    """Return how the heat of a system was prepared: "reduced" where its settings do not say so themselves."""
+    if system.exchange is None or system.heat is None:
         return "none"
-    return "reduced" if system.exchange.reduced else "as set"
+    return "reduced" if system.exchange.reduced and system.heat.operator != "reduced" else "as set"
 
 
 def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExchange:

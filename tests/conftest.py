@@ -18,6 +18,7 @@ from typing import Any
 
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
 os.environ["FENWEAR_KEPT_GIB"] = "0"  # each test computes what it checks
+os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112  (Open MPI's name; ranks that wait leave their core)
 
 import forked
 import pytest
@@ -159,11 +160,6 @@ def fenwear(run_python: Callable[..., Any], forks: str) -> Callable[..., Any]:
     return fenwear
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Choose by what tests start: ranks that wait for one another take a core each, whoever else needs it."""
-    parser.addoption("--ranks", choices=("without", "only"), help="tests that start several ranks: without or only")
-
-
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what starts a process with the fixtures above, whose imports take seconds, and what long.txt names."""
     long = set((TESTS / "long.txt").read_text("utf-8").split())
@@ -173,10 +169,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         path, name = item.path.relative_to(TESTS).as_posix(), item.name.partition("[")[0]
         if long & {path, f"{path}::{name}"}:
             item.add_marker("long")
-    if choice := config.getoption("--ranks"):
-        left = [item for item in items if bool(item.get_closest_marker("ranks")) != (choice == "only")]
-        config.hook.pytest_deselected(items=left)
-        items[:] = [item for item in items if item not in set(left)]
     items[:] = _long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 

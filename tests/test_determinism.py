@@ -93,7 +93,6 @@ def check_same_numbers(one: xarray.Dataset, other: xarray.Dataset) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.ranks
 def test_the_same_again_and_on_other_ranks(run: Callable[..., Histories]) -> None:
     """Each case: the same bits twice on one rank and twice on two, and the same numbers on one, two and three.
 

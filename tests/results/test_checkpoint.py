@@ -52,7 +52,6 @@ def test_resumed_equals_whole(fenwear: Run, tmp_path: Path, integration: str, op
     check_equal(tmp_path / "resumed", tmp_path / "whole")
 
 
-@pytest.mark.ranks
 def test_another_number_of_ranks(fenwear: Run, tmp_path: Path) -> None:
     """A run on two ranks goes on on one: the same scalars as a run on one, to 1e-9."""
     for ranks, count, extra in ((2, 20, ()), (1, 50, ("--resume",))):

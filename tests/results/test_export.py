@@ -164,7 +164,6 @@ def test_what_is_no_history(tmp_path: Path) -> None:
             export(tmp_path / name)
 
 
-@pytest.mark.ranks
 def test_command(folders: Callable[[str], Path], fenwear: Callable[..., Any], tmp_path: Path) -> None:
     """On two ranks: the names of the files once on standard output; a wrong folder ends with status 2."""
     run = tmp_path / "run"

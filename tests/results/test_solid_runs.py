@@ -167,7 +167,6 @@ def test_retried_half_cycles(tmp_path: Path, name: str, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("name", ["pin-on-disc", "brake-pad"])
-@pytest.mark.ranks
 def test_two_ranks(fenwear: Callable[..., Any], tmp_path: Path, name: str) -> None:
     """Two ranks write the same history as one, to 1e-9 of the largest value of each variable."""
     settings = (*SETTINGS[name], "run.half_cycles=6")

@@ -150,7 +150,6 @@ def test_refusals(fenwear: Run, tmp_path: Path) -> None:
     assert full.stdout == ""
 
 
-@pytest.mark.ranks
 def test_ranks(fenwear: Run, tmp_path: Path) -> None:
     """Verification 18 on two ranks: compared with each rank on its own; said and written once."""
     done = fenwear("verify", "--only", "ranks", "-o", tmp_path / "v", ranks=2)

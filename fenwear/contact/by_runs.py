@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from scipy.sparse import csr_array, hstack
 
 from fenwear.arrays import Array, Mask
@@ -36,11 +37,14 @@ class SpreadPhases:
         interfaces: Of each phase.
         ratios: tau of each phase (n, d), the traction of friction on the punch over the pressure.
         scale: Of the compliances.
+        team: The ranks, where they share more than this.
     """
 
-    def __init__(self, interfaces: Sequence[Interface], ratios: Sequence[Array], scale: float) -> None:
+    def __init__(
+        self, interfaces: Sequence[Interface], ratios: Sequence[Array], scale: float, team: Team | None = None
+    ) -> None:
         rows = interfaces[0].rows or Rows.equal(MPI.COMM_SELF, len(interfaces[0].pair.weights))
-        self.team = Team(rows.comm)
+        self.team, self._number = team or Team(rows.comm), len(interfaces)  # after those of each phase
         places = list({id(own.gap_by_force): own.gap_by_force for own in interfaces}.values())
         which = [np.flatnonzero([own.gap_by_force is place for own in interfaces]) for place in places]
         traction = [
@@ -48,19 +52,23 @@ class SpreadPhases:
             for own, ratio in zip(interfaces, ratios, strict=True)
         ]
         phases = PhaseRows(places, [np.array([traction[k] for k in one]) for one in which], which)
-        self.team.serve(0, OwnPhases(rows.own, phases))
+        self.team.serve(self._number, OwnPhases(rows.own, phases))
 
     def multiply(self, pressure: Array) -> Array:
         """Return what pressures open in all phases (m, n)."""
-        return np.concatenate(self.team.call(0, "multiply", pressure), axis=1)
+        return np.concatenate(self.team.call(self._number, "multiply", pressure), axis=1)
 
     def multiply_within(self, pressure: Array) -> Array:
         """Return the same among the prepared nodes (m, c)."""
-        return np.concatenate(self.team.call(0, "multiply_within", pressure), axis=1)
+        return np.concatenate(self.team.call(self._number, "multiply_within", pressure), axis=1)
+
+    def prepare(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> bool:
+        """Take the nodes that are solved for; return whether all runs can be eliminated: see `OwnPhases.prepare`."""
+        return all(self.team.call(self._number, "prepare", nodes, free, wear, held))
 
     def near(self, v: Array) -> Array:
         """Return the solution of all runs of the prepared nodes (m + 1, c, q)."""
-        return np.concatenate(self.team.call(0, "near", v), axis=1)
+        return np.concatenate(self.team.call(self._number, "near", v), axis=1)
 
 
 @dataclass(frozen=True)
@@ -108,7 +116,7 @@ class ByRuns:
         idle = self._free[-1] & (worn == 0) & (self._held == 0)  # shapes that nothing of their balance holds
         if idle.sum() > self._opened[-1].any(axis=0).sum():
             raise np.linalg.LinAlgError("singular matrix")
-        if not all(phases.team.call(0, "prepare", nodes, self._free, diagonals, self._held)):
+        if not phases.prepare(nodes, self._free, diagonals, self._held):
             raise np.linalg.LinAlgError("singular matrix")
         self._followed = phases.near(self._opened)
         self._solve_beside: Solve = eliminate(np.einsum("qkn,knj->qj", self._balance, self._followed[:-1]))

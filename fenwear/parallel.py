@@ -1,5 +1,8 @@
 """Ranks: what one finds wrong, every rank raises; what they add up is the same to the last bit; one leads all.
 
+Sums, products and logarithms end in other last bits on other processors. So rank 0 alone computes what works on numbers
+that every rank could have, and takes all decisions: `Team.lead`. What is spread over the ranks, all do together.
+
 PETSc's objects on several ranks are freed by all of them together, so that petsc4py keeps those that
 Python drops until it is told to free them. What is large is destroyed where it was made, and the rest
 where `release` is called.
@@ -7,10 +10,14 @@ where `release` is called.
 
 from __future__ import annotations
 
+import io
 import math
+import pickle
+import time
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -18,6 +25,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 T = TypeVar("T")
+BUSY, NAP = 2e-3, 2e-4  # s that a rank looks out for an order without a pause, and its pauses afterwards
 
 
 def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
@@ -26,22 +34,12 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
     Raises:
         Exception: what `function` raised, on every rank.
     """
-    result: T | None = None
-    error: Exception | None = None
-    if comm.rank == 0:
-        try:
-            result = function()
-        except Exception as caught:  # raised again below, on all ranks
-            error = caught
-    error = comm.bcast(error)
-    if error is not None:
-        raise error
-    return comm.bcast(result)
+    return Team.of(comm).lead(function)
 
 
 def agreed(comm: MPI.Comm, found: T) -> T:
     """Return what rank 0 has found, on every rank: what decides over further collective calls; collective."""
-    return found if comm.size == 1 else comm.bcast(found)
+    return Team.of(comm).lead(lambda: found)
 
 
 def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -102,17 +100,46 @@ class Rows:
 class Team:
     """Ranks that work for rank 0 while it leads: what it decides needs no other rank's agreement.
 
-    Args:
-        comm: The ranks.
+    What one call leads may lead further: the outermost leads all. Ranks of one group are one team.
     """
+
+    _teams: ClassVar[list[Team]] = []
 
     def __init__(self, comm: MPI.Comm) -> None:
         self.comm = comm
-        self._parts: dict[int, object] = {}
+        self._leads = False  # rank 0, now
+        self._parts: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
+        self._numbers: dict[int, int] = {}  # of parts, by their identity
+        self._served = 0
 
-    def serve(self, number: int, part: object) -> None:
-        """Have this rank's part of what is shared called by its number."""
-        self._parts[number] = part
+    @property
+    def leads(self) -> bool:
+        """Whether this rank leads now."""
+        return self._leads
+
+    @classmethod
+    def of(cls, comm: MPI.Comm) -> Team:
+        """Return the team of these ranks, which has a communicator of its own; collective at the first time."""
+        for team in cls._teams:
+            if MPI.Comm.Compare(comm, team.comm) in (MPI.IDENT, MPI.CONGRUENT):
+                return team
+        cls._teams.append(cls(comm.Dup()))
+        return cls._teams[-1]
+
+    def serve(self, part: T) -> T:
+        """Return this rank's part of what all have a part of, known as such as long as it is kept; collective.
+
+        It can be asked for by `call` and `each`, and between ranks it stands for theirs.
+        """
+        if self._number(part) is None:
+            self._parts[self._served] = part
+            self._numbers[id(part)] = self._served
+            self._served += 1
+        return part
+
+    def _number(self, part: object) -> int | None:
+        number = self._numbers.get(id(part))
+        return number if number is not None and self._parts.get(number) is part else None
 
     def lead(self, function: Callable[[], T]) -> T:
         """Call `function` on rank 0, which may `call` all ranks meanwhile; return its result on each; collective.
@@ -120,34 +147,108 @@ class Team:
         Raises:
             Exception: what `function` raised, on every rank.
         """
+        if self._leads or self.comm.size == 1:
+            return function()
         if self.comm.rank:
-            while (order := self.comm.bcast(None)) is not None:
-                self.comm.gather(self._done(*order))
-            return on_root(self.comm, function)
+            return self._follow()  # type: ignore[no-any-return]
+        result: T | None = None
+        failure: Exception | None = None
+        self._leads = True
+        try:
+            result = function()
+        except Exception as error:  # raised again below, on all ranks
+            failure = error
+        finally:
+            self._leads = False
+        self._tell((None, result, failure))
+        if failure is not None:
+            raise failure
+        return result  # type: ignore[return-value]
 
-        def led() -> T:
-            try:
-                return function()
-            finally:
-                self.comm.bcast(None)
+    def _follow(self) -> Any:
+        """Do what rank 0 asks for until it is done; return its result."""
+        while True:
+            order, *told = self._told()
+            if order is None:
+                result, failure = told
+                if failure is not None:
+                    raise failure
+                return result
+            self.comm.gather(self._packed(self._done(*order)))
 
-        return on_root(self.comm, led)
-
-    def call(self, number: int, method: str, *arguments: Any) -> list[Any]:
+    def call(self, part: object, method: str, *arguments: Any) -> list[Any]:
         """Call a method of each rank's part and return what each has returned; on rank 0, while it leads.
 
         Raises:
             Exception: what it raised on some rank.
         """
-        self.comm.bcast((number, method, arguments))
-        results, errors = zip(*(self.comm.gather(self._done(number, method, arguments)) or []), strict=True)
+        if self.comm.size == 1:
+            return [getattr(part, method)(*arguments)]
+        self._tell(((self._number(part), method, arguments), None, None))
+        self._leads = False  # in what all do together another one may lead
+        done = self._done(self._number(part), method, arguments)
+        self._leads = True
+        gathered = self.comm.gather(b"") or []
+        results, errors = zip(done, *map(self._unpacked, gathered[1:]), strict=True)
         for error in errors:
             if error is not None:
                 raise error
         return list(results)
 
-    def _done(self, number: int, method: str, arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:
+    def each(self, part: object, method: str, *arguments: Any) -> Any:
+        """Call a method of each rank's part and return what this one's returned; by rank 0 that leads, or collective.
+
+        Raises:
+            Exception: what it raised, while rank 0 leads on any rank.
+        """
+        if self._leads:
+            return self.call(part, method, *arguments)[0]
+        return getattr(part, method)(*arguments)
+
+    def _done(self, number: int | None, method: str, arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:
         try:
-            return getattr(self._parts[number], method)(*arguments), None
+            return getattr(self._parts[number], method)(*arguments), None  # type: ignore[index]
         except Exception as error:  # raised again on rank 0, which all wait for
             return None, error
+
+    def _tell(self, content: Any) -> None:
+        packed = self._packed(content)
+        self.comm.Ibarrier().Wait()
+        self.comm.bcast(packed)
+
+    def _told(self) -> Any:
+        """Return what rank 0 tells; who waits long leaves the core to others."""
+        come, begin = self.comm.Ibarrier(), time.perf_counter()
+        while not come.Test():
+            if time.perf_counter() > begin + BUSY:
+                time.sleep(NAP)
+        return self._unpacked(self.comm.bcast(None))
+
+    def _packed(self, content: Any) -> bytes:
+        """Return what crosses ranks; parts as their numbers."""
+        file = io.BytesIO()
+        _Packer(file, self._number).dump(content)
+        return file.getvalue()
+
+    def _unpacked(self, packed: bytes) -> Any:
+        return _Unpacker(io.BytesIO(packed), self._parts.__getitem__).load()
+
+
+class _Packer(pickle.Pickler):
+    def __init__(self, file: io.BytesIO, number: Callable[[object], int | None]) -> None:
+        super().__init__(file, protocol=5)
+        self._number = number
+
+    def persistent_id(self, one: object) -> int | None:
+        """Return the number of a part; None for what is packed as it is."""
+        return self._number(one)
+
+
+class _Unpacker(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, part: Callable[[int], Any]) -> None:
+        super().__init__(file)
+        self._part = part
+
+    def persistent_load(self, number: int) -> Any:
+        """Return this rank's part of a number."""
+        return self._part(number)

@@ -38,7 +38,7 @@ from fenwear.signals import Signals
 from fenwear.stick import checkpoint as stick_checkpoint
 from fenwear.stick.run import check_touching, run_stick
 from fenwear.stick.setup import make_rig
-from fenwear.watch import Watch, stroke_warnings
+from fenwear.watch import Watch, size_warnings, stroke_warnings
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
@@ -185,7 +185,7 @@ class _Run:
             self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
         self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
-        self.warnings += stroke_warnings(system)
+        self.warnings += [*size_warnings(self.case, system.bodies, system.rigid), *stroke_warnings(system)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())

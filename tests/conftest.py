@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections import deque
 from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -17,6 +18,7 @@ from typing import Any
 
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
 os.environ["FENWEAR_KEPT_GIB"] = "0"  # each test computes what it checks
+os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112  (Open MPI's name; ranks that wait leave their core)
 
 import forked
 import pytest
@@ -25,6 +27,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenwear import Case, Tribosystem, assemble, load_case, make_case
+from fenwear.assembly.variants import set_up_by, with_case
 
 # The same examples on every machine and every rank; --hypothesis-profile=search looks for others.
 settings.register_profile(
@@ -35,6 +38,7 @@ settings.register_profile("few", settings.get_profile("same"), max_examples=3)
 settings.load_profile("same")
 
 TESTS = Path(__file__).parent
+_FIRST: deque[Tribosystem] = deque(maxlen=6)
 Edit = Callable[[dict[str, Any]], object]
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
 TERMINAL = pytest.StashKey[int]()
@@ -42,7 +46,13 @@ TERMINAL = pytest.StashKey[int]()
 
 @lru_cache(maxsize=24)  # the largest hold some hundred MB
 def _assembled(name: str, settings: tuple[str, ...]) -> Tribosystem:
-    return assemble(load_case(name, settings))
+    """Return the system of a case; of what is set up alike, the first is made and the others are variants of it."""
+    case = load_case(name, settings)
+    alike = next((first for first in _FIRST if set_up_by(first.case) == set_up_by(case)), None)
+    if alike is not None:
+        return with_case(alike, case)
+    _FIRST.append(assemble(case))
+    return _FIRST[-1]
 
 
 @pytest.fixture(scope="session")
@@ -50,6 +60,7 @@ def assembled() -> Iterator[Callable[..., Tribosystem]]:
     """Return assembled(name, *settings): the system of a built-in case, made once a session."""
     yield lambda name, *settings: _assembled(name, settings)
     _assembled.cache_clear()
+    _FIRST.clear()
 
 
 @pytest.fixture
@@ -149,11 +160,6 @@ def fenwear(run_python: Callable[..., Any], forks: str) -> Callable[..., Any]:
     return fenwear
 
 
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Choose by what tests start: ranks that wait for one another take a core each, whoever else needs it."""
-    parser.addoption("--ranks", choices=("without", "only"), help="tests that start several ranks: without or only")
-
-
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what starts a process with the fixtures above, whose imports take seconds, and what long.txt names."""
     long = set((TESTS / "long.txt").read_text("utf-8").split())
@@ -163,17 +169,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         path, name = item.path.relative_to(TESTS).as_posix(), item.name.partition("[")[0]
         if long & {path, f"{path}::{name}"}:
             item.add_marker("long")
-    if choice := config.getoption("--ranks"):
-        left = [item for item in items if bool(item.get_closest_marker("ranks")) != (choice == "only")]
-        config.hook.pytest_deselected(items=left)
-        items[:] = [item for item in items if item not in set(left)]
     items[:] = _long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 
 def _long_first(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
     """Return the tests so that each worker, which takes an equal run of them, begins with its share of the long ones.
 
-    So none waits at the end for another's long test, and those that use the same systems still follow each other.
+    So none waits at the end for another's long test, and those that use the same systems and folders still follow
+    each other on one worker.
     """
     if workers == 1:
         return items
@@ -181,7 +184,7 @@ def _long_first(items: list[pytest.Item], workers: int) -> list[pytest.Item]:
     short = [item for item in items if not _length(item)]
     ordered: list[pytest.Item] = []
     for worker in range(workers):
-        own = long[worker::workers]
+        own = long[worker * len(long) // workers : (worker + 1) * len(long) // workers]
         size = max(0, (len(items) - len(ordered)) // (workers - worker) - len(own))
         ordered += [*own, *short[:size]]
         short = short[size:]

@@ -15,7 +15,7 @@ import pytest
 
 import fenwear as package
 from fenwear import Tribosystem, steady
-from fenwear.case import builtin_cases
+from fenwear.case import Dependence, builtin_cases
 from fenwear.cli.states import steady_command
 
 Run = Callable[..., Any]
@@ -208,7 +208,6 @@ def test_no_convergence(fenwear: Run, tmp_path: Path, command: str) -> None:
     refused(done, 3, "DIVERGED_MAX_IT")
 
 
-@pytest.mark.ranks
 def test_two_ranks_give_the_same_scalars(fenwear: Run, tmp_path: Path) -> None:
     """Verification 18: history and summary of 1 and 2 ranks agree to 1e-9; standard output holds one JSON object."""
     histories, summaries = [], []
@@ -228,7 +227,6 @@ def test_two_ranks_give_the_same_scalars(fenwear: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "expected"), [BAD[0], (["-o", "/proc/fenwear"], "cannot be written")])
-@pytest.mark.ranks
 def test_two_ranks_say_it_once(fenwear: Run, tmp_path: Path, arguments: list[str], expected: str) -> None:
     """The same refusal on two ranks: said once, exit status 2, nothing hangs, nothing is written."""
     done = fenwear("run", "example1", *options(), *arguments, ranks=2, cwd=tmp_path)
@@ -254,7 +252,6 @@ for words in commands:
 """
 
 
-@pytest.mark.ranks
 def test_two_ranks_refuse_whatever_is_wrong(run_python: Run, tmp_path: Path) -> None:
     """Wherever it is found, on whichever rank: by the case's tables, by gmsh, by the contact, by the command line."""
     wrong = [BAD[2], BAD[3], BAD[5], (["--colour"], "No such option")]
@@ -272,12 +269,14 @@ def test_two_ranks_refuse_whatever_is_wrong(run_python: Run, tmp_path: Path) -> 
     assert os.listdir(folder) == []
 
 
-@pytest.mark.ranks
 def test_two_ranks_without_convergence(fenwear: Run, tmp_path: Path) -> None:
     """Exit status 3 from all ranks."""
     done = fenwear("steady", "example1", *options(), "--", "-fenwear_steady_snes_max_it", "1", ranks=2, cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     assert done.stderr.count("DIVERGED_MAX_IT") == 1
+
+
+COEFFICIENT = sorted(f"wear.punch.coefficient{key}=" for key in ("", *(f".{k}" for k in Dependence.model_fields)))
 
 
 def test_shell_completion(run_python: Run) -> None:
@@ -287,6 +286,8 @@ def test_shell_completion(run_python: Run) -> None:
         ("fenwear run --re", 2, ["--resume"]),
         ("fenwear check example1-l", 2, ["example1-lz40", "example1-lz40-heat"]),
         ("fenwear check example1 --set motion.am", 4, ["motion.amplitude="]),
+        ("fenwear check example1 --set wear.punch.coefficient", 4, COEFFICIENT),
+        ("fenwear new block", 2, ["block-on-ring"]),
         ("fenwear info wear.strip.coefficient.t", 2, ["wear.strip.coefficient.table"]),
     ):
         variables = {"_FENWEAR_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(place)}

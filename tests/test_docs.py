@@ -63,7 +63,6 @@ def _pages() -> Iterator[object]:
         found = [b for b in blocks(page) if not b.mark.startswith("not run")]
         if any(b.kind in ("sh", "console", "python") for b in found):
             marks = [pytest.mark.process, *([pytest.mark.slow] if any(b.mark == "slow" for b in found) else [])]
-            marks += [pytest.mark.ranks] if any("mpirun" in b.text for b in found) else []
             yield pytest.param(page, id=page.relative_to(ROOT).with_suffix("").as_posix(), marks=marks)
 
 

@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear.results.reading import load_history
+
 Run = Callable[..., Any]
 SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 pytestmark = pytest.mark.process
@@ -107,8 +109,7 @@ def _state(pid: int) -> str:
 
 def check_history(folder: Path) -> int:
     """Check that history.nc is whole and consistent; return its last half-cycle."""
-    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as opened:
-        history = opened.load()
+    history = load_history(folder)
     assert (np.diff(history.half_cycle) > 0).all()
     for name, variable in history.variables.items():
         assert name == "periodicity" or np.isfinite(variable.values).all(), name
@@ -134,7 +135,7 @@ def check_goes_on(fenwear: Run, folder: Path) -> None:
     ("kilobytes", "ranks"),
     [
         *((kilobytes, 1) for kilobytes in (8, 40, 160, 500, 900, 1200, 2000)),
-        *(pytest.param(kilobytes, 2, marks=pytest.mark.ranks) for kilobytes in (40, 500, 2000)),
+        *((kilobytes, 2) for kilobytes in (40, 500, 2000)),
     ],
 )
 def test_full_disk(fenwear: Run, small_disk: Callable[[int], Path], kilobytes: int, ranks: int) -> None:
@@ -188,7 +189,6 @@ def test_disk_turns_read_only(fenwear: Run, small_disk: Callable[[int], Path]) -
     check_goes_on(fenwear, folder)
 
 
-@pytest.mark.ranks
 def test_read_only_folder(fenwear: Run, small_disk: Callable[[int], Path]) -> None:
     """Refused as wrong usage before anything is computed, on one rank and on two."""
     folder = small_disk(1000)
@@ -224,7 +224,6 @@ def test_full_disk_for_other_commands(fenwear: Run, small_disk: Callable[[int], 
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.ranks
 def test_signal_to_one_rank(fenwear: Run, tmp_path: Path, number: signal.Signals) -> None:
     """All ranks end together, with a checkpoint."""
     folder = tmp_path / "run"
@@ -237,7 +236,6 @@ def test_signal_to_one_rank(fenwear: Run, tmp_path: Path, number: signal.Signals
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.ranks
 def test_signal_to_mpirun(fenwear: Run, tmp_path: Path, number: signal.Signals) -> None:
     """mpirun passes it on to all ranks: they end, and what is there is whole."""
     folder = tmp_path / "run"
@@ -251,7 +249,7 @@ def test_signal_to_mpirun(fenwear: Run, tmp_path: Path, number: signal.Signals) 
     check_goes_on(fenwear, folder)
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.ranks)])
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
     """Jumps of many solves: saved long before 200 are recorded, and ended by a signal within one."""
     folder = tmp_path / "run"
@@ -272,7 +270,6 @@ def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
 
 
 @pytest.mark.parametrize("victims", [1, 2])
-@pytest.mark.ranks
 def test_killed_ranks(fenwear: Run, tmp_path: Path, victims: int) -> None:
     """One rank killed: the other does not wait for it for ever. Both killed: the files are whole all the same."""
     folder = tmp_path / "run"
@@ -321,7 +318,6 @@ RICH = {
 
 
 @pytest.mark.parametrize("name", RICH)
-@pytest.mark.ranks
 def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -> None:
     """Killed and gone on with on two ranks: as if never killed, with the strip's wear and meshes that have moved."""
     case, *settings = RICH[name]
@@ -338,7 +334,7 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
     for folder, ranks, extra in ((resumed, 2, ["--resume"]), (whole, 1, [])):
         done = fenwear("run", case, "-o", folder, *words, *extra, ranks=ranks)
         assert done.returncode == 0, done.stderr
-    one, other = (xarray.load_dataset(folder / "history.nc", engine="h5netcdf") for folder in (resumed, whole))
+    one, other = (load_history(folder) for folder in (resumed, whole))
     np.testing.assert_array_equal(one.half_cycle, other.half_cycle)
     for variable in sorted(set(other.data_vars) - {"equilibrium_error", "heat_balance_error", "periodicity"}):
         measure = {"gap": "wear"}.get(variable, "heat_friction" if str(variable).startswith("heat_") else variable)
@@ -366,7 +362,6 @@ def _reached(folder: Path) -> int:
 # ---------------------------------------------------------------------- removed files
 
 
-@pytest.mark.ranks
 def test_history_removed(fenwear: Run, tmp_path: Path) -> None:
     """The run ends and says so; it goes on with a new history, and says this, too."""
     folder = tmp_path / "run"
@@ -398,7 +393,6 @@ def test_checkpoint_removed(fenwear: Run, tmp_path: Path) -> None:
     check_goes_on(fenwear, folder)
 
 
-@pytest.mark.ranks
 def test_results_removed(tmp_path: Path) -> None:
     """The whole folder gone: the run ends and says that there is nothing to go on from."""
     folder = tmp_path / "run"
@@ -430,7 +424,6 @@ def test_history_is_read_during_the_run(tmp_path: Path) -> None:
 # --------------------------------------------------------------------- wrong numbers
 
 
-@pytest.mark.ranks
 def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
     """Exit status 3 with the half-cycle; the results before it are whole, and the run goes on with other options."""
     folder = tmp_path / "run"
@@ -449,7 +442,6 @@ def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["state.npz", "case.toml", "temperature_punch.bp/md.idx"])
-@pytest.mark.ranks
 def test_damaged_checkpoint(fenwear: Run, tmp_path: Path, name: str) -> None:
     """Cut in half it is refused, on one rank and on two, and nothing is changed."""
     folder = tmp_path / "run"
@@ -502,7 +494,6 @@ def test_damaged_depths_in_a_checkpoint(fenwear: Run, tmp_path: Path, array: str
     assert "is damaged" in done.stderr
 
 
-@pytest.mark.ranks
 def test_damaged_history(fenwear: Run, tmp_path: Path) -> None:
     """Refused with what to do; without it the run goes on."""
     folder = tmp_path / "run"
@@ -547,7 +538,7 @@ with Signals(MPI.COMM_WORLD):
 """
 
 
-@pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.ranks)])
+@pytest.mark.parametrize("ranks", [1, 2])
 def test_second_signal_ends_all_ranks(run_python: Run, tmp_path: Path, ranks: int) -> None:
     """Asked twice, a rank leaves at once and takes the other with it, which waits for it.
 
@@ -560,7 +551,6 @@ def test_second_signal_ends_all_ranks(run_python: Run, tmp_path: Path, ranks: in
     assert "too late" not in said.read_text()
 
 
-@pytest.mark.ranks
 def test_signals_until_the_end(tmp_path: Path) -> None:
     """Those that come while an interrupted run ends do not kill it, to the last moment: the exit status stays."""
     folder = tmp_path / "run"

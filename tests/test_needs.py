@@ -6,16 +6,20 @@ import re
 import subprocess
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, assemble, load_case
-from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem, ways
+from fenwear import Case, CaseError, assemble, load_case
+from fenwear.assembly import elastic, needs_of, place_case, shares_text, tribosystem, warmed_system, ways
 from fenwear.assembly.needs import BodyNeeds, Needs, needs
-from fenwear.bodies.condensation import deal
+from fenwear.bodies.condensation import condense, deal
+from fenwear.heat.field import HeatState
 from fenwear.memory import GIB, free_memory
+from fenwear.stick.interface import meshed
+from fenwear.stick.setup import make_rig
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
 
@@ -83,7 +87,7 @@ def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refused before anything is factored, with the mesh that would fit."""
     placed = place_case(load_case("ball-on-flat", COARSE))
     monkeypatch.setattr(ways, "SMALL", 0.0)
-    monkeypatch.setattr(tribosystem, "condense_bodies", lambda _placed: pytest.fail("condensed all the same"))
+    monkeypatch.setattr(tribosystem, "condense_together", lambda *_, **__: pytest.fail("condensed all the same"))
     expected = (
         r"geometry: .* unknowns, .* are free, and no setup\.way would fit: .*; elements \d\.\d times as large would"
     )
@@ -157,7 +161,7 @@ def test_all_ranks_are_told_of() -> None:
 def test_another_way_would_fit(monkeypatch: pytest.MonkeyPatch) -> None:
     """The refusal names it, with its memory; left to itself the set-up takes it, and check tells."""
     wanted = solid(2e6, 1000)
-    monkeypatch.setattr(ways, "needs", lambda *_arguments, **_options: wanted)
+    monkeypatch.setattr(tribosystem, "needs", lambda *_arguments, **_options: wanted)
     punch, strip = (replace(body, solver="multigrid") for body in (wanted.punch, wanted.strip))
     least = replace(wanted, punch=punch, strip=strip)
     free = 1.01 * least.memory
@@ -165,12 +169,74 @@ def test_another_way_would_fit(monkeypatch: pytest.MonkeyPatch) -> None:
         place_case(load_case("ball-on-flat", [*COARSE, f"setup.way={way}"])) for way in ("columns", "automatic")
     )
     with pytest.raises(CaseError, match=r"are free; setup\.way = 'multigrid' would take .* GiB; elements"):
-        ways.check_memory(by_columns, needs_of(by_columns, free), free)
+        ways.check_memory(needs_of(by_columns, free), by_columns.bodies.punch.setup, free)
     found = needs_of(automatic, free)
     assert found == least
     assert all("conjugate gradients on all ranks" in line for line in shares_text(automatic, found)[:2])
-    ways.take(automatic, found)
+    ways.settle([automatic.bodies], wanted, free)
     assert automatic.bodies.punch.solver == "multigrid"
+
+
+@pytest.mark.mpi
+def test_a_factor_over_the_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a rank's share of the memory is less than the factor: made over all ranks, with the same answer.
+
+    What all ranks eliminate together needs no such factor, and one rank alone has nobody to share it with.
+    """
+    monkeypatch.setattr(ways, "SMALL", 0.0)
+    monkeypatch.setattr(ways, "first_fitting", lambda wanted, _free: wanted)  # so small a contact outweighs the factors
+    ready = [place_case(load_case("example1", [*COARSE, f"setup.way={way}"])) for way in ("columns", "automatic")]
+    placed, together = ready
+    ranks = placed.comm.size
+    wanted = needs_of(placed)
+    share = 0.5 * (wanted.punch.factor + wanted.strip.factor) * 8 * 1.3  # between the two of them
+    found = needs_of(placed, ranks * share)
+    assert found.strip.factor > found.punch.factor
+    assert (found.punch.solver, found.strip.solver) == ("factor", "spread factor" if ranks > 1 else "factor")
+    other = needs_of(together, ranks * share).strip
+    assert other.solver == "factor" or not other.together
+    lines = shares_text(placed, found)
+    assert (f"a factor over {ranks} ranks" in lines[1]) == (ranks > 1)
+    strip = placed.bodies.strip
+    normals = np.broadcast_to([0.0, 1.0], strip.surface.x.shape)
+    expected = condense(strip, strip.surface.spread, normals)
+    strip.free_factor()
+    strip.solver = found.strip.solver
+    spread = condense(strip, strip.surface.spread, normals)
+    assert strip.factor.is_spread == (ranks > 1)
+    for one, other in ((spread.response, expected.response), (spread.by_load, expected.by_load)):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-10 * np.abs(expected.response).max())
+
+
+def test_bodies_made_anew_and_stick_take_the_same_choice(
+    edited: Callable[..., Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With properties of other temperatures, and condensed along all axes: what fits then, or a refusal."""
+
+    def soften(tables: dict[str, Any]) -> None:
+        tables["materials"][tables["strip"]["regions"]["strip_body"]]["young"] = {"expression": "1e5 - 10 * T"}
+
+    cold = assemble(edited("example1-heat", soften, *COARSE), heat="none")
+    assert cold.bodies.heat is not None
+    at = HeatState.nodal(cold.bodies.heat, [np.full(body.owned, 60.0) for body in cold.bodies.heat])
+    sticking = load_case("fretting-partial-slip", ["geometry.parameters.elements_along_contact=20"])
+    expected = [warmed_system(cold, at).condensed.strip.response, make_rig(sticking).interface.strip.response]
+
+    def low(wanted: Needs, _free: float | None) -> Needs:
+        return replace(wanted, strip=replace(wanted.strip, solver="low-rank"))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ways, "first_fitting", low)
+        warm, rig = warmed_system(cold, at), make_rig(sticking)
+    assert [warm.bodies.strip.solver, meshed(rig.interface).bodies.strip.solver] == ["low-rank", "low-rank"]
+    for found, other in zip((warm.condensed.strip, rig.interface.strip), expected, strict=True):
+        np.testing.assert_allclose(found.response, other, rtol=0, atol=1e-10 * np.abs(other).max())
+    monkeypatch.setattr(ways, "SMALL", 0.0)
+    monkeypatch.setattr(ways, "free_on_ranks", lambda _comm: 1e5)
+    with pytest.raises(CaseError, match="are free"):
+        warmed_system(cold, at)
+    with pytest.raises(CaseError, match="are free"):
+        make_rig(sticking)
 
 
 def test_free_memory() -> None:

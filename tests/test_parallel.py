@@ -114,7 +114,6 @@ assert summary["half_cycles"] == 6 and summary["largest_heat_balance_error"] < 1
 
 
 @pytest.mark.slow
-@pytest.mark.ranks
 def test_more_ranks_than_cells(run_python: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path) -> None:
     """Some have none, and all have the same pressures as one alone; runs with heat are written, and go on."""
     done = run_python("-m", "mpi4py", "-c", FEW, ranks=5, cwd=tmp_path)

@@ -12,8 +12,9 @@ takes again what a changed case makes necessary, and keeps the rest.
 """
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
+from fenwear.assembly.needs import Needs, body_needs
 from fenwear.assembly.placed import Clock, Placed, place
-from fenwear.assembly.shares import shares_text
+from fenwear.assembly.shares import body_lines, shares_text
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
     Condensed,
@@ -30,16 +31,20 @@ from fenwear.assembly.tribosystem import (
 )
 from fenwear.assembly.variants import assemble, in_parts, place_case, set_up_by, vary, with_case
 from fenwear.assembly.warmed import outwarmed, property_change, taken_at, warmed_system, warming_key
+from fenwear.assembly.ways import settle
 
 __all__ = [
     "Bodies",
     "Clock",
     "Condensed",
+    "Needs",
     "Placed",
     "Preparation",
     "Sliding",
     "Tribosystem",
     "assemble",
+    "body_lines",
+    "body_needs",
     "build_bodies",
     "build_conduction",
     "elastic",
@@ -55,6 +60,7 @@ __all__ = [
     "preparation",
     "property_change",
     "set_up_by",
+    "settle",
     "shares_text",
     "steady_exchange",
     "taken_at",

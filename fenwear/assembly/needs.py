@@ -51,6 +51,7 @@ class BodyNeeds:
         holders: Ranks that each have the factor and solve a share of the columns.
         way: What `setup.way` says.
         together: Whether all ranks eliminate it down to its surface, each its own cells.
+        made: Whether its factor, or what stands for it, is there already.
     """
 
     dim: int
@@ -64,6 +65,7 @@ class BodyNeeds:
     holders: int = 1
     way: str = "automatic"
     together: bool = False
+    made: bool = False
 
     def coarser(self, times: float) -> BodyNeeds:
         """Return the same of elements so many times as large."""
@@ -89,6 +91,8 @@ class BodyNeeds:
         """Bytes of stiffness, factor and answers."""
         answers = self.patterns * self.dim * self.columns + self.patterns * self.temperatures
         complement = 2 * self.surface**2 if self.by_surface else 0.0
+        if self.made:
+            return NUMBER * (answers + complement)
         each = self.matrix + self.solving
         return NUMBER * (0.5 * self.matrix + self.holders * each + answers + complement)
 
@@ -111,6 +115,8 @@ class BodyNeeds:
         """Time of one core."""
         if self.solver == "multigrid":
             return (ASSEMBLING[self.dim] + ITERATING * self.columns) * self.unknowns
+        if self.made:
+            return self.by_columns
         return ASSEMBLING[self.dim] * self.unknowns + self.factoring + self.by_columns
 
     @property
@@ -216,20 +222,28 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = Fal
     bodies, pair = placed.bodies, placed.pair
     n, dim = len(pair.weights), pair.punch.dim
     on_strip = len(pair.strip.trace) if moves else n
-    of_punch = _body(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
+    of_punch = body_needs(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
     one = not moves or (fixed and flat)
-    of_strip = _body(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
+    of_strip = body_needs(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
     interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
     return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs), 1 if shared else placed.comm.size)
 
 
-def _body(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool) -> BodyNeeds:
+def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool = False) -> BodyNeeds:
+    """Return what condensing a body will need; collective.
+
+    Args:
+        elastic: The body.
+        patterns: Of force.
+        columns: Solutions.
+        heat: Whether its answer to temperatures is asked for, too.
+    """
     size, surface = elastic.size, elastic.surface_dofs.size
     temperatures = size / elastic.dim if heat else 0.0
     entries, solver = elastic.matrix_entries(), elastic.solver
     way, together = elastic.setup.way, not heat and Request(elastic, elastic.surface.spread).in_substructures
     known = (elastic.dim, size, entries, columns, patterns, temperatures, surface, solver)
-    return BodyNeeds(*known, way=way, together=together)
+    return BodyNeeds(*known, way=way, together=together, made=elastic.is_factored)
 
 
 def duration(seconds: float) -> str:

@@ -26,6 +26,7 @@ from fenwear.interface import (
 )
 from fenwear.interface.placement import in_model, in_space
 from fenwear.optimum import Optimum, check_equilibrium, optimum, optimum_on_track
+from fenwear.parallel import Team
 from fenwear.remedies import Remedies
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
@@ -97,6 +98,11 @@ class Placed:
     def comm(self) -> MPI.Comm:
         """The ranks."""
         return self.bodies.comm
+
+    @property
+    def team(self) -> Team:
+        """The ranks, of which one leads."""
+        return Team.of(self.comm)
 
     @property
     def case(self) -> Case:
@@ -324,7 +330,7 @@ class Placed:
         wear = self.phases_wear
         laws = [law for law in self.sliding.wear if law is not None]
         exponent = laws[0].pressure_exponent
-        bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.exponent == exponent]
+        bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.law.exponent == exponent]
         on_track = self.sliding.track is not None and wear.strip is not None
         rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
         ratio, phases = self.friction_ratio(direction), len(self.motion.phases)

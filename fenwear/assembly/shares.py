@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.needs import BodyNeeds, Needs, duration
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.tribosystem import shared_rows
@@ -25,10 +26,7 @@ def shares_text(placed: Placed, wanted: Needs) -> list[str]:
         placed: The bodies.
         wanted: What they need in all.
     """
-    bodies = (placed.bodies.punch, placed.bodies.strip)
-    own = (wanted.punch, wanted.strip)
-    dealt = reversed(deal([need.holders for need in reversed(own)], placed.comm.size))
-    lines = [_text(body, need, holders) for body, need, holders in zip(bodies, own, dealt, strict=True)]
+    lines = body_lines(placed.bodies, wanted)
     rows = shared_rows(placed)
     if rows is not None:
         whole = wanted.contact
@@ -37,6 +35,15 @@ def shares_text(placed: Placed, wanted: Needs) -> list[str]:
             f"{memory_size(whole / rows.comm.size)} each"
         )
     return lines
+
+
+def body_lines(bodies: Bodies, wanted: Needs) -> list[str]:
+    """Return a line for each body, as `shares_text`; collective."""
+    own = (wanted.punch, wanted.strip)
+    dealt = reversed(deal([need.holders for need in reversed(own)], bodies.comm.size))
+    return [
+        _text(body, need, ranks) for body, need, ranks in zip((bodies.punch, bodies.strip), own, dealt, strict=True)
+    ]
 
 
 def _text(elastic: ElasticBody, need: BodyNeeds, holders: list[int]) -> str:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -14,9 +14,9 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import Needs
+from fenwear.assembly.needs import Needs, needs
 from fenwear.assembly.placed import Placed
-from fenwear.assembly.ways import check_memory, chosen, free_on_ranks, take
+from fenwear.assembly.ways import chosen, free_on_ranks, settle
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
 from fenwear.bodies.response import Request
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
@@ -27,6 +27,7 @@ from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium, join
 from fenwear.parallel import Rows, lasting
 
+T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
 SHARED = 2000  # contact nodes from which on ranks share the rows of their compliance
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
@@ -77,6 +78,19 @@ class Tribosystem(Placed):
     interfaces: tuple[Interface, ...]
     exchange: HeatExchange | None = None
 
+    @property
+    def replicated(self) -> bool:
+        """Whether every rank could go on alone: no temperatures of all nodes, no contact on all displacements."""
+        return self.solver == "condensed" and (self.exchange is None or self.exchange.reduced)
+
+    def led(self, function: Callable[[], T]) -> T:
+        """Call what goes on from prepared bodies, on rank 0 for all where that can be, else on every rank; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        return self.team.lead(function) if self.replicated else function()
+
     def contact(self, directions: Sequence[int]) -> ContactSolver:
         """Return the contact in the middle position under the mean loads.
 
@@ -93,7 +107,7 @@ class Tribosystem(Placed):
     def _contact(self, phases: list[SlidingContact]) -> ContactSolver:
         if self.solver == "full":
             return FullContact(self.bodies.punch, self.bodies.strip, phases[0].interface, phases[0].friction_ratio)
-        return CondensedContact(phases, self.remedies)
+        return CondensedContact(phases, self.remedies, self.team)
 
     def check_touching(self) -> None:
         """Make sure that the surfaces touch in some phase; collective.
@@ -125,7 +139,11 @@ def needs_of(placed: Placed, free: float | None = None) -> Needs:
         free: Bytes that all ranks together may take; by default those that are free.
     """
     free = free_on_ranks(placed.comm) if free is None else free
-    return chosen(placed, _frame(placed), free, shared=shared_rows(placed) is not None)
+    return chosen(_needs_as_is(placed), placed.bodies.punch.setup, placed.comm, free)
+
+
+def _needs_as_is(placed: Placed) -> Needs:
+    return needs(placed, _frame(placed), shared=shared_rows(placed) is not None)
 
 
 def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
@@ -141,19 +159,24 @@ def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -
     Raises:
         CaseError: there is not memory enough.
     """
-    free = free_on_ranks(placed.comm) if free is None else free
-    wanted = needs_of(placed, free)
-    check_memory(placed, wanted, free)
-    take(placed, wanted)
-    condensed = condense_bodies(placed, fresh=fresh)
-    return joined(placed, condensed)
+    return joined(placed, condense_bodies(placed, fresh=fresh, free=free))
 
 
-def condense_bodies(placed: Placed, *, fresh: bool = False) -> Condensed:
-    """Condense both bodies onto what the phases of the motion ask for; collective.
+def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Condensed:
+    """Condense both bodies onto what the phases of the motion ask for, in the way that fits the memory; collective.
 
     They are kept on disk, but with properties of temperatures that no other run has.
+
+    Args:
+        placed: The bodies.
+        fresh: Factor whatever is kept.
+        free: Bytes that all ranks together may take; by default those that are free.
+
+    Raises:
+        CaseError: there is not memory enough.
     """
+    loaded = {id(one): one for one in (placed.bodies, *placed.loaded)}
+    settle(list(loaded.values()), _needs_as_is(placed), free)
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
     if bodies.heat is not None:

@@ -9,15 +9,16 @@ share of its columns, while the memory lasts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from mpi4py import MPI
 
-from fenwear.assembly.needs import NUMBER, SMALL, WORKING, BodyNeeds, Needs, needs
-from fenwear.assembly.placed import Placed
+from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.needs import NUMBER, SMALL, WORKING, BodyNeeds, Needs
 from fenwear.bodies.elasticity import Solver
 from fenwear.bodies.factor import SPREAD
+from fenwear.case import Setup
 from fenwear.errors import CaseError, InputError
 from fenwear.memory import free_memory, memory_size
 from fenwear.parallel import agreed
@@ -35,31 +36,52 @@ def free_on_ranks(comm: MPI.Comm) -> float | None:
     return None if any(one is None for one in found) else float(sum(one or 0.0 for one in found))
 
 
-def chosen(placed: Placed, frames: tuple[bool, bool, bool], free: float | None, *, shared: bool = False) -> Needs:
+def settle(bodies: Sequence[Bodies], wanted: Needs, free: float | None = None) -> Needs:
+    """Choose what solves for the columns of each body, and have the bodies do it; return what they need; collective.
+
+    Args:
+        bodies: The same under all their loads.
+        wanted: What they need as they are.
+        free: Bytes that all ranks together may take; by default those that are free.
+
+    Raises:
+        CaseError: there is not memory enough.
+    """
+    comm, setup = bodies[0].comm, bodies[0].punch.setup
+    free = free_on_ranks(comm) if free is None else free
+    wanted = chosen(wanted, setup, comm, free)
+    check_memory(wanted, setup, free)
+    for each in bodies:
+        for body, own in ((each.punch, wanted.punch), (each.strip, wanted.strip)):
+            if not own.made:
+                body.solver, body.holders = own.solver, own.holders
+    return wanted
+
+
+def chosen(wanted: Needs, setup: Setup, comm: MPI.Comm, free: float | None) -> Needs:
     """Return what the set-up needs with what solves for the columns of each body; collective.
 
     Args:
-        placed: The bodies; they take the choice over.
-        frames: As of `needs.needs`.
+        wanted: The same as the bodies are.
+        setup: What the case says of it.
+        comm: The ranks.
         free: Bytes that all ranks together may take; None where that is not known.
-        shared: Whether ranks share the rows of the contact.
     """
-    wanted = needs(placed, frames, shared=shared)
-    setup = placed.bodies.punch.setup
     if setup.way == "automatic" and not setup.reproducible:
         wanted = first_fitting(wanted, free)
-    ranks = placed.comm.size
+    ranks = comm.size
     if setup.way in ("automatic", "columns") and not setup.reproducible and ranks > 1:
         most = math.inf if free is None else max(free / ranks, SMALL)
         punch, strip = (_spread(body, most) for body in (wanted.punch, wanted.strip))
         wanted = replace(wanted, punch=punch, strip=strip)
-    return agreed(placed.comm, dealt(wanted, ranks, free))
+    return agreed(comm, dealt(wanted, ranks, free))
 
 
 def _spread(body: BodyNeeds, most: float) -> BodyNeeds:
     """Return the same with its factor over all ranks where one rank cannot have it in so many bytes, or it is large."""
     large = NUMBER * body.factor > SPREAD or NUMBER * WORKING * body.factor > most
-    return replace(body, solver="spread factor") if body.solver == "factor" and large and not body.together else body
+    free = body.solver == "factor" and not (body.together or body.made)
+    return replace(body, solver="spread factor") if large and free else body
 
 
 def dealt(wanted: Needs, ranks: int, free: float | None) -> Needs:
@@ -76,7 +98,8 @@ def dealt(wanted: Needs, ranks: int, free: float | None) -> Needs:
         name, longer = max((("punch", wanted.punch), ("strip", wanted.strip)), key=lambda one: one[1].on_holder)
         more = replace(longer, holders=longer.holders + 1)
         after = replace(wanted, punch=more) if name == "punch" else replace(wanted, strip=more)
-        if longer.solver != "factor" or more.on_holder > (1 - GAIN) * longer.on_holder or not fits(after, free):
+        fixed = longer.made or longer.solver != "factor"
+        if fixed or more.on_holder > (1 - GAIN) * longer.on_holder or not fits(after, free):
             break
         wanted = after
     return wanted
@@ -95,14 +118,14 @@ def first_fitting(wanted: Needs, free: float | None) -> Needs:
 def _less_and_less(wanted: Needs) -> Iterator[Needs]:
     """Yield the same with what takes less memory, first in the larger body, then in both."""
     for solver in SOLVERS[1:]:
-        punch, strip = (replace(one, solver=solver) for one in (wanted.punch, wanted.strip))
+        punch, strip = (one if one.made else replace(one, solver=solver) for one in (wanted.punch, wanted.strip))
         larger = wanted.punch.factor > wanted.strip.factor
         yield replace(wanted, punch=punch) if larger else replace(wanted, strip=strip)
         wanted = replace(wanted, punch=punch, strip=strip)
         yield wanted
 
 
-def check_memory(placed: Placed, wanted: Needs, free: float | None) -> None:
+def check_memory(wanted: Needs, setup: Setup, free: float | None) -> None:
     """Make sure that the set-up fits into the memory that is free.
 
     Raises:
@@ -110,7 +133,6 @@ def check_memory(placed: Placed, wanted: Needs, free: float | None) -> None:
     """
     if free is None or fits(wanted, free):
         return
-    setup = placed.bodies.punch.setup
     message = f"{wanted.text()}, but {memory_size(free)} are free"
     least = wanted
     for least in _less_and_less(wanted):
@@ -126,10 +148,3 @@ def check_memory(placed: Placed, wanted: Needs, free: float | None) -> None:
         times, less = found
         message += f"; elements {times:.2g} times as large would fit: {less.text()}"
     raise CaseError(InputError("geometry", message))
-
-
-def take(placed: Placed, wanted: Needs) -> None:
-    """Give the bodies what was chosen, of all phases."""
-    for bodies in {id(one): one for one in (placed.bodies, *placed.loaded)}.values():
-        for body, own in ((bodies.punch, wanted.punch), (bodies.strip, wanted.strip)):
-            body.solver, body.holders = own.solver, own.holders

@@ -11,13 +11,23 @@ from typing import Any
 
 import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem, jit, la
 from petsc4py import PETSc
 from scipy.sparse import bsr_array
 
 from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.parallel import lasting
+
+
+def compiled(form: Any) -> fem.Form:
+    """Return a form of UFL, compiled; collective.
+
+    Kept forms lie in many small folders: Python lists the one that it loads from at every look-up, which took longer
+    than to assemble where there were a thousand.
+    """
+    options = jit.get_options()
+    return fem.form(form, jit_options={"cache_dir": options["cache_dir"] / form.signature()[:2]})
 
 
 def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: bool = False) -> PETSc.Mat:
@@ -28,7 +38,7 @@ def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: b
         bcs: Their rows and columns get ones on the diagonal.
         first_column: Keep the first column of each block alone.
     """
-    form = form if isinstance(form, fem.Form) else fem.form(form)
+    form = form if isinstance(form, fem.Form) else compiled(form)
     if form.mesh.comm.size == 1 and not first_column:
         matrix = fem.petsc.assemble_matrix(form, bcs=list(bcs))
         matrix.assemble()
@@ -92,7 +102,7 @@ def assembled_vector(form: Any) -> Array:
     Args:
         form: Of UFL, or compiled.
     """
-    vector = fem.assemble_vector(form if isinstance(form, fem.Form) else fem.form(form))
+    vector = fem.assemble_vector(form if isinstance(form, fem.Form) else compiled(form))
     vector.scatter_reverse(la.InsertMode.add)
     owned = vector.index_map.size_local * vector.block_size
     return np.array(vector.array[:owned])

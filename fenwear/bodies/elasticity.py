@@ -18,7 +18,7 @@ from ufl.algorithms.check_arities import ArityMismatch
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled, assembled_vector
+from fenwear.bodies.assembly import assembled, assembled_vector, compiled
 from fenwear.bodies.contact_surface import contact_surface
 from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.low_rank import LowRank
@@ -97,7 +97,7 @@ class ElasticBody:
         a = ufl.inner(law.stress(u), strain_of(v, law.kind)) * measure(mesh, law.kind) * dx
         self._set_loads(description.loads)
         try:
-            self._ufl, self._form = a, fem.form(a)
+            self._ufl, self._form = a, compiled(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
         # None or one of each, of all bodies that differ by their loads.
@@ -166,6 +166,11 @@ class ElasticBody:
     def substructures(self) -> Substructures | None:
         """K as substructures, where they are made."""
         return next((one for one in self._substructures if one.is_made), None)
+
+    @property
+    def is_factored(self) -> bool:
+        """Whether what solves for its columns is made."""
+        return self.substructures is not None or any(factor.is_made for factor in self._factors)
 
     @cached_property
     def boundary(self) -> Boundary:
@@ -265,7 +270,7 @@ class ElasticBody:
         for number, load in enumerate(loads):
             tag = self.body.curve(load.on, f"{self.body.name}.loads.{number}.on")
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
-            facets = fem.form(measure(mesh, self.law.kind) * ds(tag))
+            facets = compiled(measure(mesh, self.law.kind) * ds(tag))
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
             resultant = load.force if load.traction is None else [area * component for component in load.traction]
             traction = np.array(resultant) / area

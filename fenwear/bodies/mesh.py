@@ -33,6 +33,7 @@ ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of
 TRIANGLE = 2  # gmsh's number of the cell
 MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, forces of three directions
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
+SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
 
 
 @dataclass(frozen=True)
@@ -209,6 +210,7 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind) -> None:
     for name, value in geometry.parameters.items():
         gmsh.parser.setNumber(name, [value])
     _check_parameters(geometry, path)
+    gmsh.option.setNumber(SCALING, 1.0)  # not of a geometry that was read before
     too_large = ""
     try:
         _merge(gmsh, path)
@@ -219,6 +221,9 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind) -> None:
             if not too_large:
                 gmsh.model.mesh.generate(_dim(kind))
                 gmsh.model.mesh.setOrder(geometry.order)
+                factor = gmsh.option.getNumber(SCALING)  # gmsh itself would apply it to files alone
+                gmsh.model.mesh.affineTransform([factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, factor, 0])
+                gmsh.option.setNumber(SCALING, 1.0)
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
     if too_large:

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled_vector, destroy
+from fenwear.bodies.assembly import assembled_vector, compiled, destroy
 from fenwear.bodies.contact_surface import Trace, contact_surface, contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import measure
@@ -69,7 +69,7 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, kind: Kind, held: Seq
     fixed = np.union1d(fixed, np.setdiff1d(np.concatenate([*pins, []]).astype(np.int32), contact)).astype(np.int32)
     zero = fem.Function(space)
     u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    a = fem.form(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
+    a = compiled(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
     bcs = [fem.dirichletbc(shift, contact), fem.dirichletbc(zero, fixed)]
     solution = _solve(a, bcs, space)
     before = _sizes(body)
@@ -92,7 +92,7 @@ def element_height(elastic: ElasticBody) -> Array:
     cells = fem.functionspace(mesh, ("DG", 0))
     ds = ufl.Measure("ds", domain=mesh, subdomain_data=body.facet_tags)(contact_tag(body))
     v = ufl.TestFunction(cells)
-    volume, area = (fem.assemble_vector(fem.form(v * over)).array for over in (ufl.dx(domain=mesh), ds))
+    volume, area = (fem.assemble_vector(compiled(v * over)).array for over in (ufl.dx(domain=mesh), ds))
     height = fem.Function(cells)
     height.x.array[:] = volume / np.maximum(area, 1e-300)
     surface = elastic.trace.surface
@@ -120,7 +120,7 @@ def _mean_normal(body: BodyMesh) -> Array:
     """Return the mean outward unit normal of the contact surface (d,); collective."""
     ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)
     tag, n, dim = contact_tag(body), ufl.FacetNormal(body.mesh), body.mesh.geometry.dim
-    parts = [body.mesh.comm.allreduce(fem.assemble_scalar(fem.form(n[i] * ds(tag)))) for i in range(dim)]
+    parts = [body.mesh.comm.allreduce(fem.assemble_scalar(compiled(n[i] * ds(tag)))) for i in range(dim)]
     normal = np.array(parts) / np.linalg.norm(parts)
     normal[np.abs(normal) < 1e-9] = 0.0
     return normal / np.linalg.norm(normal)

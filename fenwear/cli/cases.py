@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import fenwear
 from fenwear.case import Case, doubts
+from fenwear.cli import suggestions
 from fenwear.cli.base import (
     DEFAULT_CASE,
     CaseArgument,
@@ -128,7 +129,12 @@ def _check_stick(case: Case, bodies: Bodies | None = None) -> None:
 @app.command("new")
 def new_command(
     template: Annotated[
-        str | None, typer.Argument(metavar="TEST", help="Such as block-on-ring; without it all are listed.")
+        str | None,
+        typer.Argument(
+            metavar="TEST",
+            help="Such as block-on-ring; without it all are listed.",
+            autocompletion=suggestions.tests,
+        ),
     ] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The case file to write; by default TEST.toml.")

@@ -19,13 +19,20 @@ def keys(incomplete: str) -> list[str]:
 
 def settings(incomplete: str) -> list[str]:
     """Return the keys that begin so, each ready for its value."""
-    return sorted({f"{path}=" for path, table in _paths() if not table and path.startswith(incomplete)})
+    return sorted({f"{path}=" for path, value in _paths() if value and path.startswith(incomplete)})
+
+
+def tests(incomplete: str) -> list[str]:
+    """Return the usual tests that begin so."""
+    from fenwear.case.templates import template_names
+
+    return [name for name in template_names() if name.startswith(incomplete)]
 
 
 def _paths() -> Iterator[tuple[str, bool]]:
-    """Yield every path, for both bodies, and whether it is a table."""
+    """Yield every path, for both bodies, and whether it takes a value, as some tables do in place of their keys."""
     from fenwear.case.keys import all_keys
 
     for key in all_keys():
         for body in ("punch", "strip"):
-            yield key.path.replace("BODY", body), key.table
+            yield key.path.replace("BODY", body), not key.table or key.values.startswith("number")

@@ -37,14 +37,11 @@ class SpreadPhases:
         interfaces: Of each phase.
         ratios: tau of each phase (n, d), the traction of friction on the punch over the pressure.
         scale: Of the compliances.
-        team: The ranks, where they share more than this.
     """
 
-    def __init__(
-        self, interfaces: Sequence[Interface], ratios: Sequence[Array], scale: float, team: Team | None = None
-    ) -> None:
+    def __init__(self, interfaces: Sequence[Interface], ratios: Sequence[Array], scale: float) -> None:
         rows = interfaces[0].rows or Rows.equal(MPI.COMM_SELF, len(interfaces[0].pair.weights))
-        self.team, self._number = team or Team(rows.comm), len(interfaces)  # after those of each phase
+        self.team = Team.of(rows.comm)
         places = list({id(own.gap_by_force): own.gap_by_force for own in interfaces}.values())
         which = [np.flatnonzero([own.gap_by_force is place for own in interfaces]) for place in places]
         traction = [
@@ -52,23 +49,23 @@ class SpreadPhases:
             for own, ratio in zip(interfaces, ratios, strict=True)
         ]
         phases = PhaseRows(places, [np.array([traction[k] for k in one]) for one in which], which)
-        self.team.serve(self._number, OwnPhases(rows.own, phases))
+        self.own = self.team.serve(OwnPhases(rows.own, phases))
 
     def multiply(self, pressure: Array) -> Array:
         """Return what pressures open in all phases (m, n)."""
-        return np.concatenate(self.team.call(self._number, "multiply", pressure), axis=1)
+        return np.concatenate(self.team.call(self.own, "multiply", pressure), axis=1)
 
     def multiply_within(self, pressure: Array) -> Array:
         """Return the same among the prepared nodes (m, c)."""
-        return np.concatenate(self.team.call(self._number, "multiply_within", pressure), axis=1)
+        return np.concatenate(self.team.call(self.own, "multiply_within", pressure), axis=1)
 
     def prepare(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> bool:
         """Take the nodes that are solved for; return whether all runs can be eliminated: see `OwnPhases.prepare`."""
-        return all(self.team.call(self._number, "prepare", nodes, free, wear, held))
+        return all(self.team.call(self.own, "prepare", nodes, free, wear, held))
 
     def near(self, v: Array) -> Array:
         """Return the solution of all runs of the prepared nodes (m + 1, c, q)."""
-        return np.concatenate(self.team.call(self._number, "near", v), axis=1)
+        return np.concatenate(self.team.call(self.own, "near", v), axis=1)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from functools import partial
 from typing import Protocol, TypeVar
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
@@ -101,15 +102,20 @@ class CondensedContact:
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
     PETSc's absolute tolerances mean the same for every case. Phases meet in the layer only: where
     there are many, one small elimination for each of them takes the place of one of all. Where nodes are
-    many, no matrix of all of them is made: see `fenwear.contact.blocks`. Where ranks share the rows of the
-    interface, rank 0 leads: see `fenwear.contact.spread`.
+    many, no matrix of all of them is made: see `fenwear.contact.blocks`. On several ranks rank 0 solves it; where
+    they share the rows of the interface, all help: see `fenwear.contact.spread`.
 
     Attributes:
         blocks: Of the phases, where nodes are many.
     """
 
-    def __init__(self, phases: Sequence[SlidingContact], remedies: Remedies | None = None) -> None:
-        """Take the phases, and where to note that a contact was solved in another way than usual."""
+    def __init__(
+        self, phases: Sequence[SlidingContact], remedies: Remedies | None = None, team: Team | None = None
+    ) -> None:
+        """Take the phases, where to note that a contact was solved in another way than usual, and ranks that have it.
+
+        By default every rank has a contact of its own, unless they share its rows.
+        """
         self.phases = list(phases)
         self._remedies = remedies or Remedies()
         interface = phases[0].interface
@@ -122,8 +128,11 @@ class CondensedContact:
         self._rigid_scale = self._gap_scale / lengths
         self._resultant_scale = lengths * self._pressure_scale * rigid.pair.weights.sum()
         size = n + r
-        self._team = None if interface.rows is None else Team(interface.rows.comm)
-        self._many = n > MANY or self._team is not None
+        self._shared = interface.rows is not None
+        self._team = team or Team.of(MPI.COMM_SELF if interface.rows is None else interface.rows.comm)
+        if self._shared:
+            self._team.serve(self)
+        self._many = n > MANY or self._shared
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self.blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
@@ -153,18 +162,17 @@ class CondensedContact:
                 self._dense[k, :n, :n] = interface.compliance(ratio) * scale
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
-        if len(self.phases) > 1 and (n >= LARGE or self._team is not None):
-            interfaces = [phase.interface for phase in self.phases]
-            self._spread = SpreadPhases(interfaces, self._ratios, scale, self._team)
+        if len(self.phases) > 1 and (n >= LARGE or self._shared):
+            self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
         """Return the block of a phase of many nodes."""
         interface, ratio = self.phases[k].interface, self._ratios[k]
         make, diagonal = partial(_scaled_columns, interface, ratio, scale), interface.own_compliance(ratio) * scale
         alone, rows = len(self.phases) == 1, interface.rows
-        if rows is None or self._team is None:
+        if rows is None:
             return PhaseBlock(Columns(len(modes), make), diagonal, modes, balance, iterated=alone)
-        compliance = SpreadCompliance(self._team, k, OwnRows(rows, make))
+        compliance = SpreadCompliance(self._team, OwnRows(rows, make))
         if alone:
             return SpreadBlock(compliance, diagonal, modes, balance)
         return PhaseBlock(compliance, diagonal, modes, balance, iterated=False)
@@ -177,7 +185,14 @@ class CondensedContact:
             offset[n:] = factor * phase.interface.rigid.resultant / self._resultant_scale
 
     def slide(self, ratios: Sequence[Array]) -> None:
-        """Set tau of each phase, (n, d) each."""
+        """Set tau of each phase, (n, d) each; collective where ranks share the rows."""
+        if not self._shared:
+            self.take(ratios)
+            return
+        self._team.each(self, "take", self._team.lead(lambda: list(ratios)))
+
+    def take(self, ratios: Sequence[Array]) -> None:
+        """Set tau of each phase on this rank."""
         pairs = enumerate(zip(ratios, self._ratios, strict=True))
         changed = [k for k, (ratio, before) in pairs if ratio is not before and not np.array_equal(ratio, before)]
         self._ratios = list(ratios)
@@ -240,7 +255,7 @@ class CondensedContact:
         layer: Layer | None = None,
         coupling: Array | None = None,
     ) -> ContactState:
-        """Return the contact of all phases.
+        """Return the contact of all phases; collective.
 
         Args:
             gap: Gap of the undeformed bodies, initial gap and worn depth together, (n,) or (m, n), mm.
@@ -252,6 +267,11 @@ class CondensedContact:
         Raises:
             ConvergenceError: SNES did not converge.
         """
+        return self._team.lead(partial(self._solved, gap, start, layer, coupling))
+
+    def _solved(
+        self, gap: Array, start: ContactState | None, layer: Layer | None, coupling: Array | None
+    ) -> ContactState:
         m, n = self.shape
         # From the rigid motions of the start: they take up a worn depth that may be thousands of times what the bodies
         # give. What is left at the nodes in contact is as small as the elastic gap, and so is the residual's rounding.
@@ -261,10 +281,7 @@ class CondensedContact:
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._layer = layer
-        solve = partial(self._solve, start)
-        x, f, iterations, remedy = solve() if self._team is None else self._team.lead(solve)
-        if remedy:
-            self._remedies.note(remedy)
+        x, f, iterations = self._solve(start)
         x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale
         pressure[x[:, :n] <= ZERO] = 0.0
@@ -278,14 +295,10 @@ class CondensedContact:
 
     def on_closed_contact(self, use: Callable[[Solve], T]) -> T:
         """Return what `use` makes of the solution operator of (p, a) where all nodes touch, scaled; collective."""
+        return self._team.lead(lambda: use(self._linear.factor(np.arange(self.size, dtype=np.int32))))
 
-        def led() -> T:
-            return use(self._linear.factor(np.arange(self.size, dtype=np.int32)))
-
-        return led() if self._team is None else self._team.lead(led)
-
-    def _solve(self, start: ContactState | None) -> tuple[Array, Array, int, str]:
-        """Return the solution by the first way that finds it: unknowns, residual, iterations, and the remedy or ""."""
+    def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
+        """Return the solution by the first way that finds it: unknowns, residual and iterations."""
         failure: ConvergenceError | None = None
         for guess, line_search, name in self._ways(start):
             try:
@@ -293,7 +306,9 @@ class CondensedContact:
             except ConvergenceError as error:
                 failure = failure or error  # the usual way's says most
                 continue
-            return x, self.inequality.residual, self.inequality.iterations, "" if failure is None else name
+            if failure is not None:
+                self._remedies.note(name)
+            return x, self.inequality.residual, self.inequality.iterations
         raise failure or ConvergenceError(self.inequality.name)
 
     def _ways(self, start: ContactState | None) -> Iterator[tuple[Array, bool, str]]:

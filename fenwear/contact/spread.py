@@ -87,23 +87,21 @@ class SpreadCompliance:
 
     Args:
         team: The ranks.
-        number: Of this compliance among those of the team.
         own: This rank's rows.
     """
 
-    def __init__(self, team: Team, number: int, own: OwnRows) -> None:
-        self.team, self.number = team, number
-        team.serve(number, own)
+    def __init__(self, team: Team, own: OwnRows) -> None:
+        self.team, self.own = team, team.serve(own)
 
     def multiply(self, x: Array) -> Array:
         """Return S x (n,)."""
-        return np.concatenate(self.team.call(self.number, "multiply", x))
+        return np.concatenate(self.team.call(self.own, "multiply", x))
 
     def entries(self, rows: Indices, columns: Indices) -> Array:
         """Return the numbers of some rows and columns."""
         order = np.argsort(rows, kind="stable")
         found: Array = np.empty((len(rows), len(columns)))
-        found[order] = np.concatenate(self.team.call(self.number, "entries", rows[order], columns))
+        found[order] = np.concatenate(self.team.call(self.own, "entries", rows[order], columns))
         return found
 
 
@@ -141,11 +139,11 @@ class _Spread(Updating):
         n, count = block.nodes, int((kept < block.nodes).sum())
         nodes, modes = kept[:count], kept[count:] - np.int32(n)
         wear = self._wear[nodes]
-        if not all(spread.team.call(spread.number, "prepare", nodes, wear)):
+        if not all(spread.team.call(spread.own, "prepare", nodes, wear)):
             raise np.linalg.LinAlgError("singular matrix")
 
         def inner(v: Array) -> Array:
-            return np.concatenate(spread.team.call(spread.number, "near", v))
+            return np.concatenate(spread.team.call(spread.own, "near", v))
 
         opened, balance = block.modes[np.ix_(nodes, modes)], block.balance[np.ix_(modes, nodes)]
         followed = np.array([inner(mode) for mode in opened.T]).reshape(len(modes), count).T  # D^-1 H

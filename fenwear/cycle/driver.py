@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, Protocol
 
 from fenwear.assembly import Tribosystem
@@ -11,13 +13,14 @@ from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError, InterruptedRunError
-from fenwear.parallel import agreed
+from fenwear.parallel import Team
 from fenwear.sliding.wear import Worn
 
 BLOCK = 200  # half-cycles
 
 # Asked between solves, on all ranks together: true where the block is to end, InterruptedRunError where all is.
 Watch = Callable[[], bool]
+LOOK = 0.05  # s between two looks of all ranks while one leads
 
 
 # The factor of all loads after a number of half-cycles, which need not be whole.
@@ -32,6 +35,39 @@ def as_given(_half_cycles: float) -> float:
 def unwatched() -> bool:
     """Watch nothing."""
     return False
+
+
+class Watching:
+    """Has all ranks look together, now and then where one leads.
+
+    Args:
+        team: The ranks.
+        watch: Where they look.
+    """
+
+    def __init__(self, team: Team, watch: Watch) -> None:
+        self._team, self._watch, self._looked = team, watch, time.monotonic()
+        team.serve(self)
+
+    def __call__(self) -> bool:
+        """Look; return whether the block is to end.
+
+        Raises:
+            InterruptedRunError: all is to end.
+        """
+        if self._watch is unwatched:
+            return False
+        if not self._team.leads:
+            return self._watch()
+        if time.monotonic() < self._looked + LOOK:
+            return False
+        due = self._team.each(self, "look")
+        self._looked = time.monotonic()
+        return bool(due)
+
+    def look(self) -> bool:
+        """Look at once; collective."""
+        return self._watch()
 
 
 class HalfCycle(NamedTuple):
@@ -77,38 +113,70 @@ class Course:
 def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> Iterator[Block]:
     """Yield the half-cycles that the steps record, in blocks; collective.
 
-    A failure comes after all that was done before it: the block is yielded, then it is raised.
+    Rank 0 computes a block for all, wherever no step of it needs them. A failure comes after all that was done before
+    it: the block is yielded, then it is raised.
 
     Raises:
         ConvergenceError: a step, whose half-cycle it names, did not converge.
         InterruptedRunError: what watches has ended the run within a step.
     """
-    recorder = Recorder(system, course.block)
-    ends = sorted({stop for stop in course.stops if stop > state.half_cycle} | {course.half_cycles})
+    system.team.serve(system)
+    stretches = _Stretches(system, step, state.half_cycle, course)
     while state.half_cycle < course.half_cycles:
-        until = next(end for end in ends if end > state.half_cycle)
-        try:
-            after, recorded = step(state, until)
-        except (ConvergenceError, InterruptedRunError) as error:
-            if recorder:
-                yield recorder.take(state)
-            if isinstance(error, InterruptedRunError):
-                raise
-            raise type(error)(f"half-cycle {state.half_cycle + 1}: {error}") from error
-        periodic = state.periodic_phases
+        done = system.led(partial(stretches.next, state))
+        state = done.state
+        if done.block is not None:
+            yield done.block
+        if done.failure is not None:
+            raise done.failure
+        if done.finished:
+            return
+
+
+class _Stretch(NamedTuple):
+    """What was done: a block, the state at its end, whether all is, and the error that ended it."""
+
+    block: Block | None
+    state: RunState
+    finished: bool = False
+    failure: Exception | None = None
+
+
+class _Stretches:
+    """Goes on block by block."""
+
+    def __init__(self, system: Tribosystem, step: Step, begin: int, course: Course) -> None:
+        self.system, self.step, self.course = system, step, course
+        self._recorder = Recorder(system, course.block)
+        self._ends = sorted({stop for stop in course.stops if stop > begin} | {course.half_cycles})
+
+    def next(self, state: RunState) -> _Stretch:
+        """Return the next block."""
+        recorder, course = self._recorder, self.course
+        while True:
+            until = next(end for end in self._ends if end > state.half_cycle)
+            try:
+                after, recorded = self.step(state, until)
+            except (ConvergenceError, InterruptedRunError) as error:
+                failure: Exception = error
+                if isinstance(error, ConvergenceError):
+                    failure = type(error)(f"half-cycle {state.half_cycle + 1}: {error}")
+                    failure.__cause__ = error
+                return _Stretch(recorder.take(state) if recorder else None, state, failure=failure)
+            state = replace(after, periodic_phases=self._recorded(recorded, state.periodic_phases))
+            finished = state.periodic_phases >= self.system.motion.half_cycles or course.leave(state)
+            try:
+                due = course.watch()
+            except InterruptedRunError as error:
+                return _Stretch(recorder.take(state), state, failure=error)
+            if due or recorder.full or finished or state.half_cycle in self._ends:
+                return _Stretch(recorder.take(state), state, finished)
+
+    def _recorded(self, recorded: list[HalfCycle], periodic: int) -> int:
+        """Record half-cycles; return how many in a row have repeated, from those before them."""
+        recorder, limit, team = self._recorder, self.course.periodic_within, self.system.team
         for one in recorded:
             recorder.add(one.number, one.phases, one.worn, one.totals, one.heat, one.load)
-            limit = course.periodic_within
-            repeats = limit is not None and agreed(system.comm, recorder.change() < limit)
+            repeats = limit is not None and team.lead(lambda: recorder.change() < limit)
             periodic = periodic + 1 if repeats else 0
-        state = replace(after, periodic_phases=periodic)
-        finished = periodic >= system.motion.half_cycles or course.leave(state)
-        try:
-            due = course.watch()
-        except InterruptedRunError:
-            yield recorder.take(state)
-            raise
-        if due or recorder.full or finished or state.half_cycle in ends:
-            yield recorder.take(state)
-        if finished:
-            return
+        return periodic

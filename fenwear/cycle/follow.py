@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import dolfinx
 import numpy as np
@@ -20,12 +21,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, outwarmed, preparation, warmed_system
+from fenwear.assembly import Tribosystem, assemble, outwarmed, preparation, warmed_system, warming_key
 from fenwear.compat import interpolation_points
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
 from fenwear.heat.field import HeatState
-from fenwear.parallel import agreed
 
 # Runs a system from a state, or the beginning, and leaves at the first state for which it is told to.
 Integrate = Callable[[Tribosystem, RunState | None, Callable[[RunState], bool]], Iterator[Block]]
@@ -51,7 +51,7 @@ def follow(
     """
     state = start
     while True:
-        if state is not None and system.outworn(state.worn):  # a run may also go on from just there
+        if state is not None and _Leaving(system).is_worn(state):  # a run may also go on from just there
             warmed = None if state.temperature is None else state.temperature.temperatures()
             again = assemble(system.case, system.comm, state.worn, heat=preparation(system), warmed=warmed)
             moved = adapt(again)
@@ -60,14 +60,34 @@ def follow(
         elif state is not None and state.temperature is not None and _is_warm(system, state):
             system = adapt(warmed_system(system, state.temperature))
 
-        def leave(now: RunState, own: Tribosystem = system) -> bool:
-            return agreed(own.comm, own.outworn(now.worn)) or _is_warm(own, now)
-
+        leave = _Leaving(system)
         for block in integrate(system, state, leave):
             yield block
             state = block.end
         if state is None or not leave(state):
             return
+
+
+class _Leaving:
+    """Asks whether a run is to leave its system."""
+
+    def __init__(self, system: Tribosystem) -> None:
+        self.system = system
+        system.team.serve(self)
+        system.outworn(system.unworn())  # before rank 0 leads: the elements' heights take all ranks
+
+    def __call__(self, state: RunState) -> bool:
+        """Return whether wear or warmth is large; collective, or for rank 0 that leads."""
+        team = self.system.team
+        return self.is_worn(state) or (bool(warming_key(self.system)) and team.each(self, "is_warm", state))
+
+    def is_worn(self, state: RunState) -> bool:
+        """Return whether the meshes are to follow the wear; collective, or for rank 0 that leads."""
+        return self.system.team.lead(partial(self.system.outworn, state.worn))
+
+    def is_warm(self, state: RunState) -> bool:
+        """Return whether a whole cycle ends at temperatures for which properties are to be taken anew; collective."""
+        return _is_warm(self.system, state)
 
 
 def _is_warm(system: Tribosystem, state: RunState) -> bool:

@@ -8,15 +8,16 @@ the temperatures, see `fenwear.cycle.jump_error`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from fenwear.assembly import Tribosystem, property_change
 from fenwear.cycle.block import Block
-from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, as_given, drive, unwatched
+from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, Watching, as_given, drive, unwatched
 from fenwear.cycle.jump_error import ORDER
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, ConvergenceError, InputError
-from fenwear.parallel import agreed
+from fenwear.heat.field import HeatState
 from fenwear.remedies import SHORTER_JUMPS
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
@@ -57,10 +58,14 @@ def jump(
     if start is not None and start.half_cycle % strokes:
         message = f"jumps go on from a whole cycle only, got half-cycle {start.half_cycle}"
         raise CaseError(InputError("run.integration", message))
-    stepper = Stepper(system, tolerance, watch, loading)
+    watching = Watching(system.team, watch)
+    stepper = Stepper(system, tolerance, watching, loading)
+    heat, state = stepper.coupled.heat, start or stepper.beginning()
+    if heat is not None and state.temperature is not None:
+        state = replace(state, temperature=heat.exchange.own(state.temperature))  # before rank 0 leads
     whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
-    course = Course(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watch)
-    yield from drive(system, _Jumps(stepper, tolerance), start or stepper.beginning(), course)
+    course = Course(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watching)
+    yield from drive(stepper.system, _Jumps(stepper, tolerance), state, course)
 
 
 class _Jumps:
@@ -68,6 +73,11 @@ class _Jumps:
 
     def __init__(self, stepper: Stepper, tolerance: float) -> None:
         self.stepper, self.tolerance = stepper, tolerance
+        stepper.system.team.serve(self)
+
+    def change(self, temperature: HeatState | None) -> float:
+        """Return the largest change of a property at temperatures; collective."""
+        return property_change(self.stepper.system, temperature)
 
     def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next jump that is accurate enough, and its last cycle."""
@@ -84,9 +94,9 @@ class _Jumps:
                 stepper.system.remedies.note(SHORTER_JUMPS)
                 length = max(1, tried // 4)
                 continue
-            largest = agreed(stepper.system.comm, estimate.largest)  # the length of the next one is all ranks'
+            largest = estimate.largest
             factor = SAFETY * (tolerance / max(largest, 1e-300)) ** (1 / (ORDER + 1))
-            warmed = tried > 1 and property_change(stepper.system, end.temperature) > WARMED
+            warmed = tried > 1 and stepper.system.team.each(self, "change", end.temperature) > WARMED
             if (largest <= tolerance and not warmed) or tried == 1:
                 break
             # A half is half made already.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, with_reduced_heat
+from fenwear.assembly import Tribosystem
 from fenwear.cycle.state import RunState, present
 from fenwear.sliding.wear import Worn
 
@@ -78,8 +78,8 @@ def force_difference(system: Tribosystem, first: Array, second: Array) -> float:
 
 
 def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> float:
-    """Return the difference of the contact temperatures over their rise; 0 without heat."""
-    exchange = with_reduced_heat(system).exchange
+    """Return the difference of the reduced contact temperatures over their rise; 0 without heat."""
+    exchange = system.exchange
     if exchange is None or one.temperature is None or other.temperature is None:
         return 0.0
     first, second, initial = (

@@ -38,7 +38,7 @@ from functools import reduce
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, Passing
@@ -90,7 +90,8 @@ class Stepper:
     def __init__(
         self, system: Tribosystem, tolerance: float, watch: Watch = unwatched, loading: Loading = as_given
     ) -> None:
-        self.system, self.tolerance, self.watch, self.loading = system, tolerance, watch, loading
+        self.system = system = with_reduced_heat(system)
+        self.tolerance, self.watch, self.loading = tolerance, watch, loading
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear

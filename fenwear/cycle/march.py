@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import reduce
 
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block, HalfCycleHeat
-from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, as_given, drive, unwatched
+from fenwear.cycle.driver import BLOCK, Course, HalfCycle, Loading, Watch, Watching, as_given, drive, unwatched
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
 from fenwear.cycle.state import RunState, beginning
@@ -46,8 +47,11 @@ def march(
     """
     exchange = system.exchange
     state = start or beginning(system, None if exchange is None else exchange.initial())
-    course = Course(half_cycles, periodic_within, block, stops, leave, watch)
-    yield from drive(system, _HalfCycles(system, watch, loading, implicit=implicit), state, course)
+    if exchange is not None and state.temperature is not None:
+        state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads
+    watching = Watching(system.team, watch)
+    course = Course(half_cycles, periodic_within, block, stops, leave, watching)
+    yield from drive(system, _HalfCycles(system, watching, loading, implicit=implicit), state, course)
 
 
 class _HalfCycles:

@@ -16,7 +16,6 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.parallel import agreed
 from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -90,9 +89,9 @@ class PhaseStep:
             return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
         start = before
 
-        def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
+        def solve(x: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            pressure = agreed(self.system.comm, pressure)  # a shared contact is solved by all ranks, or by none
+            pressure = self.system.team.lead(lambda: x)
             wear = self._update(pressure, temperature, worn, half_cycles)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
@@ -106,12 +105,14 @@ class PhaseStep:
         contact, after, heat, wear = fixed_point(
             solve,
             mean if before is None else before.pressure[0],
-            lambda change, pressure: agreed(
-                self.system.comm, bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure))
-            ),
+            self._is_close,
             COEFFICIENTS_FAIL,
         )
         return self._end(contact, after, heat, before, wear)
+
+    def _is_close(self, change: Array, pressure: Array) -> bool:
+        scale = pressure_scale(self.system, pressure)
+        return self.system.team.lead(lambda: bool(np.abs(change).max() < CLOSE * scale))
 
     def _update(
         self, pressure: Array | None, temperature: HeatState | None, worn: Worn, half_cycles: float

@@ -33,6 +33,7 @@ class SmallerSteps:
     def __init__(self, system: Tribosystem, *, implicit: bool) -> None:
         self.system, self.implicit = system, implicit
         self._steps: dict[int, list[PhaseStep]] = {}
+        system.team.serve(self)
 
     def half_cycle(self, state: RunState, phases: range, error: ConvergenceError, load: float = 1.0) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle.
@@ -71,10 +72,14 @@ class SmallerSteps:
 
     def _prepared(self, parts: int) -> list[PhaseStep]:
         if parts not in self._steps:
-            system = in_parts(self.system, parts)
-            phases = range(len(system.motion.phases))
-            self._steps[parts] = [PhaseStep(system, phase, implicit=self.implicit) for phase in phases]
+            self.system.team.each(self, "prepare", parts)
         return self._steps[parts]
+
+    def prepare(self, parts: int) -> None:
+        """Make the steps; collective."""
+        system = in_parts(self.system, parts)
+        phases = range(len(system.motion.phases))
+        self._steps[parts] = [PhaseStep(system, phase, implicit=self.implicit) for phase in phases]
 
 
 def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, temperature: HeatState | None) -> PhaseEnd:

@@ -20,6 +20,7 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import PhasesWear
 
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
@@ -50,7 +51,7 @@ def stability_number(system: Tribosystem) -> float:
         opened = system.wear.phases([system.conditions(phase)], [phase]).slopes(uniform[phase : phase + 1])[0]
         if not opened.data.any():  # nothing wears
             continue
-        contact = CondensedContact([SlidingContact(interface, ratios[phase])])
+        contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
         worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
         largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
     return largest / 2
@@ -306,7 +307,7 @@ def _picked(heat: CycleHeat | None, n: int) -> Array:
 def _opened(wear: PhasesWear, slope: Array) -> Array:
     """Return the gap (n, n) that depths worn off punch and strip open, for each unit at a node `slope` (2, n)."""
     punch, strip = (
-        None if body is None else replace(body, rate=slope[k : k + 1], exponent=1.0)
+        None if body is None else replace(body, rate=slope[k : k + 1], law=PressureLaw())
         for k, body in enumerate((wear.punch, wear.strip))
     )
     if punch is None and strip is None:

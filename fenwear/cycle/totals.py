@@ -88,7 +88,7 @@ class PhaseMeter:
             weigh = np.array([areas, np.full(len(areas), np.nan) if density is None else MILLIGRAM * density * areas])
             if own is None:
                 self._rows[first + 1] = 0.0 * weigh[1]
-            elif own.linear:
+            elif own.law.linear:
                 self._rows[first : first + 2] = weigh * own.rate[0]
             else:
                 self._curved.append((slice(first, first + 2), weigh, own))

@@ -29,7 +29,7 @@ from petsc4py import PETSc
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled, assembled_vector, destroy, times, transposed_times
+from fenwear.bodies.assembly import assembled, assembled_vector, compiled, destroy, times, transposed_times
 from fenwear.bodies.contact_surface import contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import Factor, factored
@@ -284,8 +284,8 @@ class _Flow:
             means = assembled_vector(body._ds(through * ufl.TestFunction(self._constants), FREE))
             flow = comm.allreduce(float(np.abs(means).sum()))
         else:
-            flow = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(abs(through), FREE))))
-        along = comm.allreduce(fem.assemble_scalar(fem.form(body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))))
+            flow = comm.allreduce(fem.assemble_scalar(compiled(body._ds(abs(through), FREE))))
+        along = comm.allreduce(fem.assemble_scalar(compiled(body._ds(ufl.sqrt(ufl.dot(v, v)), FREE))))
         return bool(flow > 1e-9 * along)
 
     @cached_property
@@ -322,7 +322,7 @@ class _Flow:
         b = r * rho_c * rate * theta * (w + upwind) * dx
         f = r * faces * ambient * (w + upwind) * dx
         f += body._ds((edges * ambient + entering * body.inflow) * w, FREE)
-        a_form, b_form, f_form, brought = (fem.form(form) for form in (a, b, f, body._ds(entering * w, FREE)))
+        a_form, b_form, f_form, brought = (compiled(form) for form in (a, b, f, body._ds(entering * w, FREE)))
         return _StepForms(a_form, b_form, f_form, brought, rate, speed, renewed)
 
     def _supg_time(self, rate: Any, v: Any) -> Any:

@@ -13,9 +13,10 @@ dense system for the 2 n fluxes, whatever nodes conduct: nothing is factored aga
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.linalg
@@ -24,11 +25,14 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.case import Heat
 from fenwear.errors import HeatError
+from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Basis, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
 from fenwear.heat.side import Side, StepPlan
 from fenwear.heat.step_map import PreparedStep, StepMap
+from fenwear.parallel import Team
 
+T = TypeVar("T")
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
@@ -84,6 +88,23 @@ class HeatExchange:
             side.field.contact_responses or [side.contact.of_changes(r) for r in side.field.responses] for side in sides
         ]
         self._forget()
+        for basis in self.bases:
+            self.team.serve(basis)
+        # Known before rank 0 leads: where temperatures are reduced, that takes all ranks.
+        self._initial = self.own(HeatState.nodal(*self._unheated())) if self.reduced else None
+
+    @property
+    def team(self) -> Team:
+        """The ranks, of which one leads."""
+        return Team.of(self.bases[0].body.body.mesh.comm)
+
+    def _led(self, function: Callable[[], T]) -> T:
+        """Call what is the same on all ranks: on rank 0 for all, unless every rank could go on alone."""
+        return function() if self.reduced else self.team.lead(function)
+
+    def _unheated(self) -> tuple[tuple[HeatBody, HeatBody], list[Array]]:
+        bodies = (self.bases[0].body, self.bases[1].body)
+        return bodies, [body.initial() for body in bodies]
 
     def _forget(self) -> None:
         """Begin without any fluxes, which follow from friction's partition and the conductances."""
@@ -115,9 +136,8 @@ class HeatExchange:
         return self.sides[0].field.basis, self.sides[1].field.basis
 
     def initial(self) -> HeatState:
-        """Return the initial state; collective."""
-        bodies = (self.bases[0].body, self.bases[1].body)
-        return self.own(HeatState.nodal(bodies, [body.initial() for body in bodies]))
+        """Return the initial state."""
+        return self._initial or self.own(HeatState.nodal(*self._unheated()))
 
     def own(self, state: HeatState) -> HeatState:
         """Return the state on this exchange's bases; collective where it is on others."""
@@ -181,7 +201,7 @@ class HeatExchange:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
         values, terms, ends = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
-        self._check_bounds(*ends.stored, terms[0] - terms[1])
+        self._led(partial(self._check_bounds, *ends.stored, terms[0] - terms[1]))
         return HeatState(self.bases, values, surfaces=ends.surfaces), terms * self.thickness
 
     def change(
@@ -259,7 +279,9 @@ class HeatExchange:
             for side, part in zip(self.sides, free, strict=True)
         ]
         ambient = self.heat.ambient if sources else 0.0
-        fluxes = np.split(self._flux_map(kinds, conductance).of(np.concatenate(bare), heat, ambient), 2)
+        fluxes = self._led(
+            lambda: np.split(self._flux_map(kinds, conductance).of(np.concatenate(bare), heat, ambient), 2)
+        )
         if further is not None:
             fluxes = [q + part for q, part in zip(fluxes, np.split(further, 2), strict=True)]
         ends = [

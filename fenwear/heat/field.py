@@ -20,7 +20,7 @@ from scipy.sparse import csc_array, csr_array
 
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody, HeatStep
-from fenwear.parallel import total
+from fenwear.parallel import Team, total
 
 CHUNK = 256  # right-hand sides at once
 
@@ -46,6 +46,14 @@ class Basis:
     def coordinates(self, temperature: Array) -> Array:
         """Return the coordinates of a temperature (owned,), or of the nearest there is; collective."""
         return temperature
+
+    def translated(self, other: Basis, coordinates: Array) -> Array:
+        """Return the coordinates of what has these on another basis; collective, or for rank 0 that leads."""
+        return Team.of(self.body.body.mesh.comm).each(self, "from_other", other, coordinates)  # type: ignore[no-any-return]
+
+    def from_other(self, other: Basis, coordinates: Array) -> Array:
+        """Return the same; collective."""
+        return self.coordinates(other.temperature(coordinates))
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +145,11 @@ class HeatState:
         return punch, strip
 
     def on(self, bases: tuple[Basis, Basis]) -> HeatState:
-        """Return the same temperatures, or the nearest there are, on other bases; collective."""
+        """Return the same temperatures, or the nearest there are, on other bases; collective, or while one leads."""
         if all(one is other for one, other in zip(self.bases, bases, strict=True)):
             return self
-        parts = [basis.coordinates(t) for basis, t in zip(bases, self.temperatures(), strict=True)]
+        own = np.split(self.values, [len(self.bases[0])])
+        parts = [to.translated(old, part) for to, old, part in zip(bases, self.bases, own, strict=True)]
         if isinstance(bases[1], TrackBasis) and self.bulk is not None:
             parts[1][-1] = self.bulk - bases[1].reference
         return HeatState(bases, np.concatenate(parts), self.bulk)

@@ -24,13 +24,14 @@ from fenwear.assembly import Tribosystem
 from fenwear.cycle.coupled import cycle_heat
 from fenwear.errors import ConvergenceError
 from fenwear.life.model import Snapshot, steady_snapshot
+from fenwear.sliding.pressure_law import PressureLaw
 
 
 def differentiable(system: Tribosystem) -> bool:
     """Return whether the equations above are all there is: constant coefficients and conductances."""
     heat = system.heat
     laws = [law for law in system.sliding.wear if law is not None]
-    if any(law.pressure_threshold > 0 or law.pressure_cap is not None for law in laws):
+    if not all(PressureLaw.of(law).power for law in laws):
         return False
     return system.constant_coefficients and (heat is None or heat.conductance_per_pressure is None)
 

@@ -15,7 +15,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.report.compare_stick import has_stick, stick_comparison
 from fenwear.report.compare_surfaces import surface_comparison
 from fenwear.report.course import directions_present, mark_few
-from fenwear.report.figures import read_history
+from fenwear.report.figures import of_half_cycles
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.shapes import worn_range
 from fenwear.report.style import (
@@ -30,7 +30,7 @@ from fenwear.report.style import (
 from fenwear.report.surface import model_of
 from fenwear.results.degrees import in_kelvin
 from fenwear.results.disk import writing
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 from fenwear.results.sheet import BODIES, LINES, shown
 
 if TYPE_CHECKING:
@@ -168,10 +168,8 @@ def _read(directory: Path) -> xarray.Dataset:
     Raises:
         CaseError: there is none, or it holds nothing yet.
     """
-    with open_history(directory) as history:
-        if has_stick(history) and history.sizes["cycle"]:
-            return history.load()
-    return read_history(directory)
+    history = load_history(directory)
+    return history if has_stick(history) and history.sizes["cycle"] else of_half_cycles(directory, history)
 
 
 def comparison_figure(comparison: Comparison) -> Figure:

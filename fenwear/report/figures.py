@@ -42,7 +42,15 @@ def read_history(directory: Path) -> xarray.Dataset:
     Raises:
         CaseError: there is none, it cannot be read, or holds no half-cycle yet.
     """
-    history = load_history(directory)
+    return of_half_cycles(directory, load_history(directory))
+
+
+def of_half_cycles(directory: Path, history: xarray.Dataset) -> xarray.Dataset:
+    """Return the history of a run if it is one of half-cycles.
+
+    Raises:
+        CaseError: it is none, or holds no half-cycle yet.
+    """
     if not {"half_cycle", "pressure", "wear"} <= set(history.variables):
         raise CaseError(InputError(str(directory / HISTORY), "no history of a run: it has other variables"))
     if history.sizes["half_cycle"] == 0:

@@ -19,7 +19,7 @@ import xarray
 from fenwear.errors import CaseError, InputError
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import HISTORY
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 
 FOLDER = "export"
 COURSE, LOOPS = "history.csv", "loops.csv"
@@ -47,16 +47,16 @@ def export(directory: Path, folder: Path | None = None, at: str = "first,last") 
         CaseError: there is no readable history, or a half-cycle was not kept.
         OutputError: a file cannot be written.
     """
-    with open_history(directory) as history:
-        record = _record(directory / HISTORY, history)
-        rows = _chosen(history, record, at)
-        tables = {COURSE: _course(history, record)}
-        if STEPS in history.sizes:
-            tables[LOOPS] = _loops(history, record, rows)
-        for name, dimensions in SURFACES.items():
-            for dimension in dimensions:
-                if dimension in history.sizes:
-                    tables[name] = _profile(history, record, dimension, rows)
+    history = load_history(directory)
+    record = _record(directory / HISTORY, history)
+    rows = _chosen(history, record, at)
+    tables = {COURSE: _course(history, record)}
+    if STEPS in history.sizes:
+        tables[LOOPS] = _loops(history, record, rows)
+    for name, dimensions in SURFACES.items():
+        for dimension in dimensions:
+            if dimension in history.sizes:
+                tables[name] = _profile(history, record, dimension, rows)
     target = directory / FOLDER if folder is None else folder
     with writing(target):
         target.mkdir(parents=True, exist_ok=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import h5netcdf
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -254,7 +255,7 @@ class HistoryWriter:
     def _cut(self, half_cycle: int) -> None:
         """Drop what a killed run wrote after its last checkpoint."""
         try:
-            with h5netcdf.File(self.path, "r") as file:
+            with h5py.File(self.path, "r") as file:
                 stored = file["half_cycle"][:]
                 if "max_temperature" in file:  # a run goes on in the degrees that it began with
                     self._degrees = degrees_in(str(file["max_temperature"].attrs["units"]))
@@ -304,7 +305,7 @@ class HistoryWriter:
             self._twin.unlink(missing_ok=True)
 
     def _stored_tail(self) -> set[int]:
-        with writing(self.path), h5netcdf.File(self.path, "r") as file:
+        with writing(self.path), h5py.File(self.path, "r") as file:
             return {int(n) for n in file["half_cycle"][max(0, self.rows - self._phases) :]}
 
     def flush(self) -> None:
@@ -329,26 +330,29 @@ class HistoryWriter:
 
     def _write(self, values: dict[str, NDArray[Any]]) -> None:
         count = self.rows + len(values["half_cycle"])
-        with h5netcdf.File(self.path, "r") as stored, self._open_twin(count) as twin:
-            twin.resize_dimension("half_cycle", count)
+        with h5py.File(self.path, "r") as stored, self._open_twin(count) as twin:
             for name in self._variables:
+                twin[name].resize(count, axis=0)
                 twin[name][self._twin_rows : self.rows] = stored[name][self._twin_rows : self.rows]
                 twin[name][self.rows : count] = values[name]
         self._twin_rows, self.rows = self.rows, count
         self._change_places()
 
-    def _open_twin(self, rows: int) -> h5netcdf.File:
-        """Open the twin, with room for so many rows in all."""
+    def _open_twin(self, rows: int) -> h5py.File:
+        """Open the twin, with room for so many rows in all.
+
+        Straight from HDF5: h5netcdf asks every variable for the size of a dimension that grows, at each turn.
+        """
         if not self._twin.exists():
             self._copy()
         claim(self._twin, self._bytes(rows - self._twin_rows))
         try:
-            return h5netcdf.File(self._twin, "a")
+            return h5py.File(self._twin, "r+")
         except OSError:  # locked: someone still reads what was history.nc before the last write
             self._twin.unlink()
             self._copy()
             claim(self._twin, self._bytes(rows - self._twin_rows))
-            return h5netcdf.File(self._twin, "a")
+            return h5py.File(self._twin, "r+")
 
     def _copy(self) -> None:
         begin = time.monotonic()

@@ -17,19 +17,6 @@ INNER = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "
 NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
 
 
-def open_history(directory: Path) -> xarray.Dataset:
-    """Open history.nc of a run.
-
-    Raises:
-        CaseError: there is none, or it cannot be read.
-    """
-    path = directory / HISTORY
-    try:
-        return xarray.open_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise _unreadable(path, error) from None
-
-
 def load_history(directory: Path) -> xarray.Dataset:
     """Return all of history.nc of a run, in memory.
 

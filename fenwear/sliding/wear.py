@@ -19,6 +19,7 @@ from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
 from fenwear.interface import ContactPair
 from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.pressure_law import PressureLaw
 
 
 @dataclass(frozen=True)
@@ -46,42 +47,18 @@ class Worn:
 
 @dataclass(frozen=True)
 class _BodyWear:
-    """What a body loses in each phase: rate q^b, q = min(p, cap) - threshold >= 0, rate = beta~ S (m, n), mm/MPa^b.
-
-    `beyond` is the share of the pressure beyond the cap that adds to q: 0 but on the way to a solution.
-    """
+    """What a body loses in each phase: rate = beta~ S (m, n), mm/MPa^b, times what of the pressure wears."""
 
     rate: Array
-    exponent: float
-    threshold: float = 0.0
-    cap: float = np.inf
-    beyond: float = 0.0
-
-    @property
-    def linear(self) -> bool:
-        """Whether depths are the rate times the pressure."""
-        return self.exponent == 1 and self.threshold == 0 and self.cap == np.inf
+    law: PressureLaw
 
     def depth(self, pressure: Array) -> Array:
         """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes."""
-        if self.linear:
-            return self.rate * pressure
-        return self.rate * np.maximum(self._felt(pressure) - self.threshold, 0.0) ** self.exponent
-
-    def _felt(self, pressure: Array) -> Array:
-        """Return min(p, cap), and a share of what is beyond."""
-        below = np.minimum(pressure, self.cap)
-        return below + self.beyond * (pressure - below) if self.beyond else below
+        return self.rate * self.law.value(pressure)
 
     def slope(self, pressure: Array) -> Array:
         """Return their derivatives to the pressures (m, n), mm/MPa."""
-        if self.linear:
-            return np.broadcast_to(self.rate, pressure.shape)
-        floor = 1e-9 * max(float(pressure.max()), 1e-300)  # b < 1: the slope at p = 0 is infinite
-        above = np.maximum(self._felt(pressure) - self.threshold, floor)
-        wears = np.where((pressure >= self.threshold) | (self.threshold == 0), 1.0, 0.0)
-        wears = np.where(pressure <= self.cap, wears, self.beyond)
-        return wears * self.rate * self.exponent * above ** (self.exponent - 1)
+        return self.rate * self.law.slope(pressure)
 
 
 @dataclass(frozen=True)
@@ -100,11 +77,14 @@ class PhasesWear:
     @property
     def cap(self) -> float:
         """The lowest pressure beyond which the wear of a body grows no more, MPa; infinite without."""
-        return min((body.cap for body in (self.punch, self.strip) if body is not None), default=np.inf)
+        return min((body.law.cap for body in (self.punch, self.strip) if body is not None), default=np.inf)
 
     def softened(self, share: float) -> PhasesWear:
         """Return the same where a share of the pressure beyond a cap wears, too: 1 is without cap, 0 with it."""
-        punch, strip = (None if one is None else replace(one, beyond=share) for one in (self.punch, self.strip))
+        punch, strip = (
+            None if one is None else replace(one, law=replace(one.law, beyond=share))
+            for one in (self.punch, self.strip)
+        )
         return replace(self, punch=punch, strip=strip)
 
     def some(self, phases: Sequence[int]) -> PhasesWear:
@@ -251,8 +231,7 @@ class Wear:
                 sliding[k] * coefficient(law, self.friction, state, key)
                 for k, state in zip(chosen, conditions, strict=True)
             ]
-            cap = np.inf if law.pressure_cap is None else law.pressure_cap
-            bodies.append(_BodyWear(np.array(rates), law.pressure_exponent, law.pressure_threshold, cap))
+            bodies.append(_BodyWear(np.array(rates), PressureLaw.of(law)))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 

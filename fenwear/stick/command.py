@@ -6,15 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.assembly import Bodies
+from fenwear.assembly import Bodies, body_lines
 from fenwear.case import Case
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import fine_enough
+from fenwear.stick.interface import meshed
 from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
+from fenwear.watch.size import size_warnings
 
 
 def check_text(case: Case, bodies: Bodies | None = None) -> str:
@@ -29,8 +31,12 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
         ConvergenceError: a time step did not converge.
     """
     rig = make_rig(case, bodies=bodies)
+    both = meshed(rig.interface)
+    setup = "\n".join((both.needs.text(), *body_lines(both.bodies, both.needs)))
     check_touching(rig)
     rig, fineness = fine_enough(rig, case)
+    interface = meshed(rig.interface)
+    sizes = size_warnings(case, interface.bodies, interface.middle.rigid)
     records = Records.joined(rig.cycle(rig.beginning())[1])
     thick, weights = case.model.thickness, rig.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
@@ -38,12 +44,14 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
     regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
     if stuck == closed:
         regime = "full stick"
+    warnings = (*sizes, fineness.text(), unique_text(records.unique.astype(bool)))
     return (
+        f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
         f"first cycle: {regime}, "
         f"tangential force up to {thick * np.abs(records.force).max():.4g} N, of the contact "
         f"{100 * stuck / closed:.0f} % stick all through, work of friction {thick * records.energy(weights):.4g} mJ"
-        + "".join(f"\nwarning: {text}" for text in (fineness.text(), unique_text(records.unique.astype(bool))) if text)
+        + "".join(f"\nwarning: {text}" for text in warnings if text)
     )
 
 

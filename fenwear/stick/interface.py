@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Bodies, Sliding
+from fenwear.assembly import Bodies, Needs, Sliding, body_needs, settle
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
 from fenwear.bodies.response import Request
 from fenwear.case import Case
@@ -154,6 +154,9 @@ class StickInterface(OppositeBodies):
         keep: Whether the condensed bodies are kept on disk, and taken from there where they are.
         fresh: Condense them whatever is kept.
         full: Whether each time step is solved on all displacements, nothing condensed.
+
+    Raises:
+        CaseError: there is not memory enough.
     """
 
     def __init__(
@@ -175,11 +178,26 @@ class StickInterface(OppositeBodies):
         if bodies.followed is None:
             check_distance(middle)
         onto = _identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
+        self.needs = settle([bodies], self._needs(len(middle.weights), onto.shape[1]))
         wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
         self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float, Loaded] = {}
         self._whole: dict[int, WholeBodies] = {}  # of positions, which stay
+
+    def _needs(self, nodes: int, on_strip: int) -> Needs:
+        """Return what condensing both along all axes takes, with C of each position and Newton's matrix; collective.
+
+        Args:
+            nodes: Of the contact.
+            on_strip: What the strip is condensed onto.
+        """
+        d, both = self.dim, self.bodies
+        positions = 1 + (self.case.stick.steps if self.moves and self.case is not None else 0)
+        punch, strip = (
+            body_needs(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
+        )
+        return Needs(punch, strip, nodes, positions * d, d**2, both.comm.size)
 
     @cached_property
     def bulk(self) -> Array:

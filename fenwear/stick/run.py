@@ -27,6 +27,7 @@ from fenwear.stick.results import dataset, row_of, summary_of
 from fenwear.stick.setup import reaches_border
 from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
+from fenwear.watch.size import size_warnings
 
 
 def run_stick(
@@ -123,7 +124,9 @@ class _Run:
             raise type(failure or ConvergenceError())(none) from failure
         self._save()
         several = [text for text in (unique_text(np.array(self.unique, dtype=bool)),) if text]
-        warnings = [*doubts(self.case), *_warnings(self.rig, self.last, fineness), *several]
+        interface = meshed(self.rig.interface)
+        sizes = size_warnings(self.case, interface.bodies, interface.middle.rigid)
+        warnings = [*sizes, *doubts(self.case), *_warnings(self.rig, self.last, fineness), *several]
         for warning in warnings:
             self.log(f"warning: {warning}")
         found = {**how, "cycles_seconds": time.perf_counter() - begin, "warnings": warnings}

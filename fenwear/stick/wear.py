@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,35 +11,29 @@ from fenwear.case import Dependence, WearLaw
 from fenwear.errors import CaseError, InputError
 from fenwear.interface import ContactPair
 from fenwear.sliding.friction import ContactConditions, Friction
+from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import coefficient
 
 
 @dataclass(frozen=True)
 class BodyRate:
-    """The wear law of a body: beta~ at the nodes (n,), b and a; the pressures below and above which nothing changes."""
+    """The wear law of a body: beta~ at the nodes (n,), what of the pressure wears, and a."""
 
     rate: Array
-    pressure_exponent: float
-    speed_exponent: float
-    threshold: float = 0.0
-    cap: float = np.inf
-
-    def effective(self, pressure: Array) -> Array:
-        """Return what of the pressure (n,) wears, MPa."""
-        return np.clip(pressure, self.threshold, self.cap) - self.threshold
+    law: PressureLaw = field(default_factory=PressureLaw)
+    speed_exponent: float = 1.0
 
     def depth(self, pressure: Array, slid: Array, duration: float) -> Array:
         """Return the depth worn off (n,), mm, by pressure (n,) and slip (n,) in a time."""
-        slide = slid if self.speed_exponent == 1 else slid**self.speed_exponent * duration ** (1 - self.speed_exponent)
-        return self.rate * self.effective(pressure) ** self.pressure_exponent * slide
+        return self.rate * self.law.value(np.maximum(pressure, 0.0)) * self._slide(slid, duration)
 
     def slope(self, pressure: Array, slid: Array, duration: float) -> Array:
         """Return the derivative of the depth to the pressure (n,), mm/MPa."""
-        b = self.pressure_exponent
-        slide = slid if self.speed_exponent == 1 else slid**self.speed_exponent * duration ** (1 - self.speed_exponent)
-        floor = 1e-9 * max(float(pressure.max(initial=0.0)), 1e-300)
-        changes = (pressure >= self.threshold) & (pressure <= self.cap)
-        return self.rate * b * np.maximum(self.effective(pressure), floor) ** (b - 1) * slide * changes
+        return self.rate * self.law.slope(np.maximum(pressure, 0.0)) * self._slide(slid, duration) * (pressure >= 0)
+
+    def _slide(self, slid: Array, duration: float) -> Array:
+        a = self.speed_exponent
+        return slid if a == 1 else slid**a * duration ** (1 - a)
 
 
 @dataclass(frozen=True)
@@ -75,12 +69,6 @@ def local_wear(
         found.append(
             None
             if law is None
-            else BodyRate(
-                coefficient(law, friction, state, key),
-                law.pressure_exponent,
-                law.speed_exponent,
-                law.pressure_threshold,
-                np.inf if law.pressure_cap is None else law.pressure_cap,
-            )
+            else BodyRate(coefficient(law, friction, state, key), PressureLaw.of(law), law.speed_exponent)
         )
     return LocalWear(found[0], found[1])

@@ -15,6 +15,7 @@ import xarray
 from fenwear.errors import CaseError, InputError
 from fenwear.results.disk import check_room, claim, writing
 from fenwear.results.history import HISTORY, next_write
+from fenwear.results.reading import load
 
 CYCLE = "cycle"
 
@@ -85,7 +86,7 @@ class CycleWriter:
             self._last = None
         self.flush()
         with writing(self.path):
-            return xarray.open_dataset(self.path, engine="h5netcdf")
+            return load(self.path)
 
     def flush(self) -> None:
         """Write what has gathered.

@@ -13,7 +13,7 @@ import ufl
 from dolfinx import fem
 
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled_vector
+from fenwear.bodies.assembly import assembled_vector, compiled
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.verify.suite import Line, Plot
 
@@ -41,7 +41,7 @@ def errors(function: fem.Function, exact: Exact) -> tuple[float, float]:
     """Return the L2 norms of the error of a field and of its gradient; collective."""
     error = function - _richer(function, exact)
     mesh = function.function_space.mesh
-    forms = (fem.form(ufl.inner(e, e) * ufl.dx(domain=mesh)) for e in (error, ufl.grad(error)))
+    forms = (compiled(ufl.inner(e, e) * ufl.dx(domain=mesh)) for e in (error, ufl.grad(error)))
     squares = [mesh.comm.allreduce(fem.assemble_scalar(form)) for form in forms]
     return math.sqrt(squares[0]), math.sqrt(squares[1])
 

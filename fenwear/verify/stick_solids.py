@@ -314,5 +314,5 @@ def sphere_wear_end() -> Result:
 
 def _rig(sphere: Sphere, amplitude: float, rate: float) -> Rig:
     n = len(sphere.weights)
-    wear = LocalWear(BodyRate(np.full(n, rate), 1.0, 1.0), None)
+    wear = LocalWear(BodyRate(np.full(n, rate)), None)
     return Rig(sphere.bodies, to_and_fro(amplitude, 10), wear, np.full(n, FRICTION))

@@ -13,6 +13,7 @@ from fenwear.cycle import Block, Steady
 from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import ContactEnds, contact_ends, opened
 from fenwear.watch.rim import ContactRim, contact_rim
+from fenwear.watch.size import size_warnings
 from fenwear.watch.stroke import stroke_warnings
 from fenwear.watch.thickness import thickness, worn_through
 
@@ -156,13 +157,15 @@ def initial_warnings(system: Tribosystem) -> list[str]:
     if limits is not None and where:
         needed = limits.width_needed(0.0, float(weights @ pressure))
         texts.append(clipped_text(limits, where, needed, system.case))
-    return [*(text for text in texts if text), *stroke_warnings(system)]
+    told = size_warnings(system.case, system.bodies, system.rigid)
+    return [*told, *(text for text in texts if text), *stroke_warnings(system)]
 
 
 def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
     """Return what is to be said of a cyclic steady state; collective."""
     weights, limits = system.pair.weights, contact_limits(system)
-    texts = [pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max()))]
+    texts = size_warnings(system.case, system.bodies, system.rigid)
+    texts.append(pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max())))
     if state.heat is not None:
         texts.append(hot(float(max(state.heat.punch.max(), state.heat.strip.max())), "in the cyclic steady state"))
     where = "" if limits is None else limits.where((state.phase_pressure > 0).any(axis=0) | (state.wear_per_cycle > 0))

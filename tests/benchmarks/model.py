@@ -5,7 +5,8 @@ python3 tests/benchmarks/model.py
 Counted: each rank's unknowns and boundary, as the meshes were really parted; the operations of its elimination and
 of the joints; the bytes of the messages and of what each rank keeps. Rates come from one rank: of the sparse
 elimination, of meshes and assembly from the smallest case, of dense algebra and of copies by themselves. All other
-rows follow from counts. What is said of 64 ranks is computed, nothing of it was run.
+rows follow from counts. Solids, of whose columns each holder of a factor solves a share, follow from the estimates that
+`check` tells, times how fast this core is. What is said of 64 ranks is computed, nothing of it was run.
 """
 
 from __future__ import annotations
@@ -14,17 +15,21 @@ import json
 import math
 import os
 import resource
-import subprocess
 import sys
+import tempfile
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import scipy.linalg
+import setup
 
+from fenwear.assembly.needs import ASSEMBLING, BodyNeeds, Needs
+from fenwear.assembly.ways import dealt
 from fenwear.bodies.factor import entries, operations
 
-SMALL, LARGE = (32, 0.2), (64, 0.1)  # elements along the contact, growth of the element size
+SMALL, LARGE = ("plane", "32", "0.2"), ("plane", "64", "0.1")  # elements along the contact, growth of their size
+SOLIDS = (8, 16)  # elements over the width of a solid contact
 PRODUCTS = 60  # iterations of a wear step of 10,000 nodes that all touch, measured on two ranks
 NETWORK, LATENCY = 10e9, 2e-6  # bytes a second and s a message between nodes, assumed
 EDGE_ENTRIES, EDGE_WORK = 1 / (1 - math.sqrt(0.5)), 2.0  # over a dissection's levels: only fronts at the edge have it
@@ -132,6 +137,70 @@ def predicted(counts: dict, rates: Rates, *, within: bool = True) -> tuple[float
     return seconds, memory
 
 
+def measure_solid(elements: str) -> None:
+    """Set a solid up once, and print what it took and what was estimated, as JSON."""
+    from mpi4py import MPI
+    from solids import describe
+
+    from fenwear import assemble
+    from fenwear.assembly import elastic, needs_of, place_case
+
+    comm = MPI.COMM_WORLD
+    assemble(describe(4))
+    base = comm.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+    begin = time.process_time()
+    placed = place_case(describe(int(elements)))
+    wanted = needs_of(placed)
+    elastic(placed)
+    spent = comm.allgather(time.process_time() - begin)
+    memory = comm.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+    if comm.rank == 0:
+        found = {"needs": asdict(wanted), "seconds": max(spent), "memory": sum(memory), "base": sum(base)}
+        print(json.dumps(found))
+
+
+def needs_in(found: dict) -> Needs:
+    """Return the needs that a run of its own has printed."""
+    own = found["needs"]
+    return Needs(**{**own, "punch": BodyNeeds(**own["punch"]), "strip": BodyNeeds(**own["strip"])})
+
+
+def estimated(wanted: Needs, ranks: int) -> float:
+    """Return the s of the rank that works most: its share of meshes and assembly, its factor, its columns."""
+    bodies = (wanted.punch, wanted.strip)
+    own = [body.on_holder for body in bodies]
+    shared = sum(ASSEMBLING[body.dim] * body.unknowns for body in bodies) / ranks
+    return shared + (max(own) if ranks > 1 else sum(own))
+
+
+def solids() -> None:
+    """Print measured solids beside what is estimated, and what the estimate says of more ranks."""
+    first = run(("solid", str(SOLIDS[0]), ""), 1)
+    speed = first["seconds"] / estimated(needs_in(first), 1)
+    print(f"\nSolids; this core takes {speed:.2f} times the time of the estimates")
+    print("| unknowns | nodes | ranks | holders | CPU s, measured | told | ratio | GiB, measured | told | ratio |")
+    print("| ---: | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: |")
+    for size in SOLIDS:
+        for ranks in (1, 2, 3, 4):
+            found = run(("solid", str(size), ""), ranks)
+            wanted = needs_in(found)
+            seconds, memory = speed * estimated(wanted, ranks), found["base"] + wanted.memory
+            both = f"{wanted.punch.holders} and {wanted.strip.holders}"
+            print(f"| {wanted.punch.unknowns + wanted.strip.unknowns:,} | {wanted.nodes:,} | {ranks} | {both} "
+                  f"| {found['seconds']:.2f} | {seconds:.2f} | {found['seconds'] / seconds:.2f} "
+                  f"| {found['memory'] / GIB:.2f} | {memory / GIB:.2f} | {found['memory'] / memory:.2f} |",
+                  flush=True)  # fmt: skip
+    bodies = [BodyNeeds(3, n, 150 * n, 2401, 2401, 0.0, 7203) for n in (151_000.0, 165_000.0)]
+    print("\nComputed, not run: 316,000 unknowns and 2,401 contact nodes of a solid")
+    print("| ranks | holders | s | GiB of all |")
+    print("| ---: | --- | ---: | ---: |")
+    for ranks in (1, 2, 4, 8, 16, 64):
+        wanted = dealt(Needs(*bodies, 2401, 1, 2, ranks), ranks, None)
+        seconds = speed * estimated(wanted, ranks)
+        print(f"| {ranks} | {wanted.punch.holders} and {wanted.strip.holders} | {seconds:,.0f} "
+              f"| {wanted.memory / GIB:,.1f} |")  # fmt: skip
+
+
 def measure(elements: str, growth: str) -> None:
     """Set up once, and print what it took and what was counted, as JSON."""
     from mpi4py import MPI
@@ -168,12 +237,10 @@ def measure(elements: str, growth: str) -> None:
         print(json.dumps({"counts": counts, "seconds": seconds, "memory": sum(memory), "base": sum(base)}))
 
 
-def run(size: tuple[float, float], ranks: int) -> dict:
+def run(size: tuple[str, str, str], ranks: int) -> dict:
     """Return what a run of its own measured."""
-    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, __file__, *map(str, size)]
     environment = {**os.environ, "HWLOC_HIDE_ERRORS": "2", "OMP_NUM_THREADS": "1", "FENWEAR_KEPT_GIB": "0"}
-    done = subprocess.run(command, check=True, env=environment, capture_output=True, text=True)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
+    return setup.run(ranks, *size, environment, __file__)
 
 
 def rates() -> Rates:
@@ -266,6 +333,13 @@ def solid(rate: Rates) -> None:
 
 def main() -> None:
     """Print the tables."""
+    with tempfile.TemporaryDirectory() as folder:
+        setup.sleeping(folder)
+        tables()
+
+
+def tables() -> None:
+    """Print the tables."""
     rate = rates()
     print(f"one core: {rate.dense / 1e9:.1f} thousand million operations a second, {1e9 * rate.sparse:.0f} ns for each "
           f"entry of a factor, {1e6 * rate.meshing:.1f} µs of meshes for each unknown, copies of "
@@ -287,7 +361,11 @@ def main() -> None:
     print("| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
     computed(rate)
     solid(rate)
+    solids()
 
 
 if __name__ == "__main__":
-    measure(*sys.argv[1:]) if len(sys.argv) == 3 else main()
+    if sys.argv[1:2] == ["--measure"]:
+        measure_solid(sys.argv[3]) if sys.argv[2] == "solid" else measure(*sys.argv[3:])
+    else:
+        main()

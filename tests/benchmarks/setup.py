@@ -22,7 +22,10 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fenwear import Case
 
 SLEEP = """
 #include <time.h>
@@ -46,15 +49,9 @@ def measure(kind: str, elements: str, growth: str) -> None:
     import gmsh  # noqa: F401  (half a second on the first rank)
     from mpi4py import MPI
 
-    from fenwear import assemble, load_case
+    from fenwear import assemble
 
-    if kind == "solid":
-        from solids import describe
-
-        case = describe(int(elements))
-    else:
-        changes = {"elements_along_contact": elements, "growth": growth}
-        case = load_case("example1", [f"geometry.parameters.{name}={value}" for name, value in changes.items()])
+    case = case_of(kind, elements, growth)
     comm, profile = MPI.COMM_WORLD, cProfile.Profile(time.process_time)
     comm.Barrier()
     begin, spent_before = time.perf_counter(), time.process_time()
@@ -68,6 +65,18 @@ def measure(kind: str, elements: str, growth: str) -> None:
         spent = {name: [of_rank[name] for of_rank, _ in found] for name in names}
         result = {"unknowns": system.bodies.unknowns, "nodes": len(system.pair.weights), "seconds": seconds}
         print(json.dumps({**result, "phases": spent, "memory": [memory for _, memory in found]}))
+
+
+def case_of(kind: str, elements: str, growth: str) -> Case:
+    """Return Example 1 with so many elements along the contact, or a solid pin with so many over its width."""
+    from solids import describe
+
+    from fenwear import load_case
+
+    if kind == "solid":
+        return describe(int(elements))
+    changes = {"elements_along_contact": elements, "growth": growth}
+    return load_case("example1", [f"geometry.parameters.{name}={value}" for name, value in changes.items()])
 
 
 def phases(profile: cProfile.Profile, whole: float) -> dict[str, float]:
@@ -103,14 +112,25 @@ def table(kind: str, elements: str, growth: str) -> None:
     print(f"second start: {sum(map(sum, kept['phases'].values())):.2f} s after the imports")
 
 
-def run(ranks: int, kind: str, elements: str, growth: str, environment: dict[str, str]) -> dict[str, Any]:
+def run(
+    ranks: int, kind: str, elements: str, growth: str, environment: dict[str, str], script: str = __file__
+) -> dict[str, Any]:
     """Return what a process, or several, measured."""
     start = ["mpirun", "--oversubscribe", "--mca", "mpi_yield_when_idle", "1", "-n", str(ranks)]
     if "SLEEP" in environment:
         start += ["-x", f"LD_PRELOAD={environment['SLEEP']}"]
-    command = [*start, sys.executable, __file__, "--measure", kind, elements, growth]
+    command = [*start, sys.executable, script, "--measure", kind, elements, growth]
     done = subprocess.run(command, check=True, env=environment, stdout=subprocess.PIPE, text=True)
     return dict(json.loads(done.stdout))
+
+
+def sleeping(folder: str) -> None:
+    """Have ranks sleep while they wait, by a library in this folder, where there is a compiler."""
+    library, compiler = Path(folder, "sleep.so"), shutil.which("cc")
+    if compiler is not None:
+        command = [compiler, "-shared", "-fPIC", "-x", "c", "-", "-o", str(library)]
+        subprocess.run(command, input=SLEEP, text=True, check=True)
+        os.environ["SLEEP"] = str(library)
 
 
 def main() -> None:
@@ -121,11 +141,7 @@ def main() -> None:
     given = sys.argv[2:] if solid else sys.argv[1:]
     with tempfile.TemporaryDirectory() as folder:
         os.environ["XDG_CACHE_HOME"] = folder
-        library, compiler = Path(folder, "sleep.so"), shutil.which("cc")
-        if compiler is not None:
-            command = [compiler, "-shared", "-fPIC", "-x", "c", "-", "-o", str(library)]
-            subprocess.run(command, input=SLEEP, text=True, check=True)
-            os.environ["SLEEP"] = str(library)
+        sleeping(folder)
         return table("solid", (given or ["24"])[0], "") if solid else table("plane", *(given or ["124", "0.05"]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,6 +39,39 @@ def test_contract() -> None:
                "strip_free": 1080, "strip_bottom": 1140, "strip_ends": 200}  # fmt: skip
     for name, length in lengths.items():
         assert integral(punch if name in punch.curves else strip, curve=name) == pytest.approx(length, rel=1e-12)
+
+
+def test_scaling_factor_of_a_geometry(tmp_path: Path) -> None:
+    """It scales all lengths, points and what is written, too; not the geometry that is read next."""
+    text = (meshes_folder() / READY).read_text("utf-8")
+    (tmp_path / "own.geo").write_text(f"{text}\nMesh.ScalingFactor = 0.5;\n", "utf-8")
+    own = Geometry(file="own.geo", parameters=SMALL)
+    write_msh(own, tmp_path, tmp_path / "own.msh")
+    for geometry in (own, Geometry(file="own.msh")):
+        punch, _ = build_meshes(geometry, tmp_path, MPI.COMM_SELF)
+        assert integral(punch) == pytest.approx(0.25 * 60 * 100, rel=1e-12)
+        assert punch.points["punch_pin"].tolist() == [[15, 60]]
+    assert integral(build()[0]) == pytest.approx(60 * 100, rel=1e-12)
+
+
+@pytest.mark.parametrize("file", sorted(meshes_folder().glob("*.geo")), ids=lambda file: file.stem)
+def test_every_ready_geometry(file: Path) -> None:
+    """Parameters, one a line; groups of the two bodies and no others, each with a region and a contact."""
+    import gmsh
+
+    assert re.search(r"^DefineConstant\[\n( +\w+ = [^,\n]+,?( +// .*)?\n)+\];$", file.read_text("utf-8"), re.MULTILINE)
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(file))
+        dim = gmsh.model.getDimension()
+        groups = {gmsh.model.getPhysicalName(*group): group[0] for group in gmsh.model.getPhysicalGroups()}
+    finally:
+        gmsh.finalize()
+    assert all(name.startswith(("punch_", "strip_")) for name in groups)
+    for body in ("punch", "strip"):
+        assert groups[f"{body}_contact"] == dim - 1
+        assert dim in [groups[name] for name in groups if name.startswith(body)]
 
 
 def integral(body: BodyMesh, region: str | None = None, curve: str | None = None) -> float:

@@ -132,11 +132,12 @@ class Part:
 @pytest.mark.mpi
 def test_one_leads() -> None:
     """Rank 0 asks all; what it returns or raises all do, and what another rank raises, too."""
-    team = Team(COMM)
-    team.serve(3, Part())
-    assert team.lead(lambda: [team.call(3, "give", k) for k in (1, 2)]) == [
+    team = Team.of(COMM)
+    part = team.serve(Part())
+    assert team.lead(lambda: [team.call(part, "give", k) for k in (1, 2)]) == [
         [k * rank for rank in range(COMM.size)] for k in (1, 2)
     ]
     with pytest.raises(ConvergenceError, match="not here"):
-        team.lead(lambda: team.call(3, "give", -1))
+        team.lead(lambda: team.call(part, "give", -1))
+    assert team.lead(lambda: part) is part
     assert team.lead(lambda: COMM.rank) == 0

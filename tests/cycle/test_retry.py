@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from fenwear import ConvergenceError, Tribosystem, jump, march
 from fenwear.contact import CondensedContact, ContactState
@@ -71,7 +72,7 @@ def test_half_cycles_in_parts(
     assert usual.retries.max() == 0
     strokes = failing(system)
     retried = run(system, 8, implicit=implicit)
-    half_cycles = len(strokes)  # a stroke fails at each of its phases, in turn
+    half_cycles = MPI.COMM_WORLD.bcast(len(strokes))  # a stroke fails at each of its phases, in turn
     assert half_cycles == len(system.motion.phases)
     assert retried.retries.sum() == half_cycles
     parts = 5 * system.motion.positions

@@ -29,7 +29,7 @@ from fenwear.report.figures import (
 from fenwear.report.sections import element_edges
 from fenwear.report.shapes import profile_figure, wear_map_figure
 from fenwear.report.style import COLOURS, Look, shades
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
 SHOWN = {"shape", "profiles", "wear_map", "pressure", "peaks", "volume", "scar", "friction", "convergence"}
@@ -252,10 +252,10 @@ def test_one_half_cycle(history: xarray.Dataset) -> None:
 def test_no_history(tmp_path: Path) -> None:
     """A folder without results, with a broken file or no half-cycle yet, is refused by its path."""
     with pytest.raises(CaseError, match=r"history.nc: no readable history"):
-        open_history(tmp_path)
+        load_history(tmp_path)
     (tmp_path / "history.nc").write_text("no NetCDF")
     with pytest.raises(CaseError, match=r"history.nc: no readable history"):
-        open_history(tmp_path)
+        load_history(tmp_path)
     xarray.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "history.nc", engine="h5netcdf")
     with pytest.raises(CaseError, match=r"history.nc: no history of a run"):
         read_history(tmp_path)

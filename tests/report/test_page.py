@@ -114,6 +114,7 @@ def test_warnings_and_a_run_without_end(folder: Path, evil: str, tmp_path: Path)
     assert "Figures" in parsed.texts["h2"]
 
 
+@pytest.mark.parametrize("folder", ["example1"], indirect=True)
 def test_images_of_an_earlier_run_are_left_out(folder: Path, tmp_path: Path) -> None:
     """A picture older than the results shows something else."""
     copy = shutil.copytree(folder, tmp_path / "copy")

@@ -15,6 +15,8 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear.results.reading import load_history
+
 Run = Callable[..., Any]
 SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.steps=2")
 
@@ -24,8 +26,7 @@ def options(*settings: str) -> list[str]:
 
 
 def history(folder: Path) -> xarray.Dataset:
-    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as opened:
-        return opened.load()
+    return load_history(folder)
 
 
 def check_equal(resumed: Path, whole: Path) -> None:
@@ -51,7 +52,6 @@ def test_resumed_equals_whole(fenwear: Run, tmp_path: Path, integration: str, op
     check_equal(tmp_path / "resumed", tmp_path / "whole")
 
 
-@pytest.mark.ranks
 def test_another_number_of_ranks(fenwear: Run, tmp_path: Path) -> None:
     """A run on two ranks goes on on one: the same scalars as a run on one, to 1e-9."""
     for ranks, count, extra in ((2, 20, ()), (1, 50, ("--resume",))):

@@ -15,7 +15,7 @@ import xarray
 from fenwear import CaseError, load_case
 from fenwear.errors import OutputError
 from fenwear.results.export import export
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
 BARE = ("output.fields_at=[]", "output.report=false")
@@ -64,12 +64,12 @@ def test_course_is_the_history(folders: Callable[[str], Path], name: str, tmp_pa
     paths = export(folders(name), tmp_path / "new" / "tables")
     assert all(path.is_file() for path in paths)
     found = read(tmp_path / "new" / "tables" / "history.csv")
-    with open_history(folders(name)) as history:
-        record = "cycle" if name == "fretting-partial-slip" else "half_cycle"
-        series = [record, *(v for v in history.data_vars if history[v].dims == (record,))]
-        assert list(found) == [headed(history, str(v)) for v in series]
-        for variable in series:
-            np.testing.assert_array_equal(numbers(found[headed(history, str(variable))]), history[variable].values)
+    history = load_history(folders(name))
+    record = "cycle" if name == "fretting-partial-slip" else "half_cycle"
+    series = [record, *(v for v in history.data_vars if history[v].dims == (record,))]
+    assert list(found) == [headed(history, str(v)) for v in series]
+    for variable in series:
+        np.testing.assert_array_equal(numbers(found[headed(history, str(variable))]), history[variable].values)
     assert {"contact_width (mm)", "contact_area (mm2)"} & set(found)
 
 
@@ -77,42 +77,42 @@ def test_course_is_the_history(folders: Callable[[str], Path], name: str, tmp_pa
 def test_profiles_are_the_history(folders: Callable[[str], Path], name: str, tmp_path: Path) -> None:
     """Places and every variable along a surface, of the chosen half-cycles alone, each once and in their order."""
     export(folders(name), tmp_path, "last, 1,001,last")
-    with open_history(folders(name)) as history:
-        last = int(history.half_cycle[-1])
-        for end in ("", "_strip"):
-            path = tmp_path / f"profile_{'strip' if end else 'punch'}.csv"
-            assert path.exists() == (f"wear{end}" in history)
-            if not path.exists():
-                continue
-            found, over = read(path), history[f"wear{end}"].dims[1]
-            for place in (v for v in history.variables if history[v].dims == (over,)):
-                np.testing.assert_array_equal(numbers(found[headed(history, str(place))]), history[place].values)
-            fields = [str(v) for v in history.data_vars if history[v].dims == ("half_cycle", over)]
-            assert f"wear{end}" in fields
-            assert end or {"pressure", "gap"} <= set(fields)
-            assert ("temperature_strip" in fields) == (name == "example1-heat")
-            for n in (1, last):
-                for variable in fields:
-                    column = numbers(found[headed(history, variable, f" at half-cycle {n}")])
-                    np.testing.assert_array_equal(column, history[variable].sel(half_cycle=n).values)
-            assert [h for h in found if h.startswith(f"wear{end} at")] == [
-                f"wear{end} at half-cycle {n} (mm)" for n in (1, last)
-            ]
+    history = load_history(folders(name))
+    last = int(history.half_cycle[-1])
+    for end in ("", "_strip"):
+        path = tmp_path / f"profile_{'strip' if end else 'punch'}.csv"
+        assert path.exists() == (f"wear{end}" in history)
+        if not path.exists():
+            continue
+        found, over = read(path), history[f"wear{end}"].dims[1]
+        for place in (v for v in history.variables if history[v].dims == (over,)):
+            np.testing.assert_array_equal(numbers(found[headed(history, str(place))]), history[place].values)
+        fields = [str(v) for v in history.data_vars if history[v].dims == ("half_cycle", over)]
+        assert f"wear{end}" in fields
+        assert end or {"pressure", "gap"} <= set(fields)
+        assert ("temperature_strip" in fields) == (name == "example1-heat")
+        for n in (1, last):
+            for variable in fields:
+                column = numbers(found[headed(history, variable, f" at half-cycle {n}")])
+                np.testing.assert_array_equal(column, history[variable].sel(half_cycle=n).values)
+        assert [h for h in found if h.startswith(f"wear{end} at")] == [
+            f"wear{end} at half-cycle {n} (mm)" for n in (1, last)
+        ]
 
 
 def test_worn_surfaces_part(folders: Callable[[str], Path], tmp_path: Path) -> None:
     """Wear raises the lower surface of the punch and lowers the strip; what is missing is the worn area."""
     folder = folders("fretting")
     export(folder, tmp_path)
-    with open_history(folder) as history:
-        last = int(history.half_cycle[-1])
-        for body, end, sign in (("punch", "", 1), ("strip", "_strip", -1)):
-            found = read(tmp_path / f"profile_{body}.csv")
-            worn = numbers(found[f"worn_height{end} at half-cycle {last} (mm)"]) - numbers(found[f"height{end} (mm)"])
-            assert (sign * worn).max() > 0
-            assert (sign * worn).min() >= 0
-            area = history[f"weight{end}"].sel(half_cycle=last).values @ (sign * worn)
-            assert area == pytest.approx(float(history[f"total_area{end}"][-1]), rel=1e-3)
+    history = load_history(folder)
+    last = int(history.half_cycle[-1])
+    for body, end, sign in (("punch", "", 1), ("strip", "_strip", -1)):
+        found = read(tmp_path / f"profile_{body}.csv")
+        worn = numbers(found[f"worn_height{end} at half-cycle {last} (mm)"]) - numbers(found[f"height{end} (mm)"])
+        assert (sign * worn).max() > 0
+        assert (sign * worn).min() >= 0
+        area = history[f"weight{end}"].sel(half_cycle=last).values @ (sign * worn)
+        assert area == pytest.approx(float(history[f"total_area{end}"][-1]), rel=1e-3)
 
 
 def test_loops_of_partial_slip(folders: Callable[[str], Path], tmp_path: Path) -> None:
@@ -120,12 +120,12 @@ def test_loops_of_partial_slip(folders: Callable[[str], Path], tmp_path: Path) -
     folder = folders("fretting-partial-slip")
     export(folder, tmp_path, "last")
     found = read(tmp_path / "loops.csv")
-    with open_history(folder) as history:
-        force, way = (numbers(found[f"{v}"]) for v in ("tangential_force (N)", "displacement (mm)"))
-        np.testing.assert_array_equal(force, history.tangential_force[-1].values)
-        np.testing.assert_array_equal(way, history.displacement[-1].values)
-        np.testing.assert_array_equal(numbers(found["cycle"]), float(history.cycle[-1]))
-        assert "fraction" in found
+    history = load_history(folder)
+    force, way = (numbers(found[f"{v}"]) for v in ("tangential_force (N)", "displacement (mm)"))
+    np.testing.assert_array_equal(force, history.tangential_force[-1].values)
+    np.testing.assert_array_equal(way, history.displacement[-1].values)
+    np.testing.assert_array_equal(numbers(found["cycle"]), float(history.cycle[-1]))
+    assert "fraction" in found
 
 
 def test_what_is_not_there(folders: Callable[[str], Path], tmp_path: Path) -> None:
@@ -164,7 +164,6 @@ def test_what_is_no_history(tmp_path: Path) -> None:
             export(tmp_path / name)
 
 
-@pytest.mark.ranks
 def test_command(folders: Callable[[str], Path], fenwear: Callable[..., Any], tmp_path: Path) -> None:
     """On two ranks: the names of the files once on standard output; a wrong folder ends with status 2."""
     run = tmp_path / "run"

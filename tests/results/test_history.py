@@ -13,7 +13,7 @@ import xarray
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
 from fenwear.report.course import mean_pressure, nominal_width
 from fenwear.results.history import free_directory, make_directory
-from fenwear.results.reading import open_history
+from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")
@@ -24,8 +24,7 @@ def save(folder: Path, *settings: str, name: str = "example1") -> tuple[xarray.D
     case = load_case(name, [*SMALL, NO_REPORT, *settings])
     summary, directory = run_case(case, "test", folder, lambda message: None)
     assert directory == folder
-    with open_history(folder) as history:
-        return history.load(), summary
+    return load_history(folder), summary
 
 
 @pytest.mark.parametrize("integration", ["explicit", "implicit", "jump"])
@@ -89,8 +88,8 @@ def test_summary_and_case(tmp_path: Path) -> None:
     assert summary["largest_equilibrium_error"] < 1e-8  # type: ignore[operator]
     again = load_case(tmp_path / "run" / "case.toml")
     _, folder = run_case(again, "again", tmp_path / "again", lambda message: None)
-    with open_history(folder) as repeated:
-        np.testing.assert_array_equal(repeated.pressure, history.pressure)
+    repeated = load_history(folder)
+    np.testing.assert_array_equal(repeated.pressure, history.pressure)
 
 
 def test_weights_follow_the_meshes(tmp_path: Path) -> None:
@@ -104,8 +103,7 @@ def test_weights_follow_the_meshes(tmp_path: Path) -> None:
         *("contact.friction=0", "run.half_cycles=300", "run.jump_tolerance=0.2", "motion.positions=3", NO_REPORT),
     )
     _, folder = run_case(load_case("fretting", settings), "test", tmp_path / "run", lambda message: None)
-    with open_history(folder) as history:
-        history.load()
+    history = load_history(folder)
     followed = np.flatnonzero((np.diff(history.weight_strip, axis=0) != 0).any(axis=1)) + 1
     assert len(followed)
     x, (points, shares) = history.x_strip.values, np.polynomial.legendre.leggauss(8)
@@ -159,8 +157,8 @@ def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypa
     with pytest.raises(ConvergenceError, match="DIVERGED_ON_PURPOSE") as failed:
         run_case(case, "test", tmp_path / "run", lambda message: None)
     assert f"half-cycle 400 are in {tmp_path / 'run'}" in str(failed.value)
-    with open_history(tmp_path / "run") as history:
-        assert history.half_cycle[-1] == 400
+    history = load_history(tmp_path / "run")
+    assert history.half_cycle[-1] == 400
     assert "DIVERGED_ON_PURPOSE" in json.loads((tmp_path / "run" / "summary.json").read_text())["stop"]
     assert (tmp_path / "run" / "figures" / "shape.png").is_file()
 

@@ -13,6 +13,7 @@ import xarray
 
 from fenwear import Tribosystem, jump, load_case, march
 from fenwear.cycle import Block, follow
+from fenwear.results.reading import load_history
 from fenwear.results.sheet import sheet, sheet_text, values, variables
 from fenwear.run import run_case
 
@@ -169,8 +170,7 @@ def run(folder: Path, *settings: str, name: str = "example1", resume: bool = Fal
         name, [*SMALL, f"wear.punch.coefficient={K}", "output.report=false", "output.fields_at=[]", *settings]
     )
     summary, _ = run_case(case, "test", folder, lambda message: None, resume=resume)
-    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
-        return history.load(), summary
+    return load_history(folder), summary
 
 
 def test_half_cycles_that_are_not_kept_and_a_restart(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import fenwear.run
 from fenwear import ConvergenceError, load_case
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.errors import InterruptedRunError
+from fenwear.results.reading import load_history
 from fenwear.results.scar import EDGE
 from fenwear.run import run_case
 
@@ -36,8 +37,7 @@ def run(folder: Path, name: str, *settings: str, resume: bool = False) -> tuple[
 
 
 def history(folder: Path) -> xarray.Dataset:
-    with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as opened:
-        return opened.load()
+    return load_history(folder)
 
 
 def area_of_facets(data: xarray.Dataset, end: str = "") -> np.ndarray:
@@ -167,7 +167,6 @@ def test_retried_half_cycles(tmp_path: Path, name: str, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize("name", ["pin-on-disc", "brake-pad"])
-@pytest.mark.ranks
 def test_two_ranks(fenwear: Callable[..., Any], tmp_path: Path, name: str) -> None:
     """Two ranks write the same history as one, to 1e-9 of the largest value of each variable."""
     settings = (*SETTINGS[name], "run.half_cycles=6")

@@ -19,6 +19,7 @@ from fenwear.errors import InterruptedRunError
 from fenwear.report.compare import compare, comparison_figure
 from fenwear.report.page import write_report
 from fenwear.report.stick import key_numbers_text
+from fenwear.results.reading import load_history
 from fenwear.run import run_case
 from fenwear.stick.results import Row, row_of
 
@@ -86,7 +87,7 @@ def test_gross_sliding_is_told(tmp_path: Path) -> None:
 def run(folder: Path, settings: list[str], *, resume: bool = False) -> xarray.Dataset:
     case = load_case("fretting-partial-slip", [*SMALL, "output.report=false", *settings])
     run_case(case, "fretting", folder, lambda _: None, progress="none", resume=resume)
-    return xarray.load_dataset(folder / "history.nc", engine="h5netcdf")
+    return load_history(folder)
 
 
 def interrupted_after(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
@@ -115,7 +116,7 @@ def test_interrupted_and_resumed_equals_whole(tmp_path: Path, monkeypatch: pytes
         interrupted_after(patched, 3)
         with pytest.raises(InterruptedRunError, match="to go on: --resume"):
             run(tmp_path / "parts", how)
-    so_far = xarray.load_dataset(tmp_path / "parts" / "history.nc", engine="h5netcdf")
+    so_far = load_history(tmp_path / "parts")
     assert 3 <= len(so_far.cycle) < len(whole.cycle)
     stop = json.loads((tmp_path / "parts" / "summary.json").read_text("utf-8"))["stop"]
     assert stop == "interrupted"

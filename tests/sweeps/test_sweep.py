@@ -188,7 +188,6 @@ def test_pictures() -> None:
     assert [label.get_text() for label in words.axes[0].get_xticklabels()] == ["stress", "strain"]
 
 
-@pytest.mark.ranks
 def test_command_on_processes_and_ranks(fenwear: Callable[..., Any], tmp_path: Path) -> None:
     """The command writes the same numbers by local processes and on two ranks; 3 where a variant failed."""
     words = [word for setting in SMALL for word in ("--set", setting)]

@@ -150,13 +150,11 @@ def test_refusals(fenwear: Run, tmp_path: Path) -> None:
     assert full.stdout == ""
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.ranks
-def test_ranks(fenwear: Run, tmp_path: Path, ranks: int) -> None:
-    """Verification 18 on two and three ranks: compared with each rank on its own; said and written once."""
-    done = fenwear("verify", "--only", "ranks", "-o", tmp_path / "v", ranks=ranks)
+def test_ranks(fenwear: Run, tmp_path: Path) -> None:
+    """Verification 18 on two ranks: compared with each rank on its own; said and written once."""
+    done = fenwear("verify", "--only", "ranks", "-o", tmp_path / "v", ranks=2)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("ranks: Ranks") == 1
     found = json.loads((tmp_path / "v" / "verification.json").read_text())
-    assert found["ranks"] == ranks
+    assert found["ranks"] == 2
     assert [case["verdict"] for case in found["cases"]] == ["agrees"]

@@ -115,7 +115,7 @@ class _Unknowns:
         )
 
 
-def _touching(pressure: NDArray[Any]) -> Array:
+def touching(pressure: NDArray[Any]) -> Array:
     """Return pressures with zeros where they are none but for `CLOSE`.
 
     A combination of pressures tends to nothing at a node that opens and never gets there: the node would conduct on.
@@ -179,7 +179,7 @@ class Coupled:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
         try:
-            return self._solve(temperature, cycles, start, solve, passing, _touching, lagged=lagged)
+            return self._solve(temperature, cycles, start, solve, passing, touching, lagged=lagged)
         except ConvergenceError:
             if self.heat is None or temperature is None:
                 raise

@@ -15,7 +15,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
-from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
@@ -71,7 +71,7 @@ def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
     return float(np.abs(eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)).max())
 
 
-def growth_rate(system: Tribosystem, pressure: Array) -> float:
+def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None = None) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
@@ -84,6 +84,8 @@ def growth_rate(system: Tribosystem, pressure: Array) -> float:
     Args:
         system: The assembled problem.
         pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
+        conductances: By which its temperatures have come about (phases, n), as `Steady.conductances`; by default those
+            of the nodes that these pressures close by more than rounding.
 
     Raises:
         CaseError: a coefficient is negative or not finite there.
@@ -93,12 +95,15 @@ def growth_rate(system: Tribosystem, pressure: Array) -> float:
         raise CaseError(
             InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
         )
-    heat, states = repeating_temperatures(system, pressure)
+    pressure = touching(pressure)
+    heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = 0 if heat is None else heat.gap_rows.shape[1]
     cycle = np.eye(dim + n)
     for phase in range(len(pressure)):
-        cycle = phase_tangent(system, phase, pressure[phase], heat, states[phase] if states else None) @ cycle
+        conductance = None if conductances is None else conductances[phase]
+        state = states[phase] if states else None
+        cycle = phase_tangent(system, phase, pressure[phase], heat, state, conductance) @ cycle
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
@@ -140,7 +145,9 @@ def stationary_growth(
     return rate, ""
 
 
-def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleHeat | None, list[HeatState]]:
+def repeating_temperatures(
+    system: Tribosystem, pressure: Array, conductances: Array | None = None
+) -> tuple[CycleHeat | None, list[HeatState]]:
     """Return the heat of cycles and the temperatures that repeat at these pressures, before each phase; collective.
 
     None where no law and no conductance depends on the state: then any temperatures do.
@@ -153,7 +160,8 @@ def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleH
         return None, []
     if system.constant_coefficients and heat.exchange.heat.conductance_per_pressure is None:
         return heat, []
-    conductances = heat.conductances(pressure)
+    if conductances is None:
+        conductances = heat.conductances(touching(pressure))
     surfaces: list[tuple[Array, Array] | None] = [None] * len(pressure)
     before = None
     for _ in range(MAX_ITERATIONS):
@@ -231,7 +239,12 @@ def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | No
 
 
 def phase_tangent(
-    system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None = None, state: HeatState | None = None
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None = None,
+    state: HeatState | None = None,
+    conductance: Array | None = None,
 ) -> Array:
     """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
 
@@ -249,6 +262,7 @@ def phase_tangent(
         pressure: During it (n,), MPa.
         heat: Of cycles, at the friction there; None without heat.
         state: Temperatures at its start; None where nothing depends on them.
+        conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
     """
     n, interface = len(pressure), system.interfaces[phase]
     laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
@@ -262,7 +276,9 @@ def phase_tangent(
     state_p: Array = np.zeros((dim, n))
     if heat is not None:
         gap_rows = heat.gap_rows
-        state_s, state_p = _heated(heat, phase, pressure, state, laws)
+        if conductance is None:
+            conductance = heat.exchange.conductance(pressure)
+        state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio) + by_mu * traction_p + gap_rows @ state_p + laws.worn_p
@@ -283,16 +299,17 @@ def phase_tangent(
     return change
 
 
-def _heated(heat: CycleHeat, phase: int, pressure: Array, state: HeatState | None, laws: _Laws) -> tuple[Array, Array]:
+def _heated(
+    heat: CycleHeat, phase: int, pressure: Array, state: HeatState | None, laws: _Laws, conductance: Array
+) -> tuple[Array, Array]:
     """Return the changes of the state at the end of a phase by those at its start, and by its pressure."""
     exchange = heat.exchange
-    conductance = exchange.conductance(pressure)
     unit = exchange.with_friction(np.tile(laws.rate, (len(exchange.friction), 1)))
     by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
     by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.gap_rows.shape[1]))
     by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
     if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
-        rise = np.divide(exchange.conductance(pressure), pressure, out=np.zeros_like(pressure), where=pressure > 0)
+        rise = np.divide(conductance, pressure, out=np.zeros_like(pressure), where=pressure > 0)
         by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
     return by_state + by_power @ (pressure[:, None] * laws.mu_s), by_pressure
 

@@ -82,6 +82,8 @@ class Steady:
         coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
         system: What it is the state of: with the properties of its own temperatures, where they depend on them.
         passes: How often the properties were taken anew; 0 where they are constants.
+        conductances: By which its temperatures have come about (phases, n), N/(mm s K), NaN where none conducts; None
+            without heat.
     """
 
     directions: tuple[int, ...]
@@ -98,6 +100,7 @@ class Steady:
     coordinates: Array = field(kw_only=True)
     system: Tribosystem = field(kw_only=True)
     passes: int = field(default=0, kw_only=True)
+    conductances: Array | None = field(default=None, kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -267,6 +270,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -
         None if heat is None else _steady_heat(heat, solved, middle),
         coordinates=system.pair.punch.x,
         system=system,
+        conductances=None if heat is None else solved.conductances,
     )
 
 

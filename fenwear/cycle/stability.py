@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
+from fenwear.assembly import Tribosystem, heating_friction, steady_exchange, with_reduced_heat
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
 from fenwear.cycle.coupled import cycle_heat, touching
@@ -39,22 +41,25 @@ def stability_number(system: Tribosystem) -> float:
     error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
     the phase that wears most.
     """
-    n = len(system.rigid.rigid_normal)
-    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
-    wear = system.phases_wear
-    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
-    ratios, directions = system.friction_ratios(), np.array(system.motion.directions)
-    most, largest = slopes.max(axis=1), 0.0
-    for d in np.unique(directions):
-        phase = int(np.argmax(np.where(directions == d, most, -1.0)))
+    ratios, largest = system.friction_ratios(), 0.0
+    for phase, opened in system.team.lead(partial(_most_worn, system)):
         interface = system.interfaces[phase]
-        opened = system.wear.phases([system.conditions(phase)], [phase]).slopes(uniform[phase : phase + 1])[0]
-        if not opened.data.any():  # nothing wears
-            continue
         contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
         worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
         largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
     return largest / 2
+
+
+def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
+    """Return of each direction the phase that wears most, if any does, and its S b p^(b-1), on the strip's nodes."""
+    n = len(system.rigid.rigid_normal)
+    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
+    wear = system.phases_wear
+    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
+    directions, most = np.array(system.motion.directions), slopes.max(axis=1)
+    phases = [int(np.argmax(np.where(directions == d, most, -1.0))) for d in np.unique(directions)]
+    opened = [system.wear.phases([system.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases]
+    return [(k, slope) for k, slope in zip(phases, opened, strict=True) if slope.data.any()]
 
 
 def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
@@ -95,6 +100,12 @@ def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None
         raise CaseError(
             InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
         )
+    system = with_reduced_heat(system)  # before rank 0 leads
+    function = partial(_growth_rate, system, pressure, conductances)
+    return function() if system.condensed.rows else system.team.lead(function)
+
+
+def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None) -> float:
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
@@ -124,8 +135,16 @@ def stationary_growth(
         phase: The one that would come next.
         change: Largest change of pressure in the last cycle over the pressure scale.
     """
-    if not change < 1:
+    if not change < 1:  # the same number on all ranks
         return None, "the last cycle is the first, or not like the one before"
+    system = with_reduced_heat(system)
+    function = partial(_stationary_growth, system, pressure, surfaces, phase, change)
+    return function() if system.condensed.rows else system.team.lead(function)
+
+
+def _stationary_growth(
+    system: Tribosystem, pressure: Array, surfaces: tuple[Array, Array], phase: int, change: float
+) -> tuple[float | None, str]:
     try:
         rate = growth_rate(system, pressure)
         heat, states = repeating_temperatures(system, pressure)
@@ -368,6 +387,13 @@ def _restricted_stiffness(system: Tribosystem, friction_ratio: Array, compliance
     return stiffness
 
 
+def _unstable_speed(stiffness: Array, thermal: NDArray[Any]) -> float:
+    """Return the lowest V of p = -V X Theta p; infinite where there is none."""
+    values = np.linalg.eigvals(-stiffness @ thermal)
+    growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
+    return float(1 / growing.max()) if len(growing) else float("inf")
+
+
 def critical_speed(system: Tribosystem, direction: int) -> float:
     """Return the sliding speed above which full contact is thermo-elastically unstable, mm/s; collective.
 
@@ -394,11 +420,9 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
         uniform = np.full(n, system.rigid.mean_pressure)
         states, _terms = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
         thermal = exchange.gap_change(states) / speed
-        values = np.linalg.eigvals(-stiffness @ thermal)
-        growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
-        if not len(growing):
-            return float("inf")
-        before, speed = speed, float(1 / growing.max())
+        before, speed = speed, system.team.lead(partial(_unstable_speed, stiffness, thermal))
+        if np.isinf(speed):
+            break
         if abs(speed - before) < 1e-6 * speed:
             break
     return speed

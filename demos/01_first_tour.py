@@ -38,7 +38,7 @@ from fenwear.report.course import peak_figure
 from fenwear.report.figures import pressure_figure, read_history, shape_figure
 from fenwear.run import run_case
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements, fewer half-cycles
 settings = []
 if COARSE:
     settings = [

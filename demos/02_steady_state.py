@@ -25,7 +25,7 @@ import numpy as np
 
 from fenwear import FenwearError, assemble, cycles_to_reach, jump, load_case, steady, vary
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 settings = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"] if COARSE else []
 
 # Legible in print and for the colour-blind.

@@ -29,7 +29,7 @@ import numpy as np
 
 from fenwear import assemble, critical_speed, growth_rate, load_case, march, steady, vary
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements, fewer half-cycles
 settings = ["geometry.degree=2", "geometry.parameters.elements_along_contact=8"] if COARSE else []
 half_cycles = 200 if COARSE else 2620
 

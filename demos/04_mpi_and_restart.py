@@ -29,7 +29,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements, fewer half-cycles
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements, fewer half-cycles
 half, whole = (10, 20) if COARSE else (300, 600)  # half-cycles
 settings = [
     "geometry.degree=2",

@@ -33,7 +33,7 @@ from fenwear.cycle import growth_rate
 from fenwear.report.figures import read_history
 from fenwear.run import run_case
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 temporary = tempfile.TemporaryDirectory()
 folder = Path(temporary.name)
 

@@ -39,7 +39,7 @@ from fenwear.paper import READINGS, Scope, paper_figures, paper_rows, sensitivit
 from fenwear.paper.section import map_text, markdown, readings_markdown
 from fenwear.paper.study import central_runs, heat_runs, stability_maps
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: coarser meshes, fewer readings
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: coarser meshes, fewer readings
 if COARSE:
     scope = Scope(
         settings=("geometry.degree=2", "geometry.parameters.elements_along_contact=8"),

@@ -26,7 +26,7 @@ import numpy as np
 
 from fenwear import CaseError, ConvergenceError, assemble, jump, load_case, steady, vary
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements and cycles
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements and cycles
 ELEMENTS, CYCLES = (16, (100, 500, 1_000)) if COARSE else (30, (1_000, 5_000, 18_000))
 
 BLUE, RED, GREEN = "#0072B2", "#D55E00", "#009E73"

@@ -46,7 +46,7 @@ from fenwear.life import (
 )
 from fenwear.life.pictures import life_figure, tornado
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements and samples
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements and samples
 ELEMENTS, SAMPLES = (12, 6) if COARSE else (60, 100)
 
 GREY, BLUE, RED = "#595959", "#0072B2", "#D55E00"

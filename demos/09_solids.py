@@ -29,7 +29,7 @@ from fenwear import assemble, load_case, steady
 from fenwear.report.maps import cuts_figure, map_figure, quantities
 from fenwear.run import run_case
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 LINEAR = ["geometry.degree=1", "geometry.order=1"] if COARSE else []
 folder = tempfile.TemporaryDirectory()
 

@@ -29,7 +29,7 @@ from fenwear.stick.final import final_shape
 from fenwear.stick.jump import jump
 from fenwear.stick.setup import make_rig, with_steps
 
-COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the tests: fewer elements
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 ELEMENTS = 30 if COARSE else 40
 
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "0.6"

@@ -71,7 +71,7 @@ def choose_law(system: Tribosystem) -> Choice:
     Args:
         system: Both bodies condensed, from a case.
     """
-    share = system.comm.bcast(elastic_share(system))  # one number decides on all ranks
+    share = system.team.lead(lambda: elastic_share(system))
     if share is None:
         return Choice("gross-sliding", "contact.law: 'gross-sliding' is taken: the strip slides one way")
     told = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"

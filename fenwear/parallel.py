@@ -234,6 +234,9 @@ class Team:
         return _Unpacker(io.BytesIO(packed), self._parts.__getitem__).load()
 
 
+ALONE = Team(MPI.COMM_SELF)  # each rank by itself
+
+
 class _Packer(pickle.Pickler):
     def __init__(self, file: io.BytesIO, number: Callable[[object], int | None]) -> None:
         super().__init__(file, protocol=5)

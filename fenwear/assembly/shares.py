@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import NUMBER, BodyNeeds, Needs, duration
+from fenwear.assembly.needs import BodyNeeds, Needs, duration
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.condensation import deal
@@ -32,8 +32,7 @@ def shares_text(placed: Placed, wanted: Needs) -> list[str]:
         whole = wanted.contact
         lines.append(
             f"contact: {rows.comm.size} ranks share the rows of its {wanted.nodes:,.0f} nodes, "
-            f"{memory_size(whole / rows.comm.size)} each; jumps in which all nodes touch gather "
-            f"{memory_size(NUMBER * wanted.nodes**2 * wanted.phases)} on rank 0"
+            f"{memory_size(whole / rows.comm.size)} each"
         )
     return lines
 

@@ -44,7 +44,7 @@ def steady_command(
     if not as_json:
         _print_steady(case, found, state)
     way = time.perf_counter()
-    rate = growth_rate(found, state.phase_pressure)
+    rate = growth_rate(found, state.phase_pressure, state.conductances)
     cycles = cycles_to_reach(found, state, 0.01) if rate < 0 else None
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
     if not as_json:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 from scipy.sparse import csr_array, hstack
 
 from fenwear.arrays import Array, Mask
@@ -57,6 +58,10 @@ class SpreadPhases:
     def multiply_within(self, pressure: Array) -> Array:
         """Return the same among the prepared nodes (m, c)."""
         return np.concatenate(self.team.call(self.own, "multiply_within", pressure), axis=1)
+
+    def prepare(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> bool:
+        """Take the nodes that are solved for; return whether all runs can be eliminated: see `OwnPhases.prepare`."""
+        return all(self.team.call(self.own, "prepare", nodes, free, wear, held))
 
     def near(self, v: Array) -> Array:
         """Return the solution of all runs of the prepared nodes (m + 1, c, q)."""
@@ -108,7 +113,7 @@ class ByRuns:
         idle = self._free[-1] & (worn == 0) & (self._held == 0)  # shapes that nothing of their balance holds
         if idle.sum() > self._opened[-1].any(axis=0).sum():
             raise np.linalg.LinAlgError("singular matrix")
-        if not all(phases.team.call(phases.own, "prepare", nodes, self._free, diagonals, self._held)):
+        if not phases.prepare(nodes, self._free, diagonals, self._held):
             raise np.linalg.LinAlgError("singular matrix")
         self._followed = phases.near(self._opened)
         self._solve_beside: Solve = eliminate(np.einsum("qkn,knj->qj", self._balance, self._followed[:-1]))

@@ -23,9 +23,11 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
+from fenwear.contact.by_runs import SpreadPhases
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator, Phases, Solve
 from fenwear.contact.spread import OwnRows, SpreadBlock, SpreadCompliance
+from fenwear.contact.spread_nodes import SpreadNodes
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.parallel import Team
@@ -34,6 +36,7 @@ from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedie
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
+LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 
 
@@ -135,6 +138,7 @@ class CondensedContact:
         self._offset = np.zeros((m, size))
         self.press(1.0)
         self._ratios = [phase.friction_ratio for phase in self.phases]
+        self._spread: SpreadPhases | None = None
         self._slide(range(m))
         self._coupling: Array | None = None
         self._layer: Layer | None = None
@@ -158,6 +162,8 @@ class CondensedContact:
                 self._dense[k, :n, :n] = interface.compliance(ratio) * scale
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
+        if len(self.phases) > 1 and (n >= LARGE or self._shared):
+            self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
         """Return the block of a phase of many nodes."""
@@ -207,8 +213,15 @@ class CondensedContact:
     def _linear(self) -> Operator:
         """The derivative of the residual without the layer."""
         if self._elastic is None:
-            self._elastic = ManyNodes(self.blocks) if self._many and self._coupling is None else self._as_phases()
+            self._elastic = self._of_nodes() if self._many and self._coupling is None else self._as_phases()
         return self._elastic
+
+    def _of_nodes(self, wear: Array | None = None, before: Operator | None = None) -> ManyNodes:
+        """Return the derivative without a matrix of all nodes."""
+        known = before if isinstance(before, ManyNodes) else None
+        if self._spread is None:
+            return ManyNodes(self.blocks, wear, known)
+        return SpreadNodes(self._spread, self.blocks, wear, known)
 
     def _as_phases(self, border: tuple[Array, Array] | None = None, local: Array | None = None) -> Phases:
         """Return the derivative by matrices of all nodes."""
@@ -230,7 +243,7 @@ class CondensedContact:
             if left is not None:
                 self._operator = self._as_phases(border=(left, slope * scale))
             elif self._many and self._coupling is None:
-                self._operator = ManyNodes(self.blocks, slope * scale, last if isinstance(last, ManyNodes) else None)
+                self._operator = self._of_nodes(slope * scale, last)
             else:
                 self._operator = self._as_phases(local=slope * scale)
         return self._operator or self._linear

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.operators import Solve, eliminate
+from fenwear.contact.worn_shape import WornShape
 
-RUN = 1500  # unknowns of neighbouring nodes that are eliminated together
+RUN = 1000  # pressures of neighbouring nodes that are eliminated together
 FEW = 0.5  # of all nodes: where no more touch in any phase, what they open at each other is copied
 
 
@@ -116,7 +117,7 @@ class OwnPhases:
     def _eliminate(self, nodes: NDArray[np.int64], begin: int, free: Mask, wear: Array, held: Array) -> bool:
         """Eliminate the runs of own nodes; those whose unknowns and wear have stayed keep their factors."""
         m, count = wear.shape
-        length = max(RUN // (m + 1), 1)
+        length = max(RUN // m, 1)
         cuts = np.append(np.flatnonzero(np.diff(nodes[begin : begin + count] // length, prepend=-1)), count)
         kept, self._cuts, self._runs = self._runs, [], {}
         for first, last in pairwise(cuts):
@@ -126,26 +127,29 @@ class OwnPhases:
             found = kept.get(run)
             if found is None or found[0] != key:
                 try:
-                    found = key, eliminate(self._matrix(some, chosen, wear[:, first:last], held[first:last]))
+                    found = key, self._eliminated(*parts)
                 except np.linalg.LinAlgError:
                     return False
             self._runs[run] = found
             self._cuts.append((np.arange(begin + first, begin + last), chosen, found[1]))
         return True
 
-    def _matrix(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> Array:
-        """Return the matrix of a run's free unknowns."""
+    def _eliminated(self, nodes: NDArray[np.int64], free: Mask, wear: Array, held: Array) -> Solve:
+        """Return the solution operator of a run's free unknowns."""
         m, count = wear.shape
+        here, blocks = np.arange(count), self._rows.of(nodes - self._first, nodes).matrices()
+        # What nothing wears and nothing holds stays where it is.
+        held = np.where((wear * free[:m]).any(axis=0), held, np.where(held > 0, held, 1.0))
+        if (held > 0).all():
+            return _with_depth(blocks, free, wear, held)
         whole: Array = np.zeros(((m + 1) * count, (m + 1) * count))
-        view, here = whole.reshape(m + 1, count, m + 1, count), np.arange(count)
-        for k, matrix in enumerate(self._rows.of(nodes - self._first, nodes).matrices()):
+        view = whole.reshape(m + 1, count, m + 1, count)
+        for k, matrix in enumerate(blocks):
             view[k, :, k, :] = matrix
             view[k, here, m, here] = 1.0
             view[m, here, k, here] = -wear[k]
-        # What nothing wears and nothing holds stays where it is.
-        view[m, here, m, here] = np.where((wear * free[:m]).any(axis=0), held, np.where(held > 0, held, 1.0))
-        kept = np.flatnonzero(free)
-        return whole[np.ix_(kept, kept)]
+        view[m, here, m, here] = held
+        return WornShape(whole, m, count).factor(np.flatnonzero(free).astype(np.int32))
 
     def near(self, v: Array) -> Array:
         """Return own columns of the solution of all runs (m + 1, own, q) for (m + 1, c, q) on the prepared nodes."""
@@ -155,3 +159,33 @@ class OwnPhases:
             part[free] = solve(v[:, at][free])
             found.append(part)
         return np.concatenate(found, axis=1)
+
+
+def _with_depth(blocks: Array, free: Mask, wear: Array, held: Array) -> Solve:
+    """Return the solution operator of a run whose shape is held everywhere: it follows from the pressures.
+
+    Args:
+        blocks: S_k of its nodes (m, n, n).
+        free, wear, held: As of `OwnPhases.prepare`, of its nodes.
+    """
+    m, n, _ = blocks.shape
+    touching, shaped, here = free[:m], free[m], np.arange(n)
+    soft = np.where(shaped, 1 / held, 0.0)
+    whole: Array = np.zeros((m * n, m * n))
+    view = whole.reshape(m, n, m, n)
+    for k, matrix in enumerate(blocks):
+        view[k, :, k, :] = matrix
+    view[:, here, :, here] += (soft * wear).T[:, None, :]
+    kept = np.flatnonzero(touching)
+    solve_pressures = eliminate(whole[np.ix_(kept, kept)])
+
+    def solve(b: Array) -> Array:
+        right = np.zeros((m + 1, n, b.shape[1]))
+        right[free] = b
+        opened = soft[:, None] * right[m]
+        right[:m][touching] = solve_pressures((right[:m] - opened)[touching])
+        right[:m][~touching] = 0.0
+        right[m] = opened + np.einsum("kn,knq->nq", soft * wear, right[:m])
+        return right[free]
+
+    return solve

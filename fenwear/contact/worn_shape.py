@@ -220,7 +220,7 @@ class WornShape(Dense):
 
         def solve(b: Array) -> Array:
             x = np.empty_like(b)
-            pressure = b[at_shape] / slope
+            pressure = (b[at_shape].T / slope).T
             omega = b[at_gap] - compliance @ pressure
             z = solve_rest(b[at_rest] - by_pressure @ pressure - by_shape @ omega)
             x[at_gap], x[at_shape], x[at_rest] = pressure - pressures @ z, omega - shapes @ z, z

@@ -115,7 +115,7 @@ class _Unknowns:
         )
 
 
-def _touching(pressure: NDArray[Any]) -> Array:
+def touching(pressure: NDArray[Any]) -> Array:
     """Return pressures with zeros where they are none but for `CLOSE`.
 
     A combination of pressures tends to nothing at a node that opens and never gets there: the node would conduct on.
@@ -179,7 +179,7 @@ class Coupled:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
         try:
-            return self._solve(temperature, cycles, start, solve, passing, _touching, lagged=lagged)
+            return self._solve(temperature, cycles, start, solve, passing, touching, lagged=lagged)
         except ConvergenceError:
             if self.heat is None or temperature is None:
                 raise
@@ -242,7 +242,7 @@ class Coupled:
                 found.extend(passing.depths(contact.pressure))
             return unknowns.joined([contact.pressure.ravel(), *found]), solved, same and constant
 
-        return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE)
+        return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE, team=system.team)
 
     def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
         """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""
@@ -260,7 +260,7 @@ class Coupled:
             return float(np.abs(change).max()) <= CLOSE * max(float(np.abs(x).max()), 1e-300)
 
         try:
-            return fixed_point(advance, start.pressure.ravel(), close, DISAGREE, depth=SMOOTH)
+            return fixed_point(advance, start.pressure.ravel(), close, DISAGREE, depth=SMOOTH, team=self.system.team)
         except ConvergenceError:  # heat that is no small part
             return solve(end.gap, end.coupling * self.mu, start)
 

@@ -45,7 +45,7 @@ class Watching:
         watch: Where they look.
     """
 
-    def __init__(self, team: Team, watch: Watch) -> None:
+    def __init__(self, team: Team, watch: Callable[[], object]) -> None:
         self._team, self._watch, self._looked = team, watch, time.monotonic()
         team.serve(self)
 
@@ -58,7 +58,7 @@ class Watching:
         if self._watch is unwatched:
             return False
         if not self._team.leads:
-            return self._watch()
+            return self.look()
         if time.monotonic() < self._looked + LOOK:
             return False
         due = self._team.each(self, "look")
@@ -67,7 +67,7 @@ class Watching:
 
     def look(self) -> bool:
         """Look at once; collective."""
-        return self._watch()
+        return bool(self._watch())
 
 
 class HalfCycle(NamedTuple):

@@ -15,6 +15,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
+from fenwear.parallel import ALONE, Team
 
 T = TypeVar("T")
 DEPTH = 5  # residuals that are combined
@@ -30,8 +31,10 @@ def fixed_point(
     failure: str,
     iterations: int = MAX_ITERATIONS,
     depth: int = DEPTH,
+    *,
+    team: Team = ALONE,
 ) -> T:
-    """Return what belongs to x = g(x).
+    """Return what belongs to x = g(x); collective where it is found by several ranks.
 
     Args:
         advance: From x returns g(x), what belongs to it, and whether it is exact already.
@@ -40,24 +43,25 @@ def fixed_point(
         failure: What is said where they do not come together.
         iterations: At most so many.
         depth: Residuals that are combined.
+        team: The ranks, of which one decides on the way and on the end.
 
     Raises:
         ConvergenceError: x and g(x) do not come together.
     """
-    x, share, best = start, 1.0, np.inf
+    x, share, best = team.lead(lambda: start), 1.0, np.inf
     points: list[Array] = []
     residuals: list[Array] = []
     for _ in range(iterations):
         new, result, exact = advance(x)
         residual = (new - x).ravel()
-        if exact or close(residual, new):
+        if team.lead(lambda: bool(exact or close(residual, new))):  # noqa: B023
             return result
         size = float(np.linalg.norm(residual))
         if size > WORSE * best:
             share, points, residuals = max(LEAST, share / 2), [], []
         best = min(best, size)
         points, residuals = [*points[-depth:], x.ravel()], [*residuals[-depth:], residual]
-        x = _mixed(points, residuals, share).reshape(start.shape)
+        x = team.lead(lambda: _mixed(points, residuals, share).reshape(start.shape))  # noqa: B023
     raise ConvergenceError(f"{failure} in {iterations} iterations")
 
 

@@ -49,7 +49,7 @@ def monotonic(system: Tribosystem) -> Monotonic:
         )
     speed = system.motion.mean_speed
     exchange = steady_exchange(system, [d * speed for d in DIRECTIONS])
-    pressures = [system.optimum(d).pressure for d in DIRECTIONS]
+    pressures = system.team.lead(lambda: [system.optimum(d).pressure for d in DIRECTIONS])
     punch, strip = [], []
     for phase, pressure in enumerate(pressures):
         state, _ = exchange.half_cycle(exchange.initial(), phase, pressure, exchange.conductance(pressure))

@@ -89,9 +89,8 @@ class PhaseStep:
             return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
         start = before
 
-        def solve(x: Array) -> tuple[Array, _Solved, bool]:
+        def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            pressure = self.system.team.lead(lambda: x)
             wear = self._update(pressure, temperature, worn, half_cycles)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
@@ -105,14 +104,11 @@ class PhaseStep:
         contact, after, heat, wear = fixed_point(
             solve,
             mean if before is None else before.pressure[0],
-            self._is_close,
+            lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
             COEFFICIENTS_FAIL,
+            team=self.system.team,
         )
         return self._end(contact, after, heat, before, wear)
-
-    def _is_close(self, change: Array, pressure: Array) -> bool:
-        scale = pressure_scale(self.system, pressure)
-        return self.system.team.lead(lambda: bool(np.abs(change).max() < CLOSE * scale))
 
     def _update(
         self, pressure: Array | None, temperature: HeatState | None, worn: Worn, half_cycles: float
@@ -149,5 +145,6 @@ class PhaseStep:
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
         meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, wear)
-        record = PhaseRecord(self.phase, contact, previous, meter(contact.pressure[0]), self._friction_ratio)
-        return PhaseEnd(record, temperature, heat, wear.worn(contact.pressure))
+        adds, worn = self.system.team.lead(lambda: (meter(contact.pressure[0]), wear.worn(contact.pressure)))
+        record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
+        return PhaseEnd(record, temperature, heat, worn)

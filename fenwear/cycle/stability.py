@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, heating_friction, steady_exchange
+from fenwear.assembly import Tribosystem, heating_friction, steady_exchange, with_reduced_heat
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
-from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
@@ -39,22 +41,25 @@ def stability_number(system: Tribosystem) -> float:
     error of the shape by I - W P: stable while the largest eigenvalue of W P is below 2, in each direction in
     the phase that wears most.
     """
-    n = len(system.rigid.rigid_normal)
-    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
-    wear = system.phases_wear
-    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
-    ratios, directions = system.friction_ratios(), np.array(system.motion.directions)
-    most, largest = slopes.max(axis=1), 0.0
-    for d in np.unique(directions):
-        phase = int(np.argmax(np.where(directions == d, most, -1.0)))
+    ratios, largest = system.friction_ratios(), 0.0
+    for phase, opened in system.team.lead(partial(_most_worn, system)):
         interface = system.interfaces[phase]
-        opened = system.wear.phases([system.conditions(phase)], [phase]).slopes(uniform[phase : phase + 1])[0]
-        if not opened.data.any():  # nothing wears
-            continue
         contact = CondensedContact([SlidingContact(interface, ratios[phase])], team=system.team)
         worn = csr_array(opened / interface.elastic_length)  # as the contact is scaled
         largest = max(largest, contact.on_closed_contact(partial(_worn_response, worn, contact.size)))
     return largest / 2
+
+
+def _most_worn(system: Tribosystem) -> list[tuple[int, csr_array]]:
+    """Return of each direction the phase that wears most, if any does, and its S b p^(b-1), on the strip's nodes."""
+    n = len(system.rigid.rigid_normal)
+    uniform = np.full((len(system.motion.phases), n), system.rigid.mean_pressure)
+    wear = system.phases_wear
+    slopes = sum((body.slope(uniform) for body in (wear.punch, wear.strip) if body is not None), np.zeros_like(uniform))
+    directions, most = np.array(system.motion.directions), slopes.max(axis=1)
+    phases = [int(np.argmax(np.where(directions == d, most, -1.0))) for d in np.unique(directions)]
+    opened = [system.wear.phases([system.conditions(k)], [k]).slopes(uniform[k : k + 1])[0] for k in phases]
+    return [(k, slope) for k, slope in zip(phases, opened, strict=True) if slope.data.any()]
 
 
 def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
@@ -71,7 +76,7 @@ def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
     return float(np.abs(eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)).max())
 
 
-def growth_rate(system: Tribosystem, pressure: Array) -> float:
+def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None = None) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
@@ -84,6 +89,8 @@ def growth_rate(system: Tribosystem, pressure: Array) -> float:
     Args:
         system: The assembled problem.
         pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
+        conductances: By which its temperatures have come about (phases, n), as `Steady.conductances`; by default those
+            of the nodes that these pressures close by more than rounding.
 
     Raises:
         CaseError: a coefficient is negative or not finite there.
@@ -93,12 +100,21 @@ def growth_rate(system: Tribosystem, pressure: Array) -> float:
         raise CaseError(
             InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
         )
-    heat, states = repeating_temperatures(system, pressure)
+    system = with_reduced_heat(system)  # before rank 0 leads
+    function = partial(_growth_rate, system, pressure, conductances)
+    return function() if system.condensed.rows else system.team.lead(function)
+
+
+def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None) -> float:
+    pressure = touching(pressure)
+    heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = 0 if heat is None else heat.gap_rows.shape[1]
     cycle = np.eye(dim + n)
     for phase in range(len(pressure)):
-        cycle = phase_tangent(system, phase, pressure[phase], heat, states[phase] if states else None) @ cycle
+        conductance = None if conductances is None else conductances[phase]
+        state = states[phase] if states else None
+        cycle = phase_tangent(system, phase, pressure[phase], heat, state, conductance) @ cycle
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
@@ -119,8 +135,16 @@ def stationary_growth(
         phase: The one that would come next.
         change: Largest change of pressure in the last cycle over the pressure scale.
     """
-    if not change < 1:
+    if not change < 1:  # the same number on all ranks
         return None, "the last cycle is the first, or not like the one before"
+    system = with_reduced_heat(system)
+    function = partial(_stationary_growth, system, pressure, surfaces, phase, change)
+    return function() if system.condensed.rows else system.team.lead(function)
+
+
+def _stationary_growth(
+    system: Tribosystem, pressure: Array, surfaces: tuple[Array, Array], phase: int, change: float
+) -> tuple[float | None, str]:
     try:
         rate = growth_rate(system, pressure)
         heat, states = repeating_temperatures(system, pressure)
@@ -140,7 +164,9 @@ def stationary_growth(
     return rate, ""
 
 
-def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleHeat | None, list[HeatState]]:
+def repeating_temperatures(
+    system: Tribosystem, pressure: Array, conductances: Array | None = None
+) -> tuple[CycleHeat | None, list[HeatState]]:
     """Return the heat of cycles and the temperatures that repeat at these pressures, before each phase; collective.
 
     None where no law and no conductance depends on the state: then any temperatures do.
@@ -153,7 +179,8 @@ def repeating_temperatures(system: Tribosystem, pressure: Array) -> tuple[CycleH
         return None, []
     if system.constant_coefficients and heat.exchange.heat.conductance_per_pressure is None:
         return heat, []
-    conductances = heat.conductances(pressure)
+    if conductances is None:
+        conductances = heat.conductances(touching(pressure))
     surfaces: list[tuple[Array, Array] | None] = [None] * len(pressure)
     before = None
     for _ in range(MAX_ITERATIONS):
@@ -231,7 +258,12 @@ def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | No
 
 
 def phase_tangent(
-    system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None = None, state: HeatState | None = None
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None = None,
+    state: HeatState | None = None,
+    conductance: Array | None = None,
 ) -> Array:
     """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
 
@@ -249,6 +281,7 @@ def phase_tangent(
         pressure: During it (n,), MPa.
         heat: Of cycles, at the friction there; None without heat.
         state: Temperatures at its start; None where nothing depends on them.
+        conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
     """
     n, interface = len(pressure), system.interfaces[phase]
     laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
@@ -262,7 +295,9 @@ def phase_tangent(
     state_p: Array = np.zeros((dim, n))
     if heat is not None:
         gap_rows = heat.gap_rows
-        state_s, state_p = _heated(heat, phase, pressure, state, laws)
+        if conductance is None:
+            conductance = heat.exchange.conductance(pressure)
+        state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio) + by_mu * traction_p + gap_rows @ state_p + laws.worn_p
@@ -283,16 +318,17 @@ def phase_tangent(
     return change
 
 
-def _heated(heat: CycleHeat, phase: int, pressure: Array, state: HeatState | None, laws: _Laws) -> tuple[Array, Array]:
+def _heated(
+    heat: CycleHeat, phase: int, pressure: Array, state: HeatState | None, laws: _Laws, conductance: Array
+) -> tuple[Array, Array]:
     """Return the changes of the state at the end of a phase by those at its start, and by its pressure."""
     exchange = heat.exchange
-    conductance = exchange.conductance(pressure)
     unit = exchange.with_friction(np.tile(laws.rate, (len(exchange.friction), 1)))
     by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
     by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.gap_rows.shape[1]))
     by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
     if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
-        rise = np.divide(exchange.conductance(pressure), pressure, out=np.zeros_like(pressure), where=pressure > 0)
+        rise = np.divide(conductance, pressure, out=np.zeros_like(pressure), where=pressure > 0)
         by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
     return by_state + by_power @ (pressure[:, None] * laws.mu_s), by_pressure
 
@@ -351,6 +387,13 @@ def _restricted_stiffness(system: Tribosystem, friction_ratio: Array, compliance
     return stiffness
 
 
+def _unstable_speed(stiffness: Array, thermal: NDArray[Any]) -> float:
+    """Return the lowest V of p = -V X Theta p; infinite where there is none."""
+    values = np.linalg.eigvals(-stiffness @ thermal)
+    growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
+    return float(1 / growing.max()) if len(growing) else float("inf")
+
+
 def critical_speed(system: Tribosystem, direction: int) -> float:
     """Return the sliding speed above which full contact is thermo-elastically unstable, mm/s; collective.
 
@@ -377,11 +420,9 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
         uniform = np.full(n, system.rigid.mean_pressure)
         states, _terms = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
         thermal = exchange.gap_change(states) / speed
-        values = np.linalg.eigvals(-stiffness @ thermal)
-        growing = values.real[(np.abs(values.imag) < 1e-6 * np.abs(values.real).max()) & (values.real > 0)]
-        if not len(growing):
-            return float("inf")
-        before, speed = speed, float(1 / growing.max())
+        before, speed = speed, system.team.lead(partial(_unstable_speed, stiffness, thermal))
+        if np.isinf(speed):
+            break
         if abs(speed - before) < 1e-6 * speed:
             break
     return speed

@@ -28,7 +28,7 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key
+from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key, with_reduced_heat
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
@@ -82,6 +82,8 @@ class Steady:
         coordinates: Of the contact nodes (n, 2) or (n, 3), mm: x and z; of rings r and z, of solids x, y and z.
         system: What it is the state of: with the properties of its own temperatures, where they depend on them.
         passes: How often the properties were taken anew; 0 where they are constants.
+        conductances: By which its temperatures have come about (phases, n), N/(mm s K), NaN where none conducts; None
+            without heat.
     """
 
     directions: tuple[int, ...]
@@ -98,6 +100,7 @@ class Steady:
     coordinates: Array = field(kw_only=True)
     system: Tribosystem = field(kw_only=True)
     passes: int = field(default=0, kw_only=True)
+    conductances: Array | None = field(default=None, kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -134,13 +137,20 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
 
 
 def _of_these_bodies(system: Tribosystem) -> Steady:
-    """Return the state of the bodies as they are, whatever its temperatures."""
+    """Return the state of the bodies as they are, whatever its temperatures; collective."""
     _check_exists(system)
-    problem = SteadyInequality(system)
-    for body, side in zip(system.bodies.heat or (), system.exchange.sides if system.exchange else (), strict=True):
+    prepared = with_reduced_heat(system)
+    sides = prepared.exchange.sides if prepared.exchange else ()
+    for body, side in zip(prepared.bodies.heat or (), sides, strict=True):
         if not side.cooled:
             raise CaseError(no_heat_sink(body.body.name))
-    return _result(problem, *_solve(problem))
+
+    def found() -> Steady:
+        problem = SteadyInequality(prepared)
+        return _result(problem, *_solve(problem))
+
+    prepared.team.serve(prepared)
+    return replace(found() if prepared.condensed.rows else prepared.team.lead(found), system=system)
 
 
 def _warmed(state: Steady, share: float) -> Steady:
@@ -267,6 +277,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -
         None if heat is None else _steady_heat(heat, solved, middle),
         coordinates=system.pair.punch.x,
         system=system,
+        conductances=None if heat is None else solved.conductances,
     )
 
 
@@ -320,7 +331,8 @@ def cycles_to_reach(system: Tribosystem, state: Steady, fraction: float, limit: 
         fraction: Of the pressure scale.
         limit: Cycles tried; None is returned beyond.
     """
-    phases, goal = len(state.directions), fraction * pressure_scale(system, state.phase_pressure)
+    phases = len(state.directions)
+    goal = system.team.lead(lambda: fraction * pressure_scale(system, state.phase_pressure))
     before: tuple[int, float] | None = None
     for block in jump(system, limit * phases, tolerance=fraction / 10, block=phases):
         cycles, distance = int(block.half_cycle[-1]) // phases, float(np.abs(block.pressure - state.pressure).max())

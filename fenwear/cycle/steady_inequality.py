@@ -178,7 +178,7 @@ class SteadyInequality:
         m, n, r = self.m, self.n, self.r
         x = np.zeros(self.equations.size)
         if m == 1:
-            optimum = self.system.optimum(self.system.motion.directions[0])
+            optimum = self.system.team.lead(lambda: self.system.optimum(self.system.motion.directions[0]))
             x[:n] = optimum.pressure / self.p_scale
             velocity = np.array([optimum.velocity[name] for name in self.system.rigid.mode_names])
             x[n + n :] = velocity * self.system.motion.period * self.lengths / self.wear_scale

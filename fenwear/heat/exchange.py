@@ -241,7 +241,7 @@ class HeatExchange:
             heat = (self.friction[phase] * plan.speed * pressure.T).T
             values, fluxes, bare = self._step(kinds, values, heat, conductance, sources=sources)
             after = self._balances(values, sources=sources)
-            terms += self._account(kinds, heat, fluxes, before, after, sources=sources)
+            terms += self._led(partial(self._account, kinds, heat, fluxes, before, after, sources=sources))
             before = after
         if sources and any(side.field.contact_responses is not None for side in self.sides):
             surfaces = self._surfaces(kinds, bare, fluxes)

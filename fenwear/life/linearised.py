@@ -21,7 +21,7 @@ import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
-from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import ConvergenceError
 from fenwear.life.model import Snapshot, steady_snapshot
 from fenwear.sliding.pressure_law import PressureLaw
@@ -65,10 +65,11 @@ class SteadyTangent:
 
     def __init__(self, system: Tribosystem, snapshot: Snapshot) -> None:
         self.system = system
-        self.closed: Mask = snapshot.pressure > 0
+        pressure = touching(snapshot.pressure)
+        self.closed: Mask = pressure > 0
         self.touched: Mask = np.asarray(self.closed.any(axis=0))
         velocity = np.array([snapshot.velocity[name] for name in system.rigid.mode_names])
-        self.state = self._complete(snapshot.pressure, velocity)
+        self.state = self._complete(pressure, velocity)
 
     def _complete(self, pressure: Array, velocity: Array) -> _Unknown:
         """Return u of these pressures: shape and rigid motions close the gaps of the closed nodes."""
@@ -76,7 +77,7 @@ class SteadyTangent:
         modes = self.system.rigid.rigid_normal
         r = modes.shape[1]
         empty = _Unknown(pressure, np.zeros(n), np.zeros((m, r)), velocity)
-        rest = _gaps(self.system, empty)
+        rest = _gaps(self.system, empty, self.closed)
         # Rows of the closed nodes of all phases; unknown omega and the rigid motions of all phases but the first.
         matrix = np.zeros((m, n, n + (m - 1) * r))
         for k in range(m):
@@ -95,7 +96,9 @@ class SteadyTangent:
             for own, ratio, p in zip(system.interfaces, system.friction_ratios(), state.pressure, strict=True)
         ]
         wear = system.phases_wear.opening(state.pressure)[0] - modes @ state.velocity
-        return np.concatenate([_gaps(system, state)[self.closed], wear[self.touched], np.concatenate(balance)])
+        return np.concatenate(
+            [_gaps(system, state, self.closed)[self.closed], wear[self.touched], np.concatenate(balance)]
+        )
 
     @cached_property
     def _jacobian(self) -> Array:
@@ -111,7 +114,7 @@ class SteadyTangent:
             balance[k, :, k] = own.rigid.equilibrium(ratio)
         heat = cycle_heat(system)
         if heat is not None:
-            gaps += heat.jump(heat.initial(), np.inf, heat.conductances(self.state.pressure)).coupling
+            gaps += heat.jump(heat.initial(), np.inf, heat.conductances(closed.astype(float))).coupling
         left, right = system.phases_wear.border(self.state.pressure)
         wear = np.einsum("iq,kqj->ikj", left[0], right)
         by_pressure = np.concatenate([
@@ -160,11 +163,13 @@ class SteadyTangent:
         """Return the steady state of a system nearby, where the state has moved by factor times a step."""
         state = self.state.plus(step, factor)
         velocity = {name: float(part) for name, part in zip(system.rigid.mode_names, state.velocity, strict=True)}
-        return steady_snapshot(system, state.pressure, velocity)
+        heat = cycle_heat(system)
+        conductances = None if heat is None else heat.conductances(self.closed.astype(float))
+        return steady_snapshot(system, state.pressure, velocity, conductances)
 
 
-def _gaps(system: Tribosystem, state: _Unknown) -> Array:
-    """Return the gap of every node in every phase (m, n), mm."""
+def _gaps(system: Tribosystem, state: _Unknown, closed: Mask) -> Array:
+    """Return the gap of every node in every phase (m, n), mm; those that are closed conduct."""
     modes = system.rigid.rigid_normal
     gaps = np.array(
         [
@@ -176,6 +181,6 @@ def _gaps(system: Tribosystem, state: _Unknown) -> Array:
     )
     heat = cycle_heat(system)
     if heat is not None:
-        end = heat.jump(heat.initial(), np.inf, heat.conductances(state.pressure))
+        end = heat.jump(heat.initial(), np.inf, heat.conductances(closed.astype(float)))
         gaps += end.gap + np.einsum("kilj,lj->ki", end.coupling, state.pressure)
     return gaps + state.shape

@@ -16,7 +16,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
-from fenwear.cycle.coupled import cycle_heat
+from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
 from fenwear.errors import CaseError, InputError
 from fenwear.law import check_slides
@@ -238,7 +238,7 @@ class Model:
         system = self.system(values, settings)
         self.evaluations += 1
         state = steady(system, properties_within=WITHIN if self.warming else None)
-        return steady_snapshot(state.system, state.phase_pressure, state.velocity)
+        return steady_snapshot(state.system, state.phase_pressure, state.velocity, state.conductances)
 
     def run_in(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> float:
         """Return after how many cycles the pressure is within 1 % of the pressure scale of its end; infinite if never.
@@ -332,15 +332,19 @@ def _of_block(block: Block) -> Snapshot:
     return _snapshot(system, float(cycle), pressure, depths, temperature, {})
 
 
-def steady_snapshot(system: Tribosystem, pressure: Array, velocity: Mapping[str, float]) -> Snapshot:
-    """Return the steady state of these pressures (m, n) of the phases."""
+def steady_snapshot(
+    system: Tribosystem, pressure: Array, velocity: Mapping[str, float], conductances: Array | None = None
+) -> Snapshot:
+    """Return the steady state of these pressures (m, n) of the phases, with heat of these conductances (m, n)."""
     heat, temperature = cycle_heat(system), None
     if heat is not None:
-        end = heat.jump(heat.initial(), np.inf, heat.conductances(pressure))
+        if conductances is None:
+            conductances = heat.conductances(touching(pressure))
+        end = heat.jump(heat.initial(), np.inf, conductances)
         state, rows = heat.exchange.at(end.state(pressure)), []
         for phase in range(len(pressure)):
             p = np.asarray(pressure[phase])
-            state, _ = heat.exchange.half_cycle(state, phase, p, heat.exchange.conductance(p))
+            state, _ = heat.exchange.half_cycle(state, phase, p, conductances[phase])
             rows.append(np.stack(heat.exchange.contact_temperatures(state)))
         temperature = np.array(rows)
     return _snapshot(system, np.inf, pressure, None, temperature, velocity)

@@ -45,7 +45,7 @@ def steady_heat(system: Tribosystem) -> SteadyHeat:
         raise ValueError("expected a case with heat")
     at_middle = float(state.heat.punch[:, centre].max())
     alone = float(monotonic(system).periodic_punch[centre])
-    return SteadyHeat(alone, at_middle, growth_rate(system, state.phase_pressure), state)
+    return SteadyHeat(alone, at_middle, growth_rate(system, state.phase_pressure, state.conductances), state)
 
 
 @cache

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 
 from fenwear.arrays import Array, Mask
+from fenwear.cycle.driver import Watching
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import Moment, together
@@ -18,6 +20,8 @@ from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.stick.wear import LocalWear
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -156,7 +160,7 @@ class Rig:
         program: Program,
         wear: LocalWear,
         friction: Array,
-        watch: Callable[[], None] = lambda: None,
+        watch: Callable[[], object] = lambda: None,
         heat: StickHeat | None = None,
         expanded: Callable[[Loaded, float], Loaded] = lambda loaded, _: loaded,
     ) -> None:
@@ -165,9 +169,18 @@ class Rig:
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
 
-    def watched(self, watch: Callable[[], None]) -> Rig:
+    def watched(self, watch: Callable[[], object]) -> Rig:
         """Return the same, watched."""
-        return Rig(self.interface, self.program, self.wear, self.friction, watch, self.heat, self.expanded)
+        watching = Watching(self.interface.team, watch)
+        return Rig(self.interface, self.program, self.wear, self.friction, watching, self.heat, self.expanded)
+
+    def led(self, function: Callable[[], T]) -> T:
+        """Call what goes on from condensed bodies, on rank 0 for all; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        return self.interface.team.lead(function)
 
     def kept_at(self, heat: StickHeat, temperature: Array) -> Rig:
         """Return the same at a temperature (dim,) that stays as it is."""
@@ -201,6 +214,9 @@ class Rig:
         Raises:
             ConvergenceError: a step did not converge.
         """
+        return self.led(partial(self._begun, shape))
+
+    def _begun(self, shape: Worn | None) -> RigState:
         interface, program, worn = self.interface, self.program, shape or self.unworn()
         loaded = self.expanded(interface.loaded(None if program.steps[-1].fraction is None else 0.0), 0.0)
         opening = self.opening(interface.middle, worn)
@@ -231,7 +247,10 @@ class Rig:
         return position, Imposed(loaded, self.opening(position, worn), step.displacement, step.force, step.strain)
 
     def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
-        """Return the state after a time step, and its record; the shape stays."""
+        """Return the state after a time step, and its record; the shape stays; collective."""
+        return self.led(partial(self._step, at, step))
+
+    def _step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
         after = self._stepped(at, step)
         return after, self._record(at, after, step)
 
@@ -258,7 +277,10 @@ class Rig:
         return RigState(state, imposed, at.worn, following, pressures=pressures, trials=trials)
 
     def half_cycle(self, at: RigState) -> tuple[RigState, Records]:
-        """Return the state at the end of the half-cycle that comes next, and its records; the shape stays."""
+        """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""
+        return self.led(partial(self._half_cycle, at))
+
+    def _half_cycle(self, at: RigState) -> tuple[RigState, Records]:
         steps, parts = self.program.steps, []
         number = steps[at.next_step].half_cycle
         while steps[at.next_step].half_cycle == number:
@@ -269,7 +291,10 @@ class Rig:
         return at, Records.joined(parts)
 
     def cycle(self, at: RigState) -> tuple[RigState, list[Records]]:
-        """Return the state a cycle later and the records of its half-cycles; the shape stays."""
+        """Return the state a cycle later and the records of its half-cycles; the shape stays; collective."""
+        return self.led(partial(self._cycle, at))
+
+    def _cycle(self, at: RigState) -> tuple[RigState, list[Records]]:
         found = []
         for _ in range(self.program.half_cycles):
             at, records = self.half_cycle(at)

@@ -15,6 +15,7 @@ and surroundings make them, and the shape is that of bodies of these temperature
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -60,8 +61,12 @@ def stick_zone(rig: Rig) -> Mask:
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    settled, _ = rig.cycle(rig.beginning())
-    return np.asarray(Records.joined(rig.cycle(settled)[1]).sticking.all(axis=0))
+
+    def found() -> Mask:
+        settled, _ = rig.cycle(rig.beginning())
+        return np.asarray(Records.joined(rig.cycle(settled)[1]).sticking.all(axis=0))
+
+    return rig.led(found)
 
 
 def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
@@ -75,6 +80,10 @@ def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
         ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
         CaseError: the bodies lose no heat.
     """
+    return rig.led(partial(_with_heat, rig, stick))
+
+
+def _with_heat(rig: Rig, stick: Mask | None) -> FinalShape:
     heat = rig.heat
     if heat is None:
         return _final_shape(rig, stick)

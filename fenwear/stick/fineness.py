@@ -8,6 +8,7 @@ Heat wants equal steps: there all are halved.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,16 +65,25 @@ def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
     while True:
         halves, of = _halved(ends)
         fine = _driven(rig, case, finest, halves)
-        local, change = _compare(_first_cycle(rig), _first_cycle(fine), of, rig.weights)
-        enough = change <= case.stick.step_tolerance
         splits = np.diff(ends, prepend=-1) > 2
-        marked = _marked(local, splits)
-        if enough or local[~splits].sum() > case.stick.step_tolerance:  # the finest steps alone are too coarse
+        change, marked = rig.led(partial(_judged, rig, fine, of, splits, case.stick.step_tolerance))
+        if marked is None:
+            enough = change <= case.stick.step_tolerance
             return rig, Fineness(round(len(ends) / finest.half_cycles), change, enough=enough)
         if case.heat is not None:
             marked[:] = True
         ends = halves[marked[of] | _last(of)]
         rig = _driven(rig, case, finest, ends)
+
+
+def _judged(
+    rig: Rig, fine: Rig, of: Ends, splits: NDArray[np.bool_], tolerance: float
+) -> tuple[float, NDArray[np.bool_] | None]:
+    """Return what halving all steps changes, and which are to be halved; None where that is to end."""
+    local, change = _compare(_first_cycle(rig), _first_cycle(fine), of, rig.weights)
+    if change <= tolerance or local[~splits].sum() > tolerance:  # the finest steps alone are too coarse
+        return change, None
+    return change, _marked(local, splits)
 
 
 def merged(finest: Program, ends: Ends) -> Program:

@@ -26,6 +26,7 @@ from fenwear.bodies.response import Request
 from fenwear.case import Case
 from fenwear.interface import ContactPair, RigidEquilibrium, check_distance, pair, rigid_equilibrium
 from fenwear.interface.placement import in_model
+from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
 from fenwear.stick.whole import WholeBodies, whole_bodies
 
@@ -109,6 +110,7 @@ class OppositeBodies:
 
     moves = False
     full = False  # whether each step is solved on all displacements
+    team = ALONE  # the ranks that have them, of which one leads
 
     def __init__(
         self, punch: CondensedBody, strip: CondensedBody, rigid: RigidEquilibrium, field: SlidingField
@@ -171,6 +173,8 @@ class StickInterface(OppositeBodies):
         full: bool = False,
     ) -> None:
         self.bodies, self.sliding, self.case, self.moves = bodies, sliding, case, moves
+        self.team = Team.of(bodies.comm)
+        self.team.serve(self)
         self.keep, self.fresh, self.full = keep, fresh, full
         self.field = sliding.field
         self.dim = bodies.punch.dim
@@ -182,8 +186,8 @@ class StickInterface(OppositeBodies):
         wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
         self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
-        self._loaded: dict[float, Loaded] = {}
-        self._whole: dict[int, WholeBodies] = {}  # of positions, which stay
+        self._loaded: dict[float | None, Loaded] = {}
+        self._whole: dict[float, WholeBodies] = {}
 
     def _needs(self, nodes: int, on_strip: int) -> Needs:
         """Return what condensing both along all axes takes, with C of each position and Newton's matrix; collective.
@@ -224,34 +228,45 @@ class StickInterface(OppositeBodies):
         return np.asarray(at_trace[punch.surface.nodes] > 0)
 
     def position(self, offset: float) -> Position:
-        """Return the place of the strip moved by this amount of its motion; collective where it is new."""
+        """Return the place of the strip moved by this amount of its motion; collective, or for rank 0 that leads."""
         offset = round(offset, 12) if self.moves else 0.0
         if offset not in self._positions:
-            middle = self.middle.pair
-            self._positions[offset] = self._position(pair(middle.punch, middle.strip, self.field.placement(offset)))
+            self.team.each(self, "prepare_position", offset)
         return self._positions[offset]
 
+    def prepare_position(self, offset: float) -> None:
+        """Make a new place of the strip; collective."""
+        middle = self.middle.pair
+        self._positions[offset] = self._position(pair(middle.punch, middle.strip, self.field.placement(offset)))
+
     def whole(self, position: Position) -> WholeBodies:
-        """Return both bodies with nothing condensed in a position of these; collective where it is new."""
-        if id(position) not in self._whole:
-            self._whole[id(position)] = whole_bodies(self.bodies, position, moves=self.moves)
-        return self._whole[id(position)]
+        """Return both bodies with nothing condensed in a position of these; collective, or for rank 0 that leads."""
+        offset = next(place for place, known in self._positions.items() if known is position)
+        if offset not in self._whole:
+            self.team.each(self, "prepare_whole", offset)
+        return self._whole[offset]
+
+    def prepare_whole(self, offset: float) -> None:
+        """Make the bodies with nothing condensed for a place of the strip; collective."""
+        self._whole[offset] = whole_bodies(self.bodies, self._positions[offset], moves=self.moves)
 
     def loaded(self, fraction: float | None) -> Loaded:
-        """Return what the loads do at a fraction of the cycle, or their mean; collective where it is new."""
+        """Return what the loads do at a fraction of the cycle, or their mean; collective, or for rank 0 that leads."""
         loads = [] if self.case is None else [*self.case.punch.loads, *self.case.strip.loads]
-        if fraction is None or self.case is None or all(load.over_cycle is None for load in loads):
-            key, bodies = -1.0, self.bodies
-        else:
-            key = fraction = round(fraction, 12)
-            bodies = self.bodies if key in self._loaded else self.bodies.under(self.case, fraction)
+        constant = fraction is None or all(load.over_cycle is None for load in loads)
+        key = None if constant or fraction is None else round(fraction, 12)
         if key not in self._loaded:
-            self._loaded[key] = Loaded(
-                np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant]),
-                respond_to_load(bodies.punch, self.punch.patterns),
-                respond_to_load(bodies.strip, self.strip.patterns),
-            )
+            self.team.each(self, "prepare_load", key)
         return self._loaded[key]
+
+    def prepare_load(self, fraction: float | None) -> None:
+        """Find what the loads do at a fraction of the cycle, or their mean; collective."""
+        bodies = self.bodies if fraction is None or self.case is None else self.bodies.under(self.case, fraction)
+        self._loaded[fraction] = Loaded(
+            np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant]),
+            respond_to_load(bodies.punch, self.punch.patterns),
+            respond_to_load(bodies.strip, self.strip.patterns),
+        )
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -82,13 +83,20 @@ def march(rig: Rig, cycles: int, start: Cycle | None = None) -> Iterator[Cycle]:
     """
     at = rig.beginning() if start is None else start.end
     for number in range(0 if start is None else start.number + 1, cycles):
-        parts, begin = [], at.worn
-        for _ in range(rig.program.half_cycles):
-            first = at.next_step
-            at, records = rig.half_cycle(at)
-            at = replace(at, worn=at.worn + rig.worn_in(records, first))
-            parts.append(records)
-        yield Cycle(number, begin, parts, at.worn - begin, 0.0, 0, at)
+        cycle = rig.led(partial(_marched, rig, at, number))
+        yield cycle
+        at = cycle.end
+
+
+def _marched(rig: Rig, at: RigState, number: int) -> Cycle:
+    """Return the cycle of a number; `at` is the state at its start."""
+    parts, begin = [], at.worn
+    for _ in range(rig.program.half_cycles):
+        first = at.next_step
+        at, records = rig.half_cycle(at)
+        at = replace(at, worn=at.worn + rig.worn_in(records, first))
+        parts.append(records)
+    return Cycle(number, begin, parts, at.worn - begin, 0.0, 0, at)
 
 
 def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) -> Iterator[Cycle]:
@@ -105,10 +113,17 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
     """
     now = start
     if now is None:
-        now = _rate(rig, rig.beginning(), rig.unworn(), 0)
+        now = rig.led(lambda: _rate(rig, rig.beginning(), rig.unworn(), 0))
         yield now
-    length = now.length
     while now.number < cycles:
+        now = rig.led(partial(_jumped, rig, now, cycles, tolerance))
+        yield now
+
+
+def _jumped(rig: Rig, now: Cycle, cycles: int, tolerance: float) -> Cycle:
+    """Return the cycle after the next jump that is accurate enough."""
+    length = now.length
+    while True:
         tried = min(length, cycles - now.number)
         try:
             then = _attempt(rig, now, tried)
@@ -123,8 +138,7 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
             continue
         if tried == length or factor < 1:
             length = max(1, int(np.ceil(tried * min(MOST, max(LEAST, factor)))))
-        now = replace(then, length=length)
-        yield now
+        return replace(then, length=length)
 
 
 def _rate(rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None = None) -> Cycle:

@@ -20,6 +20,7 @@ from fenwear.cycle.stability import phase_tangent, repeating_temperatures
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import none_yet
 from fenwear.heat import exchange
+from fenwear.life.model import steady_snapshot
 from fenwear.sliding.wear import Worn
 
 Assemble = Callable[..., Tribosystem]
@@ -369,3 +370,28 @@ def test_ranks_agree(assembled: Assemble, operator: str) -> None:
     ):
         one, other = solve(alone), solve(together)
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-8 * np.abs(one).max())
+
+
+def test_growth_and_snapshot_conduct_as_the_state(assembled: Assemble) -> None:
+    """Nodes that are open but for rounding conduct in neither; nodes that the state has conducting do."""
+    system = assembled("example1-heat", *COARSE, "heat.conductance='80 W/(m² K)'", "heat.partition=0.5")
+    state = steady(system)
+    assert state.heat is not None
+    assert state.conductances is not None
+    opened = state.phase_pressure == 0
+    assert opened.any()
+    assert np.isnan(state.conductances[opened]).all()
+    rounding = np.where(opened, 1e-14 * state.phase_pressure.max(), state.phase_pressure)
+    rate = growth_rate(system, state.phase_pressure, state.conductances)
+    assert growth_rate(system, rounding) == pytest.approx(rate, rel=1e-9)
+    for pressure, conductances in ((state.phase_pressure, state.conductances), (rounding, None)):
+        found = steady_snapshot(system, pressure, state.velocity, conductances).temperature
+        assert found is not None
+        np.testing.assert_allclose(found[:, 0], state.heat.punch, rtol=1e-9)
+        np.testing.assert_allclose(found[:, 1], state.heat.strip, rtol=1e-9)
+    # A node without pressure that conducts changes both: what the state says is followed.
+    other = np.where(opened, np.nanmax(state.conductances), state.conductances)
+    assert growth_rate(system, state.phase_pressure, other) != pytest.approx(rate, rel=1e-6)
+    warmed = steady_snapshot(system, state.phase_pressure, state.velocity, other).temperature
+    assert warmed is not None
+    assert np.abs(warmed[:, 0] - state.heat.punch).max() > 1e-6 * state.heat.punch.max()

@@ -34,6 +34,7 @@ FADES = 0.1  # of the contact's length: over which wear, as it is drawn, fades i
 NEAR = (0.72, 0.5, 0.75)  # of the length: half of the section that is shown, and most of it below and above the contact
 MARGIN = 0.05  # of the length: around bodies that end within the section
 PIXELS = 900
+MARGIN, ASPECTS = 0.04, (0.2, 0.62)  # of a picture of whole bodies: left free around them; height over width
 OPEN, AROUND = 1.5 * np.pi, 54  # of rings: how far they are turned, and in how many parts
 NEIGHBOURS = 4
 HEXAHEDRON, TETRAHEDRON = 12, 10  # VTK's numbers
@@ -212,8 +213,11 @@ def solid_figure(data: xarray.Dataset, field: str, view: SolidView, named: tuple
     images = [_image(bodies, field, view, colours, whole=True, solid=solid)]
     if solid:
         images.append(_image(bodies, field, view, colours, whole=False, solid=True))
-    shares = [1.0, images[1].shape[0] / images[1].shape[1] / (sum(NEAR[1:]) / NEAR[0] / 2)] if solid else [1.0]
-    figure = Figure(figsize=(7.0, 4.6 + 4.0 * shares[1] if solid else 5.6), layout="constrained")
+    shares = [images[0].shape[0] / images[0].shape[1] / ASPECTS[1]]
+    if solid:
+        shares.append(images[1].shape[0] / images[1].shape[1] / (sum(NEAR[1:]) / NEAR[0] / 2))
+    heights = (1.2 + 3.4 * shares[0] + 4.0 * shares[1]) if solid else 1.6 + 4.0 * shares[0]
+    figure = Figure(figsize=(7.0, heights), layout="constrained")
     axes = figure.subplots(len(images), 1, squeeze=False, height_ratios=shares)[:, 0]
     axes[0].imshow(images[0])
     axes[0].set_axis_off()
@@ -241,13 +245,18 @@ def _image(bodies: Sequence[Any], field: str, view: SolidView, colours: str, *, 
     """Return the picture of both bodies: the half behind the section, from aside or straight on."""
     import pyvista
 
+    cut: dict[str, Any] = {"normal": view.across, "origin": view.centre}
+    halves = [grid.clip(**cut, invert=True) if solid else grid for grid in bodies]
     x0, x1, z0, z1 = view.box
-    size = [PIXELS, round(0.62 * PIXELS)] if whole else [PIXELS, round(PIXELS * (z1 - z0) / (x1 - x0))]
-    plotter = pyvista.Plotter(off_screen=True, window_size=size)
+    way, centre = view.across, view.centre + (z0 + z1) / 2 * view.normal
+    aspect, scale = (z1 - z0) / (x1 - x0), (z1 - z0) / 2
+    if whole:
+        way = view.across + 0.45 * view.along if solid else np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+        way = way + 0.45 * view.normal
+        centre, aspect, scale = filling_view(np.vstack([half.points for half in halves]), way, view.normal)
+    plotter = pyvista.Plotter(off_screen=True, window_size=[PIXELS, round(PIXELS * aspect)])
     plotter.set_background("white")
-    for grid in bodies:
-        cut: dict[str, Any] = {"normal": view.across, "origin": view.centre}
-        half = grid.clip(**cut, invert=True) if solid else grid
+    for grid, half in zip(bodies, halves, strict=True):
         plotter.add_mesh(half.extract_surface(), scalars=field, cmap=colours, clim=view.ranges[field], n_colors=COLOURS,
                          lighting=whole, ambient=0.8, diffuse=0.3, show_scalar_bar=False)  # fmt: skip
         surface = grid.extract_surface()
@@ -260,19 +269,31 @@ def _image(bodies: Sequence[Any], field: str, view: SolidView, colours: str, *, 
             if line.n_points:
                 plotter.add_mesh(line, color="black" if not whole else GREY, line_width=1.5)
     plotter.enable_parallel_projection()
-    way = view.across if solid else np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
-    if whole:
-        way = way + 0.45 * view.normal + (0.45 * view.along if solid else 0.0)
-    centre = view.centre if not whole or solid else np.array([0.0, 0.0, view.centre[2]])
-    if not whole:
-        centre = centre + (z0 + z1) / 2 * view.normal
     plotter.camera_position = [centre + 100 * view.length * way, centre, view.normal]
+    plotter.camera.parallel_scale = scale
     if whole:
-        plotter.reset_camera()
-        plotter.camera.zoom(1.0 if solid else 1.5)  # rings are flat
+        plotter.reset_camera_clipping_range()
     else:
-        plotter.camera.parallel_scale = (z1 - z0) / 2
         plotter.camera.clipping_range = (view.length, 300 * view.length)
     image = np.asarray(plotter.screenshot(None, return_img=True))
     plotter.close()
     return image
+
+
+def filling_view(x: Array, way: Array, normal: Array) -> tuple[Array, float, float]:
+    """Return centre, height over width and half the height (mm) of the picture that points (n, 3) fill.
+
+    Args:
+        x: The points.
+        way: To the viewer.
+        normal: What is up.
+    """
+    way = way / np.linalg.norm(way)
+    up = normal - (normal @ way) * way
+    axes = np.array([np.cross(up, way), up]) / np.linalg.norm(up)
+    seen = x @ axes.T
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    wide, high_half = (1 + MARGIN) * (high - low) / 2
+    aspect = float(np.clip(high_half / wide, *ASPECTS))
+    centre: Array = (low + high) / 2 @ axes + x.mean(axis=0) @ way * way
+    return centre, aspect, float(max(high_half, wide * aspect))

@@ -20,7 +20,7 @@ from fenwear.report.figures import read_history
 from fenwear.report.maps import LEVELS, map_figure, quantities
 from fenwear.report.page import numbers_of
 from fenwear.report.pictures import SHOWN, draw_pictures
-from fenwear.report.solid_pictures import deformed, displacement, points, solid_view
+from fenwear.report.solid_pictures import deformed, displacement, filling_view, points, solid_view
 from fenwear.report.surface import Surface, centre_of_wear, model_of, radial, surface_of
 from fenwear.report.surface_figures import surface_figures
 from fenwear.report.turned import AROUND, turned_figure
@@ -283,3 +283,18 @@ def test_compared(folders: dict[str, Path], tmp_path: Path, names: list[str], li
     assert all(len(ax.get_lines()) == 2 for ax in figure.axes)
     assert draw_comparison(found, tmp_path / "both.png").stat().st_size > 10_000
     assert "counterclockwise.max_pressure_MPa" in found.numbers
+
+
+@pytest.mark.parametrize("sides", [(100.0, 40.0, 12.0), (4.0, 4.0, 1.6), (1.0, 1.0, 9.0)])
+def test_bodies_fill_their_picture(sides: tuple[float, float, float]) -> None:
+    """All corners are in it, seen from anywhere, with little left free the one way or the other."""
+    corners = np.array(sides) * (np.stack(np.meshgrid(*[[0, 1]] * 3), axis=-1).reshape(-1, 3) - [0.2, 0.5, 3.0])
+    way, up = np.array([0.45, -1.0, 0.45]), np.array([0.0, 0.0, 1.0])
+    centre, aspect, scale = filling_view(corners, way, up)
+    right = np.cross(up, way)
+    above = np.cross(way, right)
+    seen = (corners - centre) @ np.transpose([right / np.linalg.norm(right), above / np.linalg.norm(above)])
+    share = np.abs(seen).max(axis=0) / (scale / aspect, scale)
+    assert share.max() == pytest.approx(1 / 1.04, rel=1e-9)
+    assert 0.2 <= aspect <= 0.62
+    np.testing.assert_allclose(seen.min(axis=0), -seen.max(axis=0), atol=1e-9 * max(sides))

@@ -13,8 +13,8 @@ import ufl
 from dolfinx.mesh import CellType, create_rectangle
 from mpi4py import MPI
 
-from fenwear import CaseError, Tribosystem, assemble, march, vary
-from fenwear.assembly import Bodies, Sliding, elastic, place, with_exchange
+from fenwear import CaseError, Tribosystem, assemble, load_case, march, vary
+from fenwear.assembly import Bodies, Sliding, elastic, place, with_exchange, with_reduced_heat
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import OwnLaw, lame, strain, stress
 from fenwear.bodies.mesh import own_mesh
@@ -150,3 +150,17 @@ def test_a_variant_equals_a_new_system(assembled: Callable[..., Tribosystem]) ->
             scale = np.abs(other.gap_by_force).max()
             np.testing.assert_allclose(one.gap_by_force, other.gap_by_force, rtol=0, atol=1e-12 * scale)
             np.testing.assert_allclose(one.load_gap, other.load_gap, rtol=0, atol=1e-9 * np.abs(other.load_gap).max())
+
+
+def test_a_variant_takes_the_operator_of_its_own_settings() -> None:
+    """Whatever that of the system was; what was reduced for whole cycles stays so."""
+    small = ("geometry.parameters.elements_along_contact=4", "geometry.degree=1", "heat.steps=1")
+    full = assemble(load_case("example1-heat", [*small, "heat.operator=full"]))
+    assert full.exchange is not None
+    reduced = vary(full, "heat.operator=reduced")
+    again = vary(reduced, "heat.operator=full")
+    cycles = vary(with_reduced_heat(full), "motion.amplitude=1")
+    assert cycles.heat is not None
+    assert cycles.heat.operator == "full"
+    found = [one.exchange.reduced for one in (full, reduced, again, cycles) if one.exchange is not None]
+    assert found == [False, True, False, True]

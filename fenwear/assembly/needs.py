@@ -180,7 +180,7 @@ class Needs:
     @property
     def contact(self) -> float:
         """Bytes of the whole contact, once."""
-        return NUMBER * (self.interfaces * self.punch.dim + 2 * self.phases + 1) * self.nodes**2
+        return _contact(self.nodes, self.interfaces, self.punch.dim, self.phases)
 
     @property
     def seconds(self) -> float:
@@ -208,6 +208,16 @@ class Needs:
             if less.memory <= memory:
                 return float(times), less
         return None
+
+
+def contact_memory(placed: Placed) -> float:
+    """Return the bytes of the whole contact, once."""
+    interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
+    return _contact(len(placed.pair.weights), interfaces, placed.pair.punch.dim, len(placed.pairs))
+
+
+def _contact(nodes: float, interfaces: int, dim: int, phases: int) -> float:
+    return NUMBER * (interfaces * dim + 2 * phases + 1) * nodes**2
 
 
 def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = False) -> Needs:

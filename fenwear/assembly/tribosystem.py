@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import Needs, needs
+from fenwear.assembly.needs import Needs, contact_memory, needs
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.ways import chosen, free_on_ranks, settle
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
@@ -25,11 +25,13 @@ from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium, join
+from fenwear.memory import GIB
 from fenwear.parallel import Rows, lasting
 
 T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
-SHARED = 2000  # contact nodes from which on ranks share the rows of their compliance
+SHARED = 2 * GIB  # of the whole contact, from which on ranks share the rows of its compliance
+COPIES = 4  # times as much as all ranks together may take for a contact that each has whole
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
 
 
@@ -206,13 +208,16 @@ def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None =
 def shared_rows(placed: Placed) -> Rows | None:
     """Return the contact nodes whose rows of the compliance each rank has; None where every rank has all.
 
-    Ranks share a contact of many nodes. What heat and the contact on all displacements make of a compliance is whole.
+    Ranks share what takes much memory: half-cycles in which many nodes touch go faster with one factor on one rank.
+    What heat and the contact on all displacements make of a compliance is whole.
     """
-    comm, nodes = placed.comm, len(placed.pair.weights)
+    comm, taken = placed.comm, contact_memory(placed)
     alone = comm.size == 1 or placed.bodies.punch.setup.reproducible
-    if alone or placed.heat is not None or placed.solver != "condensed" or nodes < SHARED:
+    if alone or placed.heat is not None or placed.solver != "condensed":
         return None
-    return Rows.equal(lasting(comm), nodes)
+    if taken < SHARED and taken * comm.size < COPIES * SHARED:
+        return None
+    return Rows.equal(lasting(comm), len(placed.pair.weights))
 
 
 def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np.int64] | None, ...]:
@@ -312,10 +317,10 @@ def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = 
 
 
 def preparation(system: Tribosystem) -> Preparation:
-    """Return how the heat of a system was prepared."""
-    if system.exchange is None:
+    """Return how the heat of a system was prepared: "reduced" where its settings do not say so themselves."""
+    if system.exchange is None or system.heat is None:
         return "none"
-    return "reduced" if system.exchange.reduced else "as set"
+    return "reduced" if system.exchange.reduced and system.heat.operator != "reduced" else "as set"
 
 
 def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExchange:

@@ -130,7 +130,8 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     if system.exchange is None or case.heat is None:
         return joined(placed, condensed)
     if not conducts_alike or placed.motion != system.motion:
-        return with_exchange(joined(placed, condensed), reduced=system.exchange.reduced)
+        prepare = with_reduced_heat if preparation(system) == "reduced" else with_exchange
+        return prepare(joined(placed, condensed))
     friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
     return joined(placed, condensed, system.exchange.varied(case.heat, friction))
 

@@ -139,11 +139,18 @@ class Updating:
         except np.linalg.LinAlgError:
             return None
 
+        eliminated: Solve | None = None
+
         def solve_or_eliminate(b: Array) -> Array:
-            try:
-                return solve(b)
-            except NotSolvedError:
-                return self._eliminated(kept)(b)
+            nonlocal eliminated
+            if eliminated is None and self._spent < FACTOR * len(kept) ** 3:
+                try:
+                    return solve(b)
+                except NotSolvedError:
+                    pass
+            if eliminated is None:  # a set that stays has its factor in the end
+                eliminated = self._eliminated(kept)
+            return eliminated(b)
 
         return solve_or_eliminate
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -205,7 +206,11 @@ def calibrate(
     """
     asked = [Unknown(one) if isinstance(one, str) else one for one in unknowns]
     problem = LeastSquares(case, data, asked, baseline, comm)
-    z = np.zeros(len(asked))
+    return problem.team.lead(partial(_calibrated, problem, progress))
+
+
+def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calibration:
+    z = np.zeros(len(problem.unknowns))
     result = None
     for number in range(ROUNDS):  # the jumps of the start are too long or too short for the end
         _begin(problem, z)
@@ -213,7 +218,7 @@ def calibrate(
             problem.check_influence(problem.jacobian(z), z)
         progress(f"fit {number + 1} of {ROUNDS}")
         result = problem.fit(start=z)
-        before, z = z, np.array([result.params[f"u{k}"].value for k in range(len(asked))])
+        before, z = z, np.array([result.params[f"u{k}"].value for k in range(len(z))])
         if np.abs(z - before).max() < STEP:
             break
         if not result.success:

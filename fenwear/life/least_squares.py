@@ -19,6 +19,7 @@ from fenwear.life.model import Model
 from fenwear.life.predictor import Predictor
 from fenwear.life.ranks import share
 from fenwear.life.unknowns import Unknown, scaled
+from fenwear.parallel import Team
 
 if TYPE_CHECKING:
     import lmfit
@@ -49,7 +50,8 @@ class LeastSquares:
         Raises:
             CaseError: a key, bound or combination of data that makes no sense.
         """
-        self.case, self.comm = case, comm
+        self.case, self.comm, self.team = case, comm, Team.of(comm)
+        self.team.serve(self)
         self.model = Model(case)
         self.model.check_constant()
         self.data = list(data)
@@ -111,7 +113,14 @@ class LeastSquares:
         return (np.array(columns).T if columns else np.zeros((len(self.observed), 0))), names
 
     def keep_jumps(self, z: Vector) -> None:
-        """Let the runs from now on jump as those of these fitted unknowns do: predictions are smooth functions then."""
+        """Let the runs from now on jump as those of these fitted unknowns do: predictions are smooth functions then.
+
+        Collective, or for rank 0 that leads.
+        """
+        self.team.each(self, "keep_own_jumps", z)
+
+    def keep_own_jumps(self, z: Vector) -> None:
+        """Do so on this rank."""
         self.predict.keep_jumps(self.values(z))
         self._known.clear()
 
@@ -138,8 +147,11 @@ class LeastSquares:
         return known[key]
 
     def jacobian(self, z: Vector) -> Array:
-        """Return the predictions' derivatives by the fitted unknowns (n, m); collective, one on each rank."""
-        base = np.array(z, dtype=float)
+        """Return the predictions' derivatives by the fitted unknowns (n, m); collective, or for rank 0 that leads."""
+        return np.asarray(self.team.each(self, "shared_jacobian", np.array(z, dtype=float)))
+
+    def shared_jacobian(self, base: Array) -> Array:
+        """Return the same, one column on each rank; collective."""
 
         def shifted(k: int) -> Array:
             ends = []

@@ -193,7 +193,7 @@ def lifetime(
         raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))
     scatter.check(case)
     with_indices = len(scatter.keys) > 1 and not scatter.correlated
-    design = _design(scatter, samples, seed, with_indices=with_indices)
+    design = on_root(comm, lambda: _design(scatter, samples, seed, with_indices=with_indices))
     record = _Record(folder, scatter.keys, quantity.text, design) if folder is not None else None
     done = on_root(comm, lambda: {} if record is None else record.begin(resume=resume))
     lives, failures = _run(case, quantity, scatter.keys, design, done, record, limit, comm, progress)

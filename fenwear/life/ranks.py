@@ -33,6 +33,24 @@ def share(
     return results
 
 
+def everywhere(comm: MPI.Comm, function: Callable[[], T]) -> T:
+    """Return what a call on this rank returns, all ranks calling their own; collective.
+
+    Raises:
+        Exception: what a call on any rank raised, on every rank.
+    """
+    results: list[T] = []
+    failure: Exception | None = None
+    try:
+        results.append(function())
+    except Exception as error:  # raised on all ranks below: none waits for another
+        failure = error
+    for problem in comm.allgather(failure):
+        if problem is not None:
+            raise problem
+    return results[0]
+
+
 def in_chunks(comm: MPI.Comm, numbers: Sequence[int], function: Callable[[int], T]) -> Iterator[list[T | FenwearError]]:
     """Yield the outcomes, in order and on every rank, of one call on each rank after another; collective.
 

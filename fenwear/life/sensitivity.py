@@ -21,7 +21,7 @@ from fenwear.life.keys import Key, find_key, with_values
 from fenwear.life.linearised import SteadyTangent, differentiable
 from fenwear.life.model import Model, Snapshot
 from fenwear.life.quantities import Path, Quantity, check_quantity, evaluate, parse_quantity
-from fenwear.life.ranks import share
+from fenwear.life.ranks import everywhere, share
 
 STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error is small
 GOOD = 1e-6  # relative error of a derivative at which the step stays
@@ -140,14 +140,15 @@ def sensitivity(
     if not wanted or not found:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
     model = Model(case)
-    bases = [evaluate(model, quantity, {}) for quantity in wanted]
+    bases = everywhere(comm, lambda: [evaluate(model, quantity, {}) for quantity in wanted])
     for quantity, (value, _) in zip(wanted, bases, strict=True):
         if not np.isfinite(value):
             raise CaseError(
                 InputError("--of", f"{quantity.text!r} is never reached in this case: it has no derivative")
             )
     methods = [_method(model, quantity, method) for quantity in wanted]
-    tangent = SteadyTangent(model.system(), model.steady({})) if "implicit" in methods else None
+    implicit = "implicit" in methods
+    tangent = everywhere(comm, lambda: SteadyTangent(model.system(), model.steady({})) if implicit else None)
 
     def one(k: int) -> list[Derivative]:
         nearby = None if tangent is None else _Nearby(model, found[k], tangent)

@@ -225,6 +225,23 @@ def test_large_sets_by_iterations(monkeypatch: pytest.MonkeyPatch, whole: bool) 
     assert len(eliminated) >= 2  # iterations that have cost as much as a factor are followed by one
 
 
+def test_a_set_that_stays_gets_its_factor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One solution operator, kept for many solutions, iterates only until a factor would have cost as much."""
+    monkeypatch.setattr("fenwear.contact.operators.ITERATED", 40)
+    random, n = np.random.default_rng(9), 400
+    matrix = compliance(n, 0.3, 3)[0] + 0.02 * np.eye(n)
+    factors = Updating(lambda rows, columns: matrix[np.ix_(rows, columns)], matrix.diagonal())
+    solve, counts = factors.factor(np.arange(n, dtype=np.int32)), []
+    for _ in range(8):
+        b = random.uniform(-1, 1, n)
+        exact = np.linalg.solve(matrix, b)
+        np.testing.assert_allclose(solve(b), exact, rtol=0, atol=1e-8 * np.abs(exact).max())
+        counts.append(factors.iterations)
+    assert 0 < counts[0] < n
+    assert counts[-1] == counts[-2]
+    assert factors.base is not None
+
+
 def test_iterations_that_fail_are_followed_by_an_elimination(monkeypatch: pytest.MonkeyPatch) -> None:
     """A matrix whose diagonal says nothing of it; and a set that is singular, iterated or not."""
     monkeypatch.setattr("fenwear.contact.operators.ITERATED", 40)

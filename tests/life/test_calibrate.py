@@ -37,6 +37,7 @@ def volumes(after: Sequence[float], values: Sequence[float], sigma: Sequence[flo
     return DataSet("volumes", settings, (series,))
 
 
+@pytest.mark.mpi
 def test_standard_error_of_archards_coefficient_is_exact(small: Callable[..., Case]) -> None:
     """V = k F s: k = sum V_i F s_i / sum (F s_i)^2 and its error sigma / sqrt(sum (F s_i)^2), from any start."""
     after, sigma = np.array([100.0, 200.0, 300.0]), 0.01

@@ -20,8 +20,9 @@ from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
 from fenwear.law import decided
+from fenwear.lookout import Lookout
 from fenwear.parallel import on_root
-from fenwear.progress import LOOK, How, Log, Progress
+from fenwear.progress import How, Log, Progress
 from fenwear.results import checkpoint
 from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
@@ -189,11 +190,7 @@ class _Run:
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
-        self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
-        self._signals: Signals | None = None
-        self._progress: Progress | None = None
-        self._block_begun = self._looked = time.monotonic()
-        self._block_over = False
+        self._lookout: Lookout | None = None  # while it marches
 
     def _open_history(self, after: int | None) -> None:
         if after is not None and not (self.directory / HISTORY).exists():
@@ -214,12 +211,13 @@ class _Run:
             OutputError: a file cannot be written.
         """
         with Progress("half-cycle", self.case.run.half_cycles, self.state.half_cycle, self.comm, progress) as told:
-            self._signals, self._progress = signals, told
+            every = self.case.output.checkpoint
+            self._lookout = Lookout(self.comm, signals, told, self._save, every=every, block=BLOCK_SECONDS)
             for block in self._blocks():
                 self._take(block)
                 told.reached(int(block.half_cycle[-1]), _in_short(block))
-                self._block_begun = time.monotonic()
-                if self._look():
+                self._lookout.begin_block()
+                if self._lookout.look():
                     self._save()
                     raise InterruptedRunError(f"interrupted after half-cycle {self.state.half_cycle}")
 
@@ -229,32 +227,12 @@ class _Run:
         Raises:
             InterruptedRunError: a signal has come.
         """
-        if self.comm.size == 1 and time.monotonic() < self._looked + LOOK:
+        lookout = self._lookout
+        if lookout is None or lookout.too_soon:
             return False
-        if self._look():
+        if lookout.look():
             raise InterruptedRunError(f"interrupted in the step after half-cycle {self.state.half_cycle}")
-        return self._block_over
-
-    def _look(self) -> bool:
-        """Save where it is due, tell how far the run is, and return whether a signal has come; collective.
-
-        One clock decides, that of rank 0; a signal to any rank ends all of them.
-        """
-        self._looked = now = time.monotonic()
-        root, signals = self.comm.rank == 0, self._signals
-        wishes = [
-            signals is not None and signals.received,
-            root and now > self._checkpoint_due,
-            root and now > self._block_begun + BLOCK_SECONDS,
-        ]
-        interrupted, save, self._block_over = (self.comm.allreduce(np.array(wishes, dtype=int)) > 0).tolist()
-        if save and self.state.half_cycle > 0:
-            self._save()
-        if self._progress is not None:
-            self._progress.working()
-        if interrupted and signals is not None:
-            signals.ending = True
-        return bool(interrupted)
+        return lookout.block_over
 
     def _blocks(self) -> Iterator[Block]:
         for block in follow_program(self.system, self._integrate, self._last, self.start):
@@ -326,9 +304,9 @@ class _Run:
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
-        self._on_history(HistoryWriter.flush)
-        checkpoint.save(self.directory, self.system, self.state)
-        self._checkpoint_due = time.monotonic() + self.case.output.checkpoint
+        if self.state.half_cycle > 0:
+            self._on_history(HistoryWriter.flush)
+            checkpoint.save(self.directory, self.system, self.state)
 
     def stop(self, failure: Exception | None) -> str:
         """Return how the half-cycles ended."""
@@ -353,8 +331,7 @@ class _Run:
             return {}
         if self.state.half_cycle not in self._fields_at and self.case.output.fields_at is None:
             self._write_fields(self.last)
-        if self.state.half_cycle > 0:
-            self._save()
+        self._save()
         reason = self._note_growth(self.last)
         if reason:
             how = {**how, "no_growth_rate": reason}

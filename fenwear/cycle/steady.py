@@ -32,7 +32,7 @@ from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_syst
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
 from fenwear.cycle.state import pressure_scale
-from fenwear.cycle.steady_inequality import OPEN, SteadyInequality
+from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_memory
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.field import HeatState
@@ -124,7 +124,8 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
             temperature; by default a tenth of heat.property_tolerance.
 
     Raises:
-        CaseError: with heat, a body that loses heat nowhere; a property that is not positive.
+        CaseError: with heat, a body that loses heat nowhere, or more nodes than fit into the memory; a property that is
+            not positive.
         ConvergenceError: the inequality did not converge, or not with the nodes that conduct, or not with the
             properties of the temperatures.
     """
@@ -144,6 +145,8 @@ def _of_these_bodies(system: Tribosystem) -> Steady:
     for body, side in zip(prepared.bodies.heat or (), sides, strict=True):
         if not side.cooled:
             raise CaseError(no_heat_sink(body.body.name))
+
+    check_memory(system)
 
     def found() -> Steady:
         problem = SteadyInequality(prepared)

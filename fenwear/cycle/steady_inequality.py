@@ -15,12 +15,16 @@ from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator
 from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
-from fenwear.errors import ConvergenceError
+from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.memory import GIB, free_memory, memory_size
+from fenwear.parallel import agreed
 from fenwear.sliding.friction import ContactConditions
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
 LARGE = 4000  # nodes from which on no matrix of them is made
+NUMBER, COUPLED = 8, 3  # bytes; copies of what the heat of all phases opens in all phases, as they are scaled
+SMALL = GIB  # below which no estimate refuses anything
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
 
 
@@ -201,3 +205,23 @@ class SteadyInequality:
 
 def _same(one: csr_array, other: csr_array) -> bool:
     return all(np.array_equal(getattr(one, n), getattr(other, n)) for n in ("indptr", "indices", "data"))
+
+
+def check_memory(system: Tribosystem) -> None:
+    """Make sure that what the heat of all phases opens in all phases fits into the memory; collective.
+
+    Raises:
+        CaseError: it does not.
+    """
+    m, n = len(system.motion.phases), len(system.pair.weights)
+    free, taken = agreed(system.comm, free_memory()), COUPLED * NUMBER * float(m * n) ** 2
+    if system.heat is None or free is None or taken <= max(free, SMALL):
+        return
+    raise CaseError(
+        InputError(
+            "geometry",
+            f"the steady state with heat of {n:,} contact nodes in {m} phases takes {memory_size(taken)}, but "
+            f"{memory_size(free)} are free; expected larger elements at the contact, fewer motion.positions, or the "
+            "wear followed by `run`",
+        )
+    )

@@ -13,8 +13,9 @@ import xarray
 from fenwear.arrays import Mask
 from fenwear.case import Case, doubts
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError
+from fenwear.lookout import Lookout
 from fenwear.parallel import on_root
-from fenwear.progress import LOOK, How, Log, Progress
+from fenwear.progress import How, Log, Progress
 from fenwear.report.stick import write_stick_report
 from fenwear.results.history import HISTORY, make_directory, write_case, write_summary
 from fenwear.signals import Signals
@@ -78,7 +79,7 @@ class _Run:
         *,
         resume: bool,
     ) -> None:
-        self.case, self.directory, self.log, self.signals = case, directory, log, signals
+        self.case, self.directory, self.log = case, directory, log
         self.comm = comm = meshed(rig.interface).bodies.comm
         self.cycles = max(case.run.half_cycles // rig.program.half_cycles, 1)
         self.jumps = case.run.integration == "jump"
@@ -94,8 +95,7 @@ class _Run:
         self.writer: CycleWriter | None = None  # of rank 0
         on_root(comm, self._open_history)
         self.told = Progress("cycle", self.cycles, self.done, comm, progress)
-        self._looked = time.monotonic()
-        self._save_due = self._looked + case.output.checkpoint
+        self._lookout = Lookout(comm, signals, self.told, self._save, every=case.output.checkpoint)
 
     def _open_history(self) -> None:
         after = None if self.last is None else self.last.number
@@ -157,29 +157,19 @@ class _Run:
         self.told.reached(self.done, f"p max {cycle.half_cycles[-1].pressure.max():.4g} MPa")
 
     def _watch(self) -> None:
-        """Save where it is due, and tell how far the run is; collective.
+        """Look, between two solves, whether something is due; collective.
 
         Raises:
             InterruptedRunError: a signal has come.
         """
-        if self.comm.size == 1 and not self.signals.received and time.monotonic() < self._looked + LOOK:
-            return
-        self._looked = now = time.monotonic()
-        wishes = [self.signals.received, self.comm.rank == 0 and now > self._save_due]
-        interrupted, save = (self.comm.allreduce(np.array(wishes, dtype=int)) > 0).tolist()
-        if interrupted:
-            self.signals.ending = True
+        if not self._lookout.too_soon and self._lookout.look():
             raise InterruptedRunError("interrupted")
-        if save and self.last is not None:
-            self._save()
-        self.told.working()
 
     def _save(self) -> None:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
-        on_root(self.comm, lambda: None if self.writer is None else self.writer.flush())
         if self.last is not None:
+            on_root(self.comm, lambda: None if self.writer is None else self.writer.flush())
             checkpoint.save(self.directory, self.case, self.rig, self.last)
-        self._save_due = time.monotonic() + self.case.output.checkpoint
 
     def _finish(self, how: dict[str, Any], *, report: bool) -> dict[str, Any]:
         """Write what a run ends with, and return the summary; for rank 0."""

@@ -19,6 +19,7 @@ from fenwear.verify import (
     stick,
     stick_solids,
     thermal,
+    turning,
     wear,
 )
 from fenwear.verify.suite import Outcome, Plot, Result, Row, VerificationCase, registered, run_cases
@@ -49,5 +50,6 @@ __all__ = [
     "stick",
     "stick_solids",
     "thermal",
+    "turning",
     "wear",
 ]

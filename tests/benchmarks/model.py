@@ -29,7 +29,7 @@ from fenwear.assembly.ways import dealt
 from fenwear.bodies.factor import entries, operations
 
 SMALL, LARGE = ("plane", "32", "0.2"), ("plane", "64", "0.1")  # elements along the contact, growth of their size
-SOLIDS = (8, 16)  # elements over the width of a solid contact
+SOLIDS = (12, 16)  # elements over the width of a solid contact; the first on one rank gives the rate
 PRODUCTS = 60  # iterations of a wear step of 10,000 nodes that all touch, measured on two ranks
 NETWORK, LATENCY = 10e9, 2e-6  # bytes a second and s a message between nodes, assumed
 EDGE_ENTRIES, EDGE_WORK = 1 / (1 - math.sqrt(0.5)), 2.0  # over a dissection's levels: only fronts at the edge have it

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, ConvergenceError, Tribosystem, assemble, jump, march, steady
+from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, jump, march, steady
 from fenwear.cycle import cycles_to_reach
 
 A, MEAN = 30.0, 1e4 / 600
@@ -201,6 +201,17 @@ def test_blocks_of_many_nodes(
     for other in others:
         np.testing.assert_allclose(other.phase_pressure, one.phase_pressure, rtol=0, atol=1e-9 * MEAN)
         np.testing.assert_allclose(other.shape, one.shape, rtol=0, atol=1e-9 * np.nanmax(np.abs(one.shape)))
+
+
+def test_heat_of_too_many_nodes_is_refused(
+    assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before the memory runs out; without heat no such matrix is made."""
+    monkeypatch.setattr("fenwear.cycle.steady_inequality.free_memory", lambda: 1e3)
+    monkeypatch.setattr("fenwear.cycle.steady_inequality.SMALL", 0)
+    with pytest.raises(CaseError, match=r"geometry.*with heat of \d+ contact nodes in 2 phases takes .* are free"):
+        steady(assembled("example1-heat", "geometry.degree=2"))
+    steady(assembled("example1", "geometry.degree=2"))
 
 
 CAPPED = ("geometry.degree=2", "geometry.parameters.elements_along_contact=12")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import Tribosystem
+from fenwear import Tribosystem, assemble, load_case
 from fenwear.bodies import condensation
 from fenwear.heat.contact_response import _by_columns, contact_responses
 from fenwear.heat.prepare import contact_rows, inflows
@@ -48,14 +48,13 @@ def test_a_step_at_rest_is_one_of_hardly_moving_material(assembled: Callable[...
             assert total(comm, np.array([np.abs(one - other).sum()]))[0] <= 1e-11 * size
 
 
-def test_large_factors_are_freed_beside_heat(
-    assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_large_factors_are_freed_beside_heat(monkeypatch: pytest.MonkeyPatch) -> None:
     """And made again where they are asked for: the loads' displacement is the same."""
     monkeypatch.setenv("FENWEAR_KEPT_GIB", "0")
-    before = assembled("example1-heat", *COARSE, "heat.steps=3")
+    case = load_case("example1-heat", COARSE)
+    before = assemble(case)
     monkeypatch.setattr(condensation, "LARGE", 0)
-    after = assembled("example1-heat", *COARSE, "heat.steps=4")
+    after = assemble(case)
     for one, other in ((before.bodies.punch, after.bodies.punch), (before.bodies.strip, after.bodies.strip)):
         assert one._factors
         assert not other._factors

@@ -52,6 +52,7 @@ def append(path: Path, step: Step) -> None:
     with writing(path):
         check_room(path.parent, 2 * size + HEADER * (8 + len(step.values)) + _size(path))
         try:
+            part.unlink(missing_ok=True)  # a killed run may have left half of one
             if path.exists():
                 shutil.copyfile(path, part)
             with h5py.File(part, "a") as file:

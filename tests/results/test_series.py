@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import xarray
 
 from fenwear import load_case
 from fenwear.results.fields import SERIES
+from fenwear.results.series import TRIANGLE
+from fenwear.results.vtkhdf import Step, append
 from fenwear.run import run_case
 
 
@@ -69,3 +73,14 @@ def test_stress_of_the_contact(tmp_path: Path) -> None:
         assert not data[f"{body}_stress_yy"].any()
     for variable in data.variables.values():
         assert variable.attrs.get("units") or "degree" in variable.attrs
+
+
+def test_what_a_killed_run_left_half_written_is_passed_over(tmp_path: Path) -> None:
+    """With or without a whole series beside it."""
+    path = tmp_path / SERIES
+    step = Step(0.5, np.eye(3), [(TRIANGLE, np.array([[0, 1, 2]]))], {"body": np.ones(3)})
+    for count in (1, 2):
+        path.with_name(f"{SERIES}.part").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(range(200)))
+        append(path, replace(step, time=float(count)))
+        with h5py.File(path) as file:
+            assert file["VTKHDF/Steps/Values"][:].tolist() == list(range(1, count + 1))

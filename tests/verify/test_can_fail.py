@@ -134,7 +134,8 @@ def steeper_wear(patch: Patch) -> None:
 
     def phases(self: Wear, *arguments: Any) -> Any:
         found = right(self, *arguments)
-        return replace(found, punch=replace(found.punch, exponent=1.1 * found.punch.exponent))
+        law = replace(found.punch.law, exponent=1.1 * found.punch.law.exponent)
+        return replace(found, punch=replace(found.punch, law=law))
 
     patch.setattr(Wear, "phases", phases)
 

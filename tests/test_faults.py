@@ -251,7 +251,7 @@ def test_signal_to_mpirun(fenwear: Run, tmp_path: Path, number: signal.Signals) 
 
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
-    """Jumps of many solves: saved long before 200 are recorded, and ended by a signal within one."""
+    """Jumps of many solves: saved while they go on, and ended by a signal within one."""
     folder = tmp_path / "run"
     settings = ("run.integration=jump", "run.jump_tolerance=1e-4", "output.checkpoint=1")
     with running(folder, *settings, ranks=ranks, case="fretting") as process:
@@ -262,8 +262,7 @@ def test_jumps_save_and_stop(fenwear: Run, tmp_path: Path, ranks: int) -> None:
     with np.load(folder / "checkpoint" / "state.npz") as saved:
         reached = int(saved["half_cycle"])
     with xarray.open_dataset(folder / "history.nc", engine="h5netcdf") as history:
-        assert 0 < history.sizes["half_cycle"] < 200
-        assert history.half_cycle.values[-1] == reached
+        assert history.half_cycle.values[-1] == reached > 0
     words = options(*settings, f"run.half_cycles={reached + 2}", "output.every=1", "output.fields_at=[]")
     done = fenwear("run", "fretting", "-o", folder, *words, "--resume")
     assert done.returncode == 0, done.stderr

@@ -15,7 +15,11 @@ import numpy as np
 import pytest
 import xarray
 
+from fenwear import Tribosystem, load_case
+from fenwear.cycle.state import RunState
+from fenwear.results import checkpoint
 from fenwear.results.reading import load_history
+from fenwear.run import run_case
 
 Run = Callable[..., Any]
 SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.steps=2")
@@ -113,3 +117,25 @@ def test_refusals(fenwear: Run, tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "no checkpoint in" in done.stderr
     assert not (tmp_path / "none").exists()
+
+
+def test_jumps_are_saved_long_before_a_block_of_them_is_full(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the clock, which is always over here: each jump is recorded and saved."""
+    saved: list[int] = []
+    save = checkpoint.save
+
+    def noted(directory: Path, system: Tribosystem, state: RunState) -> None:
+        saved.append(state.half_cycle)
+        save(directory, system, state)
+
+    monkeypatch.setattr("fenwear.run.BLOCK_SECONDS", 0.0)
+    monkeypatch.setattr("fenwear.lookout.LOOK", 0.0)
+    monkeypatch.setattr(checkpoint, "save", noted)
+    settings = ("run.half_cycles=400", "run.jump_tolerance=0.02", "output.checkpoint=1e-9", "output.report=false")
+    case = load_case(
+        "block-on-ring", [*settings, "output.fields_at=[]", "geometry.parameters.elements_along_contact=8"]
+    )
+    _, folder = run_case(case, "run", tmp_path / "run", lambda message: None, progress="none")
+    recorded = history(folder).half_cycle.values.tolist()
+    assert len(recorded) < 200
+    assert sorted(set(saved)) == recorded

@@ -212,8 +212,12 @@ class Needs:
 
 def contact_memory(placed: Placed) -> float:
     """Return the bytes of the whole contact, once."""
-    interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
-    return _contact(len(placed.pair.weights), interfaces, placed.pair.punch.dim, len(placed.pairs))
+    return _contact(len(placed.pair.weights), _interfaces(placed), placed.pair.punch.dim, len(placed.pairs))
+
+
+def _interfaces(placed: Placed) -> int:
+    """Return how many interfaces the phases and the middle position have."""
+    return len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
 
 
 def _contact(nodes: float, interfaces: int, dim: int, phases: int) -> float:
@@ -235,8 +239,7 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = Fal
     of_punch = body_needs(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
     one = not moves or (fixed and flat)
     of_strip = body_needs(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
-    interfaces = len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
-    return Needs(of_punch, of_strip, n, interfaces, len(placed.pairs), 1 if shared else placed.comm.size)
+    return Needs(of_punch, of_strip, n, _interfaces(placed), len(placed.pairs), 1 if shared else placed.comm.size)
 
 
 def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool = False) -> BodyNeeds:

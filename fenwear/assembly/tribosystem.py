@@ -93,6 +93,14 @@ class Tribosystem(Placed):
         """
         return self.team.lead(function) if self.replicated else function()
 
+    def led_whole(self, function: Callable[[], T]) -> T:
+        """Call what takes the whole compliance, on rank 0 for all, but where ranks share its rows; collective.
+
+        Raises:
+            Exception: what `function` raised, on every rank.
+        """
+        return function() if self.condensed.rows else self.team.lead(function)
+
     def contact(self, directions: Sequence[int]) -> ContactSolver:
         """Return the contact in the middle position under the mean loads.
 

@@ -101,8 +101,7 @@ def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None
             InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
         )
     system = with_reduced_heat(system)  # before rank 0 leads
-    function = partial(_growth_rate, system, pressure, conductances)
-    return function() if system.condensed.rows else system.team.lead(function)
+    return system.led_whole(partial(_growth_rate, system, pressure, conductances))
 
 
 def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None) -> float:
@@ -138,8 +137,7 @@ def stationary_growth(
     if not change < 1:  # the same number on all ranks
         return None, "the last cycle is the first, or not like the one before"
     system = with_reduced_heat(system)
-    function = partial(_stationary_growth, system, pressure, surfaces, phase, change)
-    return function() if system.condensed.rows else system.team.lead(function)
+    return system.led_whole(partial(_stationary_growth, system, pressure, surfaces, phase, change))
 
 
 def _stationary_growth(

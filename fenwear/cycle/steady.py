@@ -153,7 +153,7 @@ def _of_these_bodies(system: Tribosystem) -> Steady:
         return _result(problem, *_solve(problem))
 
     prepared.team.serve(prepared)
-    return replace(found() if prepared.condensed.rows else prepared.team.lead(found), system=system)
+    return replace(prepared.led_whole(found), system=system)
 
 
 def _warmed(state: Steady, share: float) -> Steady:

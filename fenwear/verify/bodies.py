@@ -1,4 +1,4 @@
-"""The bodies of the verification cases: two blocks on each other, and a rigid punch on a half-plane."""
+"""The bodies of the verification cases: two blocks, a rigid punch on a half-plane; how fast wear relieves them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
+import numpy as np
+
+from fenwear.arrays import Array
 from fenwear.assembly import Bodies, Tribosystem, assemble, build_bodies
 from fenwear.case import Case, load_case, make_case
 
@@ -98,3 +101,20 @@ def rigid_punch(depth: float, *settings: str) -> Tribosystem:
         "contact.friction=0",
         *settings,
     )
+
+
+def relief_rates(system: Tribosystem, modulus: float, speed: Array | float = 1.0) -> Array:
+    """Return the eigenvalues (n,) of the pressure that worn depths take away in closed contact, times a modulus.
+
+    Args:
+        system: Without friction.
+        modulus: That the compliance is measured by, MPa.
+        speed: At which the nodes wear (n,).
+    """
+    rigid = system.rigid
+    n, r = rigid.rigid_normal.shape
+    matrix = np.zeros((n + r, n + r))
+    matrix[:n, :n] = system.interface.compliance(0.0) * modulus
+    matrix[:n, n:] = rigid.rigid_normal
+    matrix[n:, :n] = rigid.equilibrium(0.0)
+    return np.asarray(np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n] * speed).real)

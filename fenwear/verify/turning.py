@@ -12,6 +12,7 @@ from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import growth_rate, march, steady
+from fenwear.verify.bodies import relief_rates
 from fenwear.verify.solid import (
     MODULUS,
     RIGID,
@@ -56,13 +57,7 @@ def decay_rates(system: Tribosystem, speed: Array) -> Array:
 
     On closed contact S p' + H a' = -k v p with the equilibrium of p' (full contact, no friction in S).
     """
-    rigid = system.rigid
-    n, r = rigid.rigid_normal.shape
-    matrix = np.zeros((n + r, n + r))
-    matrix[:n, :n] = system.interface.compliance(0.0) * MODULUS
-    matrix[:n, n:] = rigid.rigid_normal
-    matrix[n:, :n] = rigid.equilibrium(0.0)
-    values = np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n] * speed).real
+    values = relief_rates(system, MODULUS, speed)
     return np.sort(values[values > 1e-6 * values.max()])
 
 

@@ -12,7 +12,7 @@ from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import growth_rate, jump, march, stability_number, steady
-from fenwear.verify.bodies import builtin, rigid_punch
+from fenwear.verify.bodies import builtin, relief_rates, rigid_punch
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 HALF_WIDTH, MEAN = 30.0, 1e4 / 600  # mm; p_m, MPa
@@ -122,13 +122,7 @@ def half_plane_rates(terms: int = 24) -> Array:
 
 def stiffness_rates(system: Tribosystem, effective: float) -> Array:
     """Return the same rates of fenwear's interface: eigenvalues of the pressure that a worn depth takes away."""
-    rigid = system.rigid
-    n, r = rigid.rigid_normal.shape
-    matrix = np.zeros((n + r, n + r))
-    matrix[:n, :n] = system.interface.compliance(0.0) * effective
-    matrix[:n, n:] = rigid.rigid_normal
-    matrix[n:, :n] = rigid.equilibrium(0.0)
-    values = np.linalg.eigvals(np.linalg.inv(matrix)[:n, :n]).real * HALF_WIDTH
+    values = relief_rates(system, effective) * HALF_WIDTH
     return np.sort(values[values > 1e-6])
 
 

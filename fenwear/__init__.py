@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from fenwear.stack import importing, load_mpi_first
+
 __version__ = "0.2.0"
 
 __all__ = [
@@ -74,9 +76,13 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'fenwear' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"fenwear.{_HOMES[name]}"), name)
+    with importing():
+        return getattr(import_module(f"fenwear.{_HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:
     """Return the public names, for completion."""
     return sorted(__all__)
+
+
+load_mpi_first()

@@ -11,6 +11,9 @@ import sys
 import traceback
 from typing import TYPE_CHECKING
 
+from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError, StackError
+from fenwear.stack import check_numbers, importing
+
 if TYPE_CHECKING:
     from mpi4py import MPI
 
@@ -18,26 +21,32 @@ if TYPE_CHECKING:
 def main() -> int:
     """Run the command line and return the exit status; every rank calls it."""
     os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")  # silent where a container hides the processor's topology
-    arguments, petsc_options = _split(sys.argv[1:])
-    import numpy as np
-    import petsc4py
-    from mpi4py import MPI  # before PETSc, which asks for no threads: a sweep on several ranks has one for its messages
+    try:
+        return _start(*_split(sys.argv[1:]))
+    except StackError as error:
+        print(f"fenwear: {error}", file=sys.stderr)
+        return 1
 
-    petsc4py.init([sys.argv[0], "-no_signal_handler", *petsc_options])  # signals are ours, or the system's
-    from petsc4py import PETSc
 
+def _start(arguments: list[str], petsc_options: list[str]) -> int:
+    with importing():
+        import petsc4py
+        from mpi4py import MPI  # before PETSc, which asks for no threads: a sweep on several ranks has one for messages
+
+        petsc4py.init([sys.argv[0], "-no_signal_handler", *petsc_options])  # signals are ours, or the system's
+    check_numbers()
     comm = MPI.COMM_WORLD
     if comm.rank != 0:  # what all ranks say, rank 0 says
         sys.stdout = sys.stderr = open(os.devnull, "w")  # noqa: SIM115
-    if np.dtype(PETSc.ScalarType).kind == "c":
-        print("fenwear needs PETSc with real numbers: on Debian install python3-dolfinx-real", file=sys.stderr)
-        return 1
     from fenwear.compiled import ensure_folder
 
     told = ensure_folder(comm)
     if told is not None:
         print(f"fenwear: {told}", file=sys.stderr)
-    return _call(arguments, comm)
+    status = _call(arguments, comm)
+    # What mpirun returns is rank 0's: a rank that ended before it with another status than 0 would have all others
+    # killed, what rank 0 has written among what is lost.
+    return status if comm.rank == 0 else 0
 
 
 def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
@@ -47,16 +56,16 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _call(arguments: list[str], comm: MPI.Comm) -> int:
-    import click
+    import typer
 
-    from fenwear.cli import app
-    from fenwear.errors import CaseError, ConvergenceError, InterruptedRunError, OutputError
+    from fenwear.cli import UsageError, app
     from fenwear.signals import ignore_from_now_on
 
     try:
-        result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
+        with importing():  # commands import what they need
+            result = app(args=arguments, prog_name="fenwear", standalone_mode=False)
         return int(result) if isinstance(result, int) else 0
-    except click.ClickException as error:
+    except UsageError as error:
         error.show(file=sys.stderr)
         return 2
     except CaseError as error:
@@ -66,12 +75,12 @@ def _call(arguments: list[str], comm: MPI.Comm) -> int:
     except ConvergenceError as error:
         print(f"fenwear: {error}", file=sys.stderr)
         return 3
-    except (InterruptedRunError, OutputError) as error:
+    except (InterruptedRunError, OutputError, StackError) as error:
         print(f"fenwear: {error}", file=sys.stderr)
         if isinstance(error, InterruptedRunError):
             ignore_from_now_on()
         return 1
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         print("fenwear: interrupted", file=sys.stderr)
     except Exception:
         traceback.print_exc(file=sys.__stderr__)

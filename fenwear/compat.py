@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import dolfinx.io
@@ -12,7 +13,11 @@ from dolfinx.graph import adjacencylist
 from dolfinx.mesh import Mesh, MeshTags
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
+from fenwear.stack import check_numbers
+
+check_numbers()
 CORNERS = {"triangle": 3, "quadrilateral": 4, "tetrahedron": 4, "hexahedron": 8}
 
 
@@ -79,13 +84,29 @@ def geometry_degree(mesh: Mesh) -> int:
     return int((mesh.geometry.cmap if maps is None else maps[0]).degree)
 
 
-def petsc_library() -> str | None:
-    """Return the path of PETSc's library; None where it is not found. From 0.10 on dolfinx.fem.petsc tells it."""
-    import dolfinx.fem.petsc
-    import dolfinx.utils
-
-    find = getattr(dolfinx.utils, "get_petsc_lib", None) or getattr(dolfinx.fem.petsc, "get_petsc_lib", None)
+@cache
+def least_fill() -> str:
+    """Return the ordering of least fill for PETSc's own factors: that of SuiteSparse, where PETSc is built with it."""
+    one = PETSc.Mat().createAIJ(1, nnz=1, comm=PETSc.COMM_SELF)
+    one[0, 0] = 1.0
+    one.assemble()
     try:
-        return None if find is None else str(find())
+        one.getOrdering("amd")
+    except PETSc.Error:
+        return "nd"
+    finally:
+        one.destroy()
+    return "amd"
+
+
+def petsc_library() -> str | None:
+    """Return the path of PETSc's library; None where it is not found. Up to 0.9 dolfinx.utils tells it."""
+    import dolfinx.fem.petsc
+
+    home = dolfinx.fem.petsc
+    if not hasattr(home, "get_petsc_lib"):
+        home = __import__("dolfinx.utils", fromlist=["utils"])
+    try:
+        return str(home.get_petsc_lib())
     except RuntimeError:  # not where PETSc's own configuration says
         return None

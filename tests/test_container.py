@@ -306,7 +306,7 @@ printf '%s\\n' "${COMPREPLY[@]}"
     [
         (["fenwear", "st"], ["steady"]),
         (["fenwear", "--b"], ["--build"]),
-        (["fenwear", "test", "-"], ["--fast", "--on"]),
+        (["fenwear", "test", "-"], ["--fast", "--on", "--wheel"]),
         (["fenwear", "docs", ""], ["--show"]),
         (["fenwear", "info", "motion.am"], ["/fenwear 2 fenwear info motion.am"]),
     ],

@@ -1,0 +1,99 @@
+"""The stack below fenwear: loaded in an order that works, and what is missing is told by its name.
+
+In wheels from PyPI, dolfinx and PETSc find the library of MPI only where mpi4py has loaded it before.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from fenwear.errors import StackError
+
+LINKED = ("dolfinx", "petsc4py")  # to MPI
+PARTS = {"basix", "cffi", "ffcx", "gmsh", "mpi4py", "ufl", *LINKED}
+SOLVER = 'pip install "fenwear[solver]"'
+LIBRARIES = "libgl1 libglu1-mesa libxcursor1 libxft2 libxinerama1"  # of Debian, with what they bring: those of gmsh
+REAL = "fenwear needs PETSc with real numbers: install dolfinx-solver-real, on Debian python3-dolfinx-real"
+
+
+class _MPIFirst:
+    """Finds nothing: loads MPI where something linked to it is about to be imported."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> None:  # noqa: ARG002
+        if fullname in LINKED:
+            with suppress(ImportError):
+                import mpi4py.MPI  # noqa: F401
+
+
+def load_mpi_first() -> None:
+    """Let whatever is imported from now on find MPI loaded; imports nothing."""
+    sys.meta_path.insert(0, _MPIFirst())
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Tell of a part of the stack that cannot be imported by its name, and how it is installed.
+
+    Raises:
+        StackError: a part is missing, or a library that it needs.
+    """
+    try:
+        yield
+    except StackError:  # told already
+        raise
+    except (ImportError, OSError) as error:
+        part = (getattr(error, "name", None) or "").partition(".")[0]
+        if isinstance(error, ModuleNotFoundError) and part in PARTS:
+            raise StackError(f"{part} is missing, and nothing is computed without: {SOLVER}") from error
+        if "cannot open shared object file" not in str(error):
+            raise
+        raise StackError(f"a library is missing ({error}): on Debian, gmsh needs {LIBRARIES}") from error
+
+
+def check_numbers() -> None:
+    """Make sure that PETSc computes with real numbers.
+
+    Raises:
+        StackError: it is built for complex ones.
+    """
+    import numpy as np
+    from petsc4py import PETSc
+
+    if np.dtype(PETSc.ScalarType).kind == "c":
+        raise StackError(REAL)
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Tell what is missing where a form cannot be compiled.
+
+    Raises:
+        StackError: no compiler is found, or no headers of Python.
+    """
+    import cffi
+
+    try:
+        yield
+    except (cffi.VerificationError, RuntimeError) as error:
+        lack = lacks_to_compile()
+        if lack is None:
+            raise
+        raise StackError(f"a form cannot be compiled: {lack}") from error
+
+
+def lacks_to_compile() -> str | None:
+    """Return what there is not that forms are compiled with; None where all is there."""
+    import shlex
+    import shutil
+    import sysconfig
+
+    compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")[0]
+    if shutil.which(compiler) is None:
+        return f"there is no C compiler {compiler} on PATH: install gcc, or name another one in CC"
+    header = Path(sysconfig.get_paths()["include"]) / "Python.h"
+    return None if header.is_file() else f"there is no {header}: install Python's headers, on Debian python3-dev"

@@ -165,7 +165,7 @@ tornado(depths)
 
 # %%
 inputs = scatter.and_also(parse_scatter(case, "punch.loads.0.force.1=normal(-65 N, 10 %)"))
-life = lifetime(case, "distance until depth 0.03 mm", inputs, samples=SAMPLES, wanted=1.2e6)
+life = lifetime(case, "distance until depth 0.03 mm", inputs, samples=SAMPLES, wanted=1.2e6, indices=True)
 print(life.text())
 life_figure(life)
 
@@ -192,4 +192,4 @@ print(f"{held.sum()} of {len(held)} intervals hold the truth; the coefficient is
 #         --each -o rings
 #     fenwear sensitivity block_on_ring.toml --of "depth after 3600 m" --to wear.punch.coefficient --to contact.friction
 #     fenwear life block_on_ring.toml --until "distance until depth 0.03 mm" --from rings \
-#         --scatter "punch.loads.0.force.1=normal(-65 N, 10 %)" -o lives
+#         --scatter "punch.loads.0.force.1=normal(-65 N, 10 %)" --sobol -o lives

@@ -3,7 +3,8 @@
 Minimised is chi^2 = sum ((prediction - value) / sigma)^2 over the unknown keys and, for every profile, the
 offset and tilt of the trace where they are asked for. The covariance is (J^T J)^-1, J the Jacobian
 of the weighted residuals, times chi^2 / (n - m) where no sigma was given. Unknowns that cannot be
-negative are fitted by their logarithms: their intervals are intervals of a ratio.
+negative are fitted by their logarithms: their intervals are intervals of a ratio. Residuals that are correlated
+are fitted again as such, see `fenwear.life.correlated`; a given sigma is a relative one then.
 """
 
 from __future__ import annotations
@@ -17,11 +18,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy import stats
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.life.correlated import LARGEST_CONDITION, Correlated, Correlation
 from fenwear.life.data import DataSet, Series
-from fenwear.life.identifiable import hardly_known, inflated, known_together, not_determined, without_baselines
+from fenwear.life.identifiable import hardly_known, known_together, not_determined, without_baselines
 from fenwear.life.least_squares import STEP, LeastSquares
 from fenwear.life.quantities import UNITS
 from fenwear.life.scatter import Scatter
@@ -86,12 +88,13 @@ class Calibration:
         traces: Every series with its prediction.
         noise: Standard deviation of a measurement over its sigma, or where none was given in internal units.
         degrees_of_freedom: Measurements less unknowns.
-        inflation: Factor of the standard errors for residuals that are correlated along a profile; 1 for none.
+        inflation: Largest factor of the standard errors for residuals that are correlated; 1 for none.
         not_known: What the data cannot tell, in sentences.
         remarks: What else is to be said.
         at_bound: Keys whose value is at a bound.
         evaluations: Runs computed.
         jacobian: Of the weighted residuals by the fitted unknowns and baselines (n, m + baselines).
+        correlated: How the residuals are correlated; None where they are not.
     """
 
     fitted: tuple[Fitted, ...]
@@ -106,6 +109,7 @@ class Calibration:
     at_bound: tuple[str, ...]
     evaluations: int
     jacobian: Array = field(repr=False)
+    correlated: Correlated | None = field(default=None, repr=False)
 
     @property
     def values(self) -> dict[str, float]:
@@ -227,8 +231,30 @@ def _calibrated(problem: LeastSquares, progress: Callable[[str], None]) -> Calib
             )
     if result is None:
         raise ConvergenceError("the fit did not begin")
+    correlated: Correlated | None = None
+    remarks: tuple[str, ...] = ()
+    if _parts(problem, result)[2].all():  # at a bound residuals are what the data want beyond it, too
+        correlated, remarks = _correlation(problem, result).test(np.asarray(result.residual))
+    if correlated is not None:
+        progress("fit with residuals that are correlated")
+        problem.correlated, remarks = correlated, correlated.lines
+        result = problem.fit(start=z)
+        z = np.array([result.params[f"u{k}"].value for k in range(len(z))])
     problem.predicted(z, strict=True)  # raises what a trial may do, and a result may not
-    return _calibration(problem, result)
+    return _calibration(problem, result, list(remarks))
+
+
+def _parts(problem: LeastSquares, result: Any) -> tuple[Array, Array, Mask]:
+    """Return the fitted unknowns (m,), the baselines, and which of the unknowns are at no bound (m,)."""
+    numbers, m = np.array([p.value for p in result.params.values()]), len(problem.unknowns)
+    free = [not _at_bound(one, part) for one, part in zip(problem.unknowns, numbers, strict=False)]
+    return numbers[:m], numbers[m:], np.array(free)
+
+
+def _correlation(problem: LeastSquares, result: Any, jacobian: Array | None = None) -> Correlation:
+    """Return how the residuals of a fit may be correlated."""
+    whole = np.asarray(result.jac) if jacobian is None else jacobian
+    return Correlation(problem.series, whole, problem.sigma, has_sigma=problem.has_sigma)
 
 
 def _begin(problem: LeastSquares, z: Array) -> None:
@@ -243,50 +269,48 @@ def _begin(problem: LeastSquares, z: Array) -> None:
         ) from error
 
 
-def _calibration(problem: LeastSquares, result: Any) -> Calibration:
+def _calibration(problem: LeastSquares, result: Any, remarks: list[str]) -> Calibration:
     """Return the result in the unknowns' own units, with what the data cannot tell."""
-    m = len(problem.unknowns)
-    weighted = np.asarray(result.jac)
-    numbers = np.array([p.value for p in result.params.values()])
-    z, lines = numbers[:m], numbers[m:]
-    n = len(problem.observed)
-    freedom = n - len(numbers)
+    m, n = len(problem.unknowns), len(problem.observed)
+    z, lines, free = _parts(problem, result)
+    freedom = n - m - len(lines)
     noise = float(np.sqrt(result.chisqr / freedom))
-    scale = 1.0 if problem.has_sigma else noise
-    traces = _traces(problem, np.asarray(result.residual), lines)
-    inflation, remarks = inflated([one.series for one in traces], [one.residual for one in traces])
-    keys = [one.unknown.key for one in problem.unknowns]
+    scale = 1.0 if problem.absolute else noise
+    residual, weighted = np.asarray(result.residual), np.asarray(result.jac)
     own = without_baselines(weighted, m)
-    free = np.array([not _at_bound(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
-    at_bound = [one.unknown.key for one, inside in zip(problem.unknowns, free, strict=True) if not inside]
+    covariance = _covariance(own, free, scale)
+    factor = stats.t.ppf(0.975, freedom) if not problem.absolute else stats.norm.ppf(0.975)
+    ends = np.outer(np.sqrt(np.diag(covariance)), [-factor, factor])
+    inflation = 1.0
+    if problem.correlated is not None:
+        residual, weighted = problem.weighted(z, lines)
+        known = 1.0 if problem.has_sigma else float(np.sqrt(residual @ residual / freedom))
+        independent = _covariance(without_baselines(weighted, m), free, known)
+        if np.isfinite(covariance).all():
+            mixture = _correlation(problem, result, weighted).mixture(residual, m)
+            covariance, ends = mixture.covariance, np.array([mixture.interval(k) for k in range(m)])
+            inflation = float(np.sqrt((np.diag(covariance) / np.diag(independent)).max()))
+    keys = [one.unknown.key for one in problem.unknowns]
+    at_bound = [key for key, inside in zip(keys, free, strict=True) if not inside]
     relative = own * np.array([_per_relative(one, part) for one, part in zip(problem.unknowns, z, strict=True)])
-    not_known = (
-        not_determined(np.array(keys)[free].tolist(), relative[:, free] / (scale * inflation)) if free.any() else []
-    )
-    covariance = np.full((m, m), np.nan)
-    lengths = np.linalg.norm(own[:, free], axis=0)
-    if free.any() and (lengths > 0).all():
-        unit = own[:, free] / lengths
-        if np.linalg.cond(unit) < 1e12:
-            inner = np.linalg.inv(unit.T @ unit) / np.outer(lengths, lengths)
-            covariance[np.ix_(free, free)] = inner * (scale * inflation) ** 2
-    factor = stats.t.ppf(0.975, freedom) if not problem.has_sigma else stats.norm.ppf(0.975)
-    fitted = tuple(_fitted(one, part, error, factor) for one, part, error in
-                   zip(problem.unknowns, z, np.sqrt(np.diag(covariance)), strict=True))  # fmt: skip
-    own_units = np.array([1.0 if one.logarithmic else one.scale for one in problem.unknowns])
+    not_known = not_determined([key for key in keys if key not in at_bound], relative[:, free] / scale)
     errors = np.sqrt(np.diag(covariance))
+    fitted = tuple(map(_fitted, problem.unknowns, z, errors, ends))
+    own_units = np.array([1.0 if one.logarithmic else one.scale for one in problem.unknowns])
     correlation = covariance / np.outer(errors, errors)
     if not not_known:
         not_known = hardly_known(keys, problem.data, own)
-    remarks += known_together(keys, correlation, at_bound)
-    if problem.has_sigma and noise > 2:
+    remarks = [*remarks, *known_together(keys, correlation, at_bound)]
+    if problem.correlated is not None:
+        remarks.append(f"standard errors are up to {inflation:.2g} times those of independent residuals")
+    if problem.absolute and noise > 2:
         remarks.append(f"the residuals are {noise:.2g} times their sigma: the model does not describe the data, or "
                        "sigma is too small; standard errors are those of the given sigma")  # fmt: skip
     return Calibration(
         fitted,
         correlation,
         covariance * np.outer(own_units, own_units),
-        tuple(traces),
+        tuple(_traces(problem, residual, lines)),
         noise,
         freedom,
         inflation,
@@ -295,16 +319,29 @@ def _calibration(problem: LeastSquares, result: Any) -> Calibration:
         tuple(at_bound),
         problem.model.evaluations,
         weighted,
+        problem.correlated,
     )
 
 
-def _fitted(one: ScaledUnknown, z: float, error: float, factor: float) -> Fitted:
+def _covariance(own: Array, free: Mask, scale: float) -> Array:
+    """Return the covariance of the fitted unknowns (m, m); NaN of those at a bound, and where they are not known."""
+    m = own.shape[1]
+    covariance = np.full((m, m), np.nan)
+    lengths = np.linalg.norm(own[:, free], axis=0)
+    if free.any() and (lengths > 0).all():
+        unit = own[:, free] / lengths
+        if np.linalg.cond(unit) < LARGEST_CONDITION:
+            inner = np.linalg.inv(unit.T @ unit) / np.outer(lengths, lengths)
+            covariance[np.ix_(free, free)] = inner * scale**2
+    return covariance
+
+
+def _fitted(one: ScaledUnknown, z: float, error: float, ends: Array) -> Fitted:
+    """Return an unknown in its own unit; `ends` are those of its interval less z."""
     value = one.value(z)
-    if one.logarithmic:
-        low, high = (value * np.exp(sign * factor * error) for sign in (-1, 1))
-        return Fitted(one.unknown.key, value, one.unit, float(value * error), float(low), float(high), True)
-    spread = float(one.scale * error)
-    return Fitted(one.unknown.key, value, one.unit, spread, value - factor * spread, value + factor * spread, False)
+    low, high = (one.value(z + end) for end in ends)
+    spread = float((value if one.logarithmic else one.scale) * error)
+    return Fitted(one.unknown.key, value, one.unit, spread, low, high, one.logarithmic)
 
 
 def _at_bound(one: ScaledUnknown, z: float) -> bool:

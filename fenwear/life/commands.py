@@ -54,6 +54,13 @@ def _folder(output: Path | None, what: str, name: str, comm: MPI.Comm) -> Path:
     return on_root(comm, make)
 
 
+def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
+    """Say at the start, before anything is computed, that stick is left out where it is; collective."""
+    asked = case.contact.law == "gross-sliding" or bool(case.against_stick)
+    for line in on_root(comm, lambda: Model(case).stick_left_out() if asked else []):
+        log(f"warning: {line}")
+
+
 def _write_case(folder: Path, case: Case) -> None:
     write_text(folder / CASE, case.to_toml())
 
@@ -85,6 +92,7 @@ def run_sensitivity(
 ) -> tuple[list[Sensitivity], Path]:
     """Compute sensitivities; write sensitivity.json and tornado.png; collective."""
     method: Method | None = "differences" if differences else None
+    _tell_of_stick(case, log, comm)
     found = sensitivity(case, quantities, keys, spread=spread, method=method, comm=comm, progress=_counter(log, "keys"))
     folder = _folder(output, "sensitivity", name, comm)
 
@@ -117,6 +125,7 @@ def run_calibrate(
     _need("lmfit", "calibrate")
     asked = [parse_unknown(case, text) for text in unknowns]
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
+    _tell_of_stick(case, log, comm)
     found = calibrate(case, data, asked, baseline=baseline, comm=comm, progress=log)
     folder = _folder(output, "calibrate", name, comm)
 
@@ -162,6 +171,7 @@ def run_calibrate_each(
     _need("openturns", "--each")
     asked = [parse_unknown(case, text) for text in unknowns]
     data = on_root(comm, lambda: [read_data(path, case) for path in files])
+    _tell_of_stick(case, log, comm)
     found = []
     for one in data:
         log(one.name)
@@ -218,6 +228,7 @@ def run_life(
     output: Path | None,
     log: Log,
     *,
+    indices: bool = False,
     resume: bool = False,
     comm: MPI.Comm = MPI.COMM_WORLD,
 ) -> tuple[Lifetime, Path]:
@@ -233,6 +244,7 @@ def run_life(
             InputError("--scatter", "expected the distribution of at least one key, or --from a calibration")
         )
     scatter.check(case)
+    _tell_of_stick(case, log, comm)
     if resume and output is None:
         raise CaseError(InputError("--resume", "expected the folder of the sampling to go on with, as -o DIR"))
     level = None if wanted is None else _wanted(case, quantity.life, wanted)
@@ -243,8 +255,8 @@ def run_life(
     for line in scatter.text:
         log(line)
     found = lifetime(
-        case, quantity, scatter, samples=samples, seed=seed, wanted=level, folder=folder, resume=resume, comm=comm,
-        progress=_counter(log, "samples"),
+        case, quantity, scatter, samples=samples, seed=seed, wanted=level, indices=indices, folder=folder,
+        resume=resume, comm=comm, progress=_counter(log, "samples"),
     )  # fmt: skip
 
     def write() -> None:

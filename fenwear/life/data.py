@@ -29,7 +29,7 @@ from fenwear.arrays import Array
 from fenwear.case import Case, changed_case
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-from fenwear.life.quantities import UNITS, Quantity, check_quantity, parse_amount
+from fenwear.life.quantities import UNITS, Quantity, of_case, parse_amount
 
 MEASURED = {"depth": "mm", "height": "mm", "volume": "mm^3", "mass": "N*s^2/mm", "friction": "", "temperature": "K"}
 PLACES = {"x": "mm"}
@@ -124,7 +124,7 @@ class _Reader:
         for name in measured:
             values, sigma, quantity = self._measured(name, units, columns, lines, only=len(measured) == 1)
             wanted = Quantity(f"{self.path}: column {name}", quantity, "snapshot", UNITS[quantity], body)
-            check_quantity(wanted, case, str(self.path))
+            of_case(wanted, case, str(self.path))
             whole = Series(quantity, body, None, after, counted, values, sigma, lines)
             if "x" in names:
                 x = self._converted("x", units["x"], "mm", columns["x"])

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.life.data import DataSet, Series
+from fenwear.life.data import DataSet
 
 UNKNOWN = 0.5  # standard error, relative to the value, beyond which a combination of unknowns is not known
 TOGETHER = 0.95  # correlation that is told
 APART = 0.995  # correlation, of data of one condition, from which two unknowns count as one: errors ten times as wide
-CORRELATED = 3.0  # standard errors of an autocorrelation beyond which residuals count as correlated
 
 
 def without_baselines(weighted: Array, m: int) -> Array:
@@ -21,34 +20,6 @@ def without_baselines(weighted: Array, m: int) -> Array:
     if not lines.shape[1]:
         return own
     return own - lines @ np.linalg.lstsq(lines, own, rcond=None)[0]
-
-
-def inflated(series: Sequence[Series], residuals: Sequence[Array]) -> tuple[float, list[str]]:
-    """Return by how much residuals that are correlated along profiles widen the errors.
-
-    For a correlation r of neighbours, sqrt((1 + r) / (1 - r)): the factor of the standard error of
-    a mean of a first-order autoregressive sequence.
-    """
-    products = squares = 0.0
-    count = 0
-    for trace, residual in zip(series, residuals, strict=True):
-        if trace.x is None:
-            continue
-        sigma = 1.0 if trace.sigma is None else trace.sigma
-        ordered = (residual / sigma)[np.argsort(trace.x, kind="stable")]
-        products += float(ordered[1:] @ ordered[:-1])
-        squares += float(ordered @ ordered)
-        count += len(ordered)
-    if count == 0 or squares == 0:
-        return 1.0, []
-    r = min(products / squares, 0.999)
-    if r < CORRELATED / np.sqrt(count):
-        return 1.0, []
-    factor = float(np.sqrt((1 + r) / (1 - r)))
-    return factor, [
-        f"the residuals of neighbouring places have a correlation of {r:.2f}: roughness, or a shape that the model "
-        f"does not have; standard errors are {factor:.1f} times those of independent measurements"
-    ]
 
 
 def not_determined(keys: Sequence[str], relative: Array) -> list[str]:

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.life.correlated import Correlated
 from fenwear.life.data import DataSet
 from fenwear.life.identifiable import hardly_known, without_baselines
 from fenwear.life.model import Model
@@ -64,6 +65,7 @@ class LeastSquares:
         self.observed = np.concatenate([series.values for series in self.series])
         self.has_sigma = self.series[0].sigma is not None
         self.sigma = np.concatenate([np.ones(len(s.values)) if s.sigma is None else s.sigma for s in self.series])
+        self.correlated: Correlated | None = None  # how the errors of measurement are, beyond sigma
         self._lines, self.baseline_names = self._baselines()
         count = len(self.unknowns) + self._lines.shape[1]
         if len(self.observed) <= count:
@@ -207,7 +209,7 @@ class LeastSquares:
         def derivative(parameters: lmfit.Parameters) -> Array:
             z = self._parts(parameters)[0]
             columns = self.jacobian(z) if jacobian is None else jacobian
-            return np.hstack([columns, self._lines]) / self.sigma[:, None]
+            return self._independent(np.hstack([columns, self._lines]) / self.sigma[:, None])
 
         minimizer = self.minimizer(observed, start)
         minimizer.max_nfev = MOST_TRIALS
@@ -230,9 +232,23 @@ class LeastSquares:
 
         def residual(parameters: lmfit.Parameters) -> Array:
             z, lines = self._parts(parameters)
-            return np.asarray((self._tried(z) + self._lines @ lines - values) / self.sigma)
+            return self._independent((self._tried(z) + self._lines @ lines - values) / self.sigma)
 
-        return lmfit.Minimizer(residual, parameters, scale_covar=not self.has_sigma)
+        return lmfit.Minimizer(residual, parameters, scale_covar=not self.absolute)
+
+    @property
+    def absolute(self) -> bool:
+        """Whether the errors' size is given, and not to be told by the residuals."""
+        return self.has_sigma and self.correlated is None
+
+    def _independent(self, weighted: Array) -> Array:
+        """Return residuals over sigma (n, ...) as independent ones."""
+        return np.asarray(weighted) if self.correlated is None else self.correlated.whiten(weighted)
+
+    def weighted(self, z: Vector, lines: Array) -> tuple[Array, Array]:
+        """Return the residuals over sigma (n,), as measured, and their Jacobian (n, m + baselines)."""
+        residual = (self._tried(np.asarray(z, dtype=float)) + self._lines @ lines - self.observed) / self.sigma
+        return np.asarray(residual), np.hstack([self.jacobian(z), self._lines]) / self.sigma[:, None]
 
     def _parts(self, parameters: lmfit.Parameters) -> tuple[Array, Array]:
         """Return fitted unknowns and baselines."""

@@ -21,7 +21,7 @@ from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, FenwearError, InputError
 from fenwear.life.model import Model
-from fenwear.life.quantities import LIMIT, Quantity, check_quantity, evaluate, parse_quantity
+from fenwear.life.quantities import LIMIT, Quantity, evaluate, of_case, parse_quantity
 from fenwear.life.ranks import in_chunks
 from fenwear.life.scatter import Scatter
 from fenwear.life.sobol import LEVEL, SobolIndices, sobol_design, sobol_indices
@@ -61,7 +61,7 @@ class Lifetime:
         lives: (n,); infinite where the level is never reached, NaN where a run did not converge.
         quantiles: Of the lives; those of level q are reached before by a share q of the parts.
         reliability: Share of parts that live as long as was wanted; None if that was not asked for.
-        sobol: Indices of the logarithm of the life; None where inputs depend on each other or only one scatters.
+        sobol: Indices of the logarithm of the life; None where they were not asked for, or a part lives for ever.
         failures: What went wrong, by its sample.
         seed: Of the sample.
     """
@@ -112,7 +112,9 @@ class Lifetime:
                 f"  a share of {one.value:.4f} ({one.low:.4f} to {one.high:.4f}) lives for {one.level:.6g} {unit}"
             )
         if self.sobol is not None:
-            lines.append("  share of the variance of the life's logarithm: alone, with interactions")
+            lines.append(
+                "  share of the variance of the life's logarithm with 95 % intervals: alone, with interactions"
+            )
             lines += [
                 f"    {name:36} {first:7.3f} ({a[0]:.3f} to {a[1]:.3f})  {total:7.3f} ({b[0]:.3f} to {b[1]:.3f})"
                 for name, first, total, a, b in self.sobol.rows()
@@ -157,6 +159,7 @@ def lifetime(
     samples: int = 200,
     seed: int = 0,
     wanted: float | None = None,
+    indices: bool = False,
     limit: int = LIMIT,
     folder: Path | None = None,
     resume: bool = False,
@@ -169,9 +172,10 @@ def lifetime(
         case: The problem.
         until: Such as "depth 0.2 mm", or "distance until volume 3 mm^3".
         scatter: Distribution of keys.
-        samples: Size n of the sample; with several independent keys n (d + 2) runs also give Sobol indices.
+        samples: Size n of the sample, a run for each.
         seed: Of the sample.
         wanted: A life whose reliability is asked for, in the unit of the lives.
+        indices: Whether Sobol indices of d independent keys are wanted, too: n (d + 2) runs.
         limit: Cycles after which a level counts as never reached.
         folder: Where samples.csv is kept; None for nowhere.
         resume: Go on with the samples that are there.
@@ -188,16 +192,17 @@ def lifetime(
         raise CaseError(
             InputError("--until", f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}")
         )
-    check_quantity(quantity, case, "--until")
+    of_case(quantity, case, "--until")
     if samples < 2:
         raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))
     scatter.check(case)
-    with_indices = len(scatter.keys) > 1 and not scatter.correlated
-    design = on_root(comm, lambda: _design(scatter, samples, seed, with_indices=with_indices))
+    if indices and (len(scatter.keys) < 2 or scatter.correlated):
+        raise CaseError(InputError("--sobol", "expected two or more keys that scatter independently of each other"))
+    design = on_root(comm, lambda: _design(scatter, samples, seed, with_indices=indices))
     record = _Record(folder, scatter.keys, quantity.text, design) if folder is not None else None
     done = on_root(comm, lambda: {} if record is None else record.begin(resume=resume))
     lives, failures = _run(case, quantity, scatter.keys, design, done, record, limit, comm, progress)
-    return _summary(quantity, scatter.keys, design, lives, failures, samples, wanted, seed, with_indices=with_indices)
+    return _summary(quantity, scatter.keys, design, lives, failures, samples, wanted, seed, with_indices=indices)
 
 
 def _design(scatter: Scatter, samples: int, seed: int, *, with_indices: bool) -> Array:

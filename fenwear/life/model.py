@@ -18,12 +18,16 @@ from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
+from fenwear.cycle.totals import Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
-from fenwear.law import check_slides
+from fenwear.law import check_no_stick, check_slides
 from fenwear.life.keys import with_values
+from fenwear.sliding.friction import ContactConditions
+from fenwear.watch.stroke import stroke_warnings
 
 BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
+KEPT = 32  # runs whose ends are kept
 ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop
 WITHIN = 1e-9  # relative: what properties of the temperature may still change by in a steady state, for differences
 NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
@@ -38,12 +42,23 @@ class WornSurface:
         weights: Length that each stands for (n,), mm.
         depth: Worn depth (n,), mm; None in a steady state, whose depth grows without end.
         rate: Depth worn in a cycle (n,), mm.
+        volume: Worn off as the run has metered it, mm³: of a closed track all that is spread along it, where the
+            surface is a part of the track; None in a steady state.
+        volume_rate: The same of a cycle, mm³.
     """
 
     x: Array
     weights: Array
     depth: Array | None
     rate: Array
+    volume: float | None
+    volume_rate: float
+
+    def later(self, cycles: float) -> WornSurface:
+        """Return the surface after cycles more, or less, at the rates of the last one."""
+        if self.depth is None or self.volume is None:
+            return self
+        return replace(self, depth=self.depth + self.rate * cycles, volume=self.volume + self.volume_rate * cycles)
 
 
 @dataclass(frozen=True)
@@ -62,7 +77,6 @@ class Snapshot:
         velocity: Rigid-body wear per cycle of each mode, mm and rad; empty in a run.
         distance: Slid in a cycle, mm.
         period: Duration of a cycle, s.
-        thickness: mm.
     """
 
     cycle: float
@@ -75,15 +89,35 @@ class Snapshot:
     velocity: Mapping[str, float]
     distance: float
     period: float
-    thickness: float
+
+    @property
+    def parts(self) -> bool:
+        """Whether the surfaces are apart at some nodes in some phase."""
+        return bool((self.pressure == 0).any())
+
+    def grown_from(self, first: Snapshot) -> bool:
+        """Return whether the edge of contact or scar has moved since, and lies within the mesh."""
+        masks = [(own.pressure > 0).any(axis=0) for own in (first, self)]
+        pairs = [(masks[0], masks[1])]
+        for body, own in self.surfaces.items():
+            before = first.surfaces[body].depth
+            if own.depth is not None and before is not None:
+                pairs.append((before > 0, own.depth > 0))
+        return any(bool((late & ~early).any()) and not bool(late.all()) for early, late in pairs)
 
     def at_cycle(self, cycle: float) -> Snapshot:
-        """Return the snapshot with its depths carried on to a cycle nearby, at the rate of its last one."""
-        moved = {
-            body: replace(own, depth=None if own.depth is None else own.depth + own.rate * (cycle - self.cycle))
-            for body, own in self.surfaces.items()
-        }
+        """Return the snapshot with its depths and volumes carried on to a cycle nearby, at the rate of its last one."""
+        moved = {body: own.later(cycle - self.cycle) for body, own in self.surfaces.items()}
         return replace(self, cycle=cycle, surfaces=moved)
+
+
+@dataclass(frozen=True)
+class Course:
+    """A run: its first and last snapshots, and the cycles at the ends of its jumps."""
+
+    first: Snapshot
+    last: Snapshot
+    ends: tuple[int, ...]
 
 
 @dataclass
@@ -101,13 +135,15 @@ class Model:
     evaluations: int = 0
     _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
+    _courses: dict[tuple[object, ...], Course] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse a test program.
+        """Refuse a test program, and stick.
 
         Raises:
-            CaseError: the case has one.
+            CaseError: the case has one of them.
         """
+        check_no_stick(self.case)
         if self.case.program is not None:
             message = "not followed here; expected a case of constant loads and motion, or `run`"
             raise CaseError(InputError("program", message))
@@ -122,6 +158,10 @@ class Model:
     def warming(self) -> bool:
         """Whether properties of materials depend on the temperature."""
         return any(material.dependent for material in self.case.materials.values())
+
+    def stick_left_out(self) -> list[str]:
+        """Return what is to be said of stick that the case leaves out, with an estimate of it."""
+        return stroke_warnings(self.system())
 
     def check_constant(self) -> None:
         """Refuse properties of the temperature where they are followed in steps.
@@ -168,7 +208,9 @@ class Model:
     ) -> tuple[float, float]:
         """Return the distance slid in a cycle, mm, mean over the contact surface, and its duration, s."""
         system = self.system(values, settings)
-        return _distance(system), system.motion.period
+        states = [system.conditions(k) for k in range(len(system.pairs))]
+        unpressed = np.zeros((len(system.pairs), len(system.pair.weights)))
+        return float(cycle_totals(system, unpressed, states).of("distance")), system.motion.period
 
     def run(
         self,
@@ -228,6 +270,22 @@ class Model:
             if until(snapshot):
                 return
 
+    def course(
+        self,
+        values: Mapping[str, float],
+        cycles: int,
+        settings: Sequence[str] = (),
+        sequence: Sequence[int] | None = None,
+    ) -> Course:
+        """Return a run to its end, as `run`; kept, so that several quantities of it cost one."""
+        key = (tuple(sorted(values.items())), cycles, tuple(settings), None if sequence is None else tuple(sequence))
+        if key not in self._courses:
+            while len(self._courses) >= KEPT:
+                self._courses.pop(next(iter(self._courses)))
+            taken = list(self.run(values, cycles, settings=settings, sequence=sequence))
+            self._courses[key] = Course(taken[0], taken[-1], tuple(int(one.cycle) for one in taken))
+        return self._courses[key]
+
     def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
         """Return the cyclic steady state, with properties of its own temperatures where they depend on them.
 
@@ -265,58 +323,52 @@ class Model:
         return min(critical_speed(system, d) for d in sorted(set(system.motion.directions)))
 
 
-def _surfaces(system: Tribosystem, depths: Mapping[str, Array] | None, pressure: Array) -> dict[str, WornSurface]:
+def _surfaces(
+    system: Tribosystem, pressure: Array, states: Sequence[ContactConditions], adds: Totals, end: RunState | None
+) -> dict[str, WornSurface]:
     """Return both bodies' worn surfaces, nodes ascending along x."""
     facing = system.pair
     nodes = {"punch": (facing.x, facing.weights), "strip": (facing.strip.x[:, 0], facing.strip.weights)}
-    worn = system.phases_wear.worn(pressure)
+    worn = system.wear.phases(states).worn(pressure)
     surfaces = {}
     for body, (x, weights) in nodes.items():
-        order = np.argsort(x, kind="stable")
-        depth = None if depths is None else depths[body][order]
-        surfaces[body] = WornSurface(x[order], weights[order], depth, getattr(worn, body)[order])
+        order, volume = np.argsort(x, kind="stable"), f"volume_{body}"
+        surfaces[body] = WornSurface(
+            x[order],
+            weights[order],
+            None if end is None else getattr(end.worn, body)[order],
+            getattr(worn, body)[order],
+            None if end is None else float(end.totals.of(volume)),
+            float(adds.of(volume)),
+        )
     return surfaces
-
-
-def _distance(system: Tribosystem, pressure: Array | None = None) -> float:
-    """Return the distance slid in a cycle, mm: mean over the load of pressures (k, n), or over the contact surface.
-
-    A turning strip's phases are angles: its surface slides them times its distance from the axis.
-    """
-    whole = 0.0
-    for number, (phase, pair) in enumerate(zip(system.motion.phases, system.pairs, strict=True)):
-        speed = np.linalg.norm(system.sliding.field.velocity(pair.opposite), axis=1)
-        load = pair.weights if pressure is None or not pressure[number].any() else pair.weights * pressure[number]
-        whole += phase.distance * float(speed @ load) / float(load.sum())
-    return whole
 
 
 def _snapshot(
     system: Tribosystem,
     cycle: float,
     pressure: Array,
-    depths: Mapping[str, Array] | None,
+    end: RunState | None,
     temperature: Array | None,
     velocity: Mapping[str, float],
 ) -> Snapshot:
-    motion, weights = system.motion, system.pair.weights
-    paths = np.array([phase.distance * slid for phase, slid in zip(motion.phases, system.slid, strict=True)])
+    """Return the end of a cycle of these pressures (m, n), or the steady state where there is no end."""
     latest = None if temperature is None else (temperature[-1, 0], temperature[-1, 1])
-    states = [system.conditions(k, np.asarray(pressure[k]), latest) for k in range(len(pressure))]
-    mu = np.array([system.friction.values(state) for state in states])
-    carried = float((paths * pressure * weights).sum())
+    worn, done = (None, None) if end is None else (end.worn, end.half_cycle)
+    states = [system.conditions(k, np.asarray(p), latest, worn, done) for k, p in enumerate(pressure)]
+    adds = cycle_totals(system, pressure, states)
+    path = float(adds.of("load_path"))
     return Snapshot(
         cycle,
-        _surfaces(system, depths, pressure),
+        _surfaces(system, pressure, states, adds, end),
         system.pair.x,
-        weights,
+        system.pair.weights,
         pressure,
         temperature,
-        float((paths * mu * pressure * weights).sum()) / carried if carried > 0 else 0.0,
+        float(adds.of("work")) / path if path > 0 else 0.0,
         velocity,
-        _distance(system, pressure),
-        motion.period,
-        system.case.model.thickness,
+        float(adds.of("distance")),
+        system.motion.period,
     )
 
 
@@ -324,12 +376,11 @@ def _of_block(block: Block) -> Snapshot:
     """Return the end of the last cycle of a block."""
     system, contacts = block.system, joined(block.end.contacts)
     pressure = block.pressure if contacts is None else contacts.pressure
-    depths = {"punch": block.end.worn.punch, "strip": block.end.worn.strip}
     heat, temperature = block.heat, None
     if heat is not None:
         temperature = np.stack([heat.temperature_punch, heat.temperature_strip], axis=1)
     cycle = int(block.half_cycle[-1]) // system.motion.half_cycles
-    return _snapshot(system, float(cycle), pressure, depths, temperature, {})
+    return _snapshot(system, float(cycle), pressure, block.end, temperature, {})
 
 
 def steady_snapshot(
@@ -345,6 +396,6 @@ def steady_snapshot(
         for phase in range(len(pressure)):
             p = np.asarray(pressure[phase])
             state, _ = heat.exchange.half_cycle(state, phase, p, conductances[phase])
-            rows.append(np.stack(heat.exchange.contact_temperatures(state)))
+            rows.append(np.stack(heat.exchange.contact_temperatures(state, phase)))
         temperature = np.array(rows)
     return _snapshot(system, np.inf, pressure, None, temperature, velocity)

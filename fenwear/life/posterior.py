@@ -1,4 +1,4 @@
-"""The posterior distribution of a calibration by sampling (emcee): flat within the bounds, normal noise."""
+"""The posterior distribution of a calibration by sampling (emcee): flat within the bounds, noise as it was found."""
 
 from __future__ import annotations
 
@@ -58,15 +58,16 @@ def posterior(problem: LeastSquares, found: Calibration, steps: int, seed: int =
     if steps < 10:
         raise CaseError(InputError("--posterior", f"expected 10 steps or more, got {steps}"))
     z = [one.fitted(value) for one, value in zip(problem.unknowns, found.values.values(), strict=True)]
+    problem.correlated = found.correlated
     problem.keep_jumps(z)
     minimizer = problem.minimizer(start=z)
-    variables = len(minimizer.params) + (0 if problem.has_sigma else 1)
+    variables = len(minimizer.params) + (0 if problem.absolute else 1)
     walkers = max(2 * variables, WALKERS_EACH * variables)
     state = np.random.RandomState(seed)
     start = _start(problem, found, z, walkers, state)
     result = minimizer.emcee(
         steps=steps, burn=steps // 3, nwalkers=walkers, pos=start, seed=state, progress=False,
-        is_weighted=problem.has_sigma, run_mcmc_kwargs={"skip_initial_state_check": True},
+        is_weighted=problem.absolute, run_mcmc_kwargs={"skip_initial_state_check": True},
     )  # fmt: skip
     chain = np.array(result.flatchain)[:, : len(z)]
     values = np.array([[one.value(part) for one, part in zip(problem.unknowns, row, strict=True)] for row in chain])
@@ -87,10 +88,10 @@ def _start(
     errors = np.where(np.isfinite(errors), errors, 0.01)
     middles = np.concatenate([z, [part for t in found.traces for part in (t.offset, t.tilt) if np.isfinite(part)]])
     widths = np.concatenate([errors, np.full(baselines, 0.1 * found.noise)])
-    if not problem.has_sigma:
+    if not problem.absolute:
         middles, widths = np.append(middles, np.log(found.noise)), np.append(widths, 0.1)
     start = middles + widths * state.standard_normal((walkers, len(middles)))
     for k, one in enumerate(problem.unknowns):
         low, high = (one.fitted(b) if np.isfinite(b) else b for b in (one.unknown.low, one.unknown.high))
         start[:, k] = np.clip(start[:, k], low, high)
-    return start[:, : m + baselines + (0 if problem.has_sigma else 1)]
+    return start[:, : m + baselines + (0 if problem.absolute else 1)]

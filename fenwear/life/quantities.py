@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -109,7 +109,7 @@ class Quantity:
         """Return its growth in a cycle, for depth and volume; NaN for what has no simple rate."""
         surface = snapshot.surfaces[self.body]
         if self.name == "volume":
-            return float(surface.weights @ surface.rate) * snapshot.thickness
+            return surface.volume_rate
         if self.name == "depth" and surface.depth is not None:
             if self.at is not None:
                 return _at(surface.x, surface.rate, self.at, self.text)
@@ -198,8 +198,8 @@ def _place(name: str, match: re.Match[str], words: str, option: str) -> tuple[st
         raise CaseError(InputError(option, f"{words!r}: {error}")) from None
 
 
-def check_quantity(quantity: Quantity, case: Case, option: str = "--of") -> None:
-    """Check that a case knows the quantity.
+def of_case(quantity: Quantity, case: Case, option: str = "--of") -> Quantity:
+    """Return a quantity with the unit that it has in a case: speeds of a strip that turns are angular.
 
     Raises:
         CaseError: it needs heat, or the wear of a body that does not wear.
@@ -210,6 +210,7 @@ def check_quantity(quantity: Quantity, case: Case, option: str = "--of") -> None
         other = "strip" if quantity.body == "punch" else "punch"
         message = f"{quantity.text!r}: the case has no wear.{quantity.body}; expected it 'of {other}'"
         raise CaseError(InputError(option, message))
+    return replace(quantity, unit="rad/s") if quantity.name == "critical speed" and case.turns else quantity
 
 
 # ---- Values of a snapshot ---------------------------------------------------------------------
@@ -235,8 +236,8 @@ def _depth(quantity: Quantity, snapshot: Snapshot) -> float:
 
 
 def _volume(quantity: Quantity, snapshot: Snapshot) -> float:
-    surface, depth = _worn(quantity, snapshot)
-    return float(surface.weights @ depth) * snapshot.thickness
+    _worn(quantity, snapshot)
+    return snapshot.surfaces[quantity.body].volume or 0.0
 
 
 def _scar_width(quantity: Quantity, snapshot: Snapshot) -> float:
@@ -262,8 +263,7 @@ def _temperature(quantity: Quantity, snapshot: Snapshot) -> float:
 
 
 def _volume_rate(quantity: Quantity, snapshot: Snapshot) -> float:
-    surface = snapshot.surfaces[quantity.body]
-    return float(surface.weights @ surface.rate) * snapshot.thickness
+    return snapshot.surfaces[quantity.body].volume_rate
 
 
 def _velocity(quantity: Quantity, snapshot: Snapshot) -> float:
@@ -297,9 +297,18 @@ def cycles_of(amount: tuple[float, str], distance: float, period: float) -> floa
 
 @dataclass(frozen=True)
 class Path:
-    """How a quantity is computed again for other values, so that its values are smooth: the ends of the jumps."""
+    """How a quantity is computed again for other values, so that its values are smooth.
+
+    Attributes:
+        sequence: The ends of the jumps.
+        rough: Whether values are smooth as long as the same nodes are in contact, and no further: an edge of contact or
+            scar has moved on the way to them and lies within the mesh, or they are the place of one.
+        grain: The smallest step of a value that is counted in nodes.
+    """
 
     sequence: tuple[int, ...] = ()
+    rough: bool = False
+    grain: float = 0.0
 
 
 def evaluate(
@@ -325,7 +334,9 @@ def evaluate(
         ConvergenceError: a run or a steady state did not converge.
     """
     if quantity.kind == "steady":
-        return quantity.of_snapshot(model.steady(values, settings)), Path()
+        state = model.steady(values, settings)
+        of_nodes = quantity.name == "contact_width" and state.parts
+        return quantity.of_snapshot(state), Path(rough=of_nodes, grain=_grain(quantity, state))
     model.check_constant()
     distance, period = model.cycle_measures(values, settings)
     if quantity.kind == "whole":
@@ -339,9 +350,13 @@ def evaluate(
         wanted = cycles_of(quantity.after, distance, period)
     last = max(1, round(wanted)) if path is None else path.sequence[-1]
     sequence = None if path is None else path.sequence
-    snapshots = list(model.run(values, last, settings=settings, sequence=sequence))
-    made = Path(tuple(int(s.cycle) for s in snapshots))
-    return quantity.of_snapshot(snapshots[-1].at_cycle(wanted)), made
+    course = model.course(values, last, settings, sequence)
+    made = Path(course.ends, course.last.grown_from(course.first), _grain(quantity, course.last))
+    return quantity.of_snapshot(course.last.at_cycle(wanted)), made
+
+
+def _grain(quantity: Quantity, snapshot: Snapshot) -> float:
+    return float(snapshot.weights.max()) if quantity.name == "contact_width" else 0.0
 
 
 def _whole(
@@ -365,7 +380,8 @@ def _until(
     """Run until the level is passed, and count to where a cubic through depths and rates meets it."""
     taken: list[tuple[float, float, float]] = [(0.0, 0.0, float("nan"))]
     sequence = None if path is None else path.sequence
-    passed = 0
+    passed, grows = 0, False
+    first: Snapshot | None = None
 
     def enough(_: Snapshot) -> bool:
         return passed > 1  # one jump more, so that values nearby find their level on the same path
@@ -374,7 +390,9 @@ def _until(
                               sequence=sequence, until=enough):  # fmt: skip
         taken.append((snapshot.cycle, quantity.of_snapshot(snapshot), quantity.rate(snapshot)))
         passed += taken[-1][1] >= quantity.level
-    made = Path(tuple(int(cycle) for cycle, _, _ in taken[1:]))
+        first = first or snapshot
+        grows = snapshot.grown_from(first)
+    made = Path(tuple(int(cycle) for cycle, _, _ in taken[1:]), grows)
     cycles = _crossing(np.array(taken), quantity.level)
     factor = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}[quantity.life]
     return cycles * factor, made

@@ -4,6 +4,10 @@ Of a steady state by implicit differentiation; of a run, and of what is not diff
 state whose materials depend on its temperatures, by central differences of runs with the same jumps. Every
 difference is taken with two steps, h and h / 2, and extrapolated (Richardson): D = (4 D(h/2) - D(h)) / 3; the
 error that is told is |D(h/2) - D(h)|, of the coarser order. Where it is too large the step is reduced.
+
+Where contact or scar grows over the mesh such steps are too small: as long as the same nodes are in contact a computed
+quantity changes with a key in another way than from node to node. There it is computed at keys over a window that
+the edge crosses several nodes in, see `fenwear.life.window`.
 """
 
 from __future__ import annotations
@@ -20,13 +24,14 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.life.keys import Key, find_key, with_values
 from fenwear.life.linearised import SteadyTangent, differentiable
 from fenwear.life.model import Model, Snapshot
-from fenwear.life.quantities import Path, Quantity, check_quantity, evaluate, parse_quantity
+from fenwear.life.quantities import Path, Quantity, evaluate, of_case, parse_quantity
 from fenwear.life.ranks import everywhere, share
+from fenwear.life.window import over_window
 
 STEPS = (1e-3, 1e-4, 1e-5)  # relative to the key's value, tried until the error is small
 GOOD = 1e-6  # relative error of a derivative at which the step stays
 NONE = 1e-3  # elasticity below which a derivative may have the error of this one
-Method = Literal["implicit", "differences"]
+Method = Literal["implicit", "differences", "window"]
 
 
 @dataclass(frozen=True)
@@ -38,10 +43,10 @@ class Derivative:
         key_value: In `key_unit`.
         key_unit: The internal one.
         derivative: Of the quantity, in its unit over the key's.
-        error: What two steps differ by, in the same unit.
+        error: What two steps differ by, or what a fit over a window leaves open, in the same unit.
         elasticity: Relative change of the quantity over that of the key; NaN where one of them is zero.
         low, high: The quantity with the key smaller and larger by the spread; NaN where that is not possible.
-        method: implicit, or differences.
+        method: implicit, differences, or window.
     """
 
     key: str
@@ -123,7 +128,8 @@ def sensitivity(
         quantities: Such as "depth", "steady pressure" or "cycles until depth 0.2 mm".
         keys: Such as "wear.punch.coefficient".
         spread: Relative change of each key for the tornado plot; 0 for none.
-        method: By default implicit where that is possible.
+        method: By default implicit where that is possible, over a window where contact or scar grows, and by
+            differences else. Differences that are asked for are those of a growing contact's present nodes.
         comm: The ranks.
         progress: Told of the derivatives done and of all.
 
@@ -133,9 +139,7 @@ def sensitivity(
     """
     if not 0 <= spread < 1:
         raise CaseError(InputError("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
-    wanted = [parse_quantity(q) if isinstance(q, str) else q for q in quantities]
-    for quantity in wanted:
-        check_quantity(quantity, case)
+    wanted = [of_case(parse_quantity(q) if isinstance(q, str) else q, case) for q in quantities]
     found = [find_key(case, key, "--to") for key in keys]
     if not wanted or not found:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
@@ -153,7 +157,7 @@ def sensitivity(
     def one(k: int) -> list[Derivative]:
         nearby = None if tangent is None else _Nearby(model, found[k], tangent)
         return [
-            _derivative(model, quantity, base, found[k], spread, nearby if by == "implicit" else None)
+            _derivative(model, quantity, base, found[k], spread, nearby if by == "implicit" else None, method)
             for quantity, base, by in zip(wanted, bases, methods, strict=True)
         ]
 
@@ -180,17 +184,32 @@ def _method(model: Model, quantity: Quantity, asked: Method | None) -> Method:
 
 
 def _derivative(
-    model: Model, quantity: Quantity, base: tuple[float, Path], key: Key, spread: float, nearby: _Nearby | None
+    model: Model,
+    quantity: Quantity,
+    base: tuple[float, Path],
+    key: Key,
+    spread: float,
+    nearby: _Nearby | None,
+    asked: Method | None,
 ) -> Derivative:
     value, path = base
     scale = abs(value) / _step(key, 1.0)
-    if nearby is not None:
+    along = None if quantity.kind == "life" else path  # with a smaller key a life is longer
+
+    def at(x: float, on: Path | None) -> float:
+        return evaluate(model, quantity, {key.path: x}, path=on)[0]
+
+    by: Method = "differences" if nearby is None else "implicit"
+    windowed = None
+    if path.rough and by != asked:
+        windowed = over_window(lambda x: at(x, along), value, key.value, path.grain)
+    if windowed is not None:
+        by = "window"
+        slope, error = windowed
+    elif nearby is not None:
         slope, error = _refined(lambda relative: nearby.slope(quantity, relative), scale)
     else:
-        slope, error = _differences(
-            lambda x: evaluate(model, quantity, {key.path: x}, path=path)[0], model.case, key, scale
-        )
-    by: Method = "differences" if nearby is None else "implicit"
+        slope, error = _differences(lambda x: at(x, path), model.case, key, scale)
     elasticity = slope * key.value / value if key.value != 0 and value != 0 else float("nan")
     ends = [_end(model, quantity, key, factor) if spread > 0 else float("nan") for factor in (1 - spread, 1 + spread)]
     return Derivative(key.path, key.value, key.unit, slope, error, elasticity, ends[0], ends[1], by)

@@ -11,7 +11,8 @@ import pytest
 
 from fenwear.case import changed_case, load_case
 from fenwear.cli import app
-from fenwear.errors import CaseError
+from fenwear.errors import CaseError, InputError
+from fenwear.life import commands
 from fenwear.life.model import Model
 
 SMALL = ["--set", "geometry.degree=2", "--set", "geometry.parameters.elements_along_contact=8"]
@@ -103,3 +104,22 @@ def test_programs_are_not_followed() -> None:
     case = changed_case(load_case("example1"), "program={steps=[{cycles=3}]}", "run.half_cycles=6")
     with pytest.raises(CaseError, match="program: not followed here"):
         Model(case)
+
+
+def test_stick_that_is_left_out_is_told_before_a_fit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A case of partial slip, forced to slide as a whole: said at the start, with the estimate of "auto"."""
+    told: list[str] = []
+
+    def fit(*_: object, **__: object) -> None:
+        raise CaseError(InputError("", "the fit has begun"))
+
+    monkeypatch.setattr(commands, "calibrate", fit)
+    (tmp_path / "volumes.csv").write_text(VOLUMES)
+    case = load_case("fretting-partial-slip", ["contact.law=gross-sliding"])
+    with pytest.raises(CaseError, match="the fit has begun"):
+        commands.run_calibrate(case, "x", [tmp_path / "volumes.csv"], [K], [], None, None, told.append)
+    assert len(told) == 1
+    assert "% of the amplitude" in told[0]
+    assert "gross sliding leaves that out" in told[0]
+    with pytest.raises(CaseError, match="not followed here"):
+        Model(load_case("fretting-partial-slip"))

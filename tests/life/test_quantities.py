@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import Case, CaseError, assemble
+from fenwear import Case, CaseError, assemble, load_case
 from fenwear.cycle import critical_speed
 from fenwear.life import Model, evaluate, parse_quantity
-from fenwear.life.quantities import check_quantity
+from fenwear.life.quantities import of_case
 
 LOAD, AMPLITUDE, BETA = 1e4, 1.5, 3.926990816987242e-8  # N, mm, 1/MPa of Example 2
 
@@ -30,6 +30,33 @@ def test_volume_and_the_life_to_a_volume_are_archards(small: Callable[..., Case]
     assert value(case, "cycles until volume 3 mm^3") == pytest.approx(cycles, rel=1e-9)
     assert value(case, "distance until volume 3 mm^3") == pytest.approx(cycles * 4 * AMPLITUDE, rel=1e-9)
     assert value(case, "time until volume 3 mm^3") == pytest.approx(cycles * 2 * np.pi / 10, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "settings"),
+    [
+        ("pin-on-disc", "strip", ["geometry.order=1", "geometry.degree=1", "geometry.parameters.across=2"]),
+        ("block-on-ring", "strip", ["geometry.parameters.elements_along_contact=8"]),
+        ("block-on-ring", "punch", ["geometry.parameters.elements_along_contact=8"]),
+        ("monotonic-lz20", "strip", ["geometry.parameters.elements_along_contact=8", "motion.track=20000"]),
+    ],
+)
+def test_volumes_are_k_f_s_on_the_whole_of_a_closed_track(name: str, body: str, settings: list[str]) -> None:
+    """V = beta~ F s for a = b = 1, s of the load's own path: the meshed patch is a part of the track alone."""
+    case = load_case(name, ["geometry.degree=2", "wear.strip.coefficient=1e-9", *settings])
+    model, cycles = Model(case), 3
+    ends = list(model.run({}, cycles))
+    slid = ends[-1].distance  # the mean over the load is the same all along so short a run
+    law = getattr(case.wear, body)
+    expected = law.coefficient * model.system().normal_force * slid * cycles
+    worn = ends[-1].surfaces[body]
+    assert worn.volume == pytest.approx(expected, rel=1e-4)
+    assert worn.volume_rate == pytest.approx(expected / cycles, rel=1e-4)
+    assert value(case, f"volume of {body} after {cycles} cycles") == pytest.approx(expected, rel=1e-4)
+    assert value(case, f"steady volume_rate of {body}") == pytest.approx(expected / cycles, rel=2e-3)
+    level = 5 * expected
+    life = value(case, f"cycles until volume of {body} {level!r} mm^3")
+    assert life == pytest.approx(5 * cycles, rel=1e-3)
 
 
 def test_distance_of_a_turning_strip(small: Callable[..., Case]) -> None:
@@ -68,6 +95,8 @@ def test_run_in_and_critical_speed(small: Callable[..., Case]) -> None:
     hot = small("example1-heat")
     speeds = [critical_speed(assemble(hot), d) for d in (-1, 1)]
     assert value(hot, "critical speed") == pytest.approx(min(speeds), rel=1e-6)
+    for case, unit in ((hot, "mm/s"), (load_case("ring-on-ring-heat"), "rad/s")):
+        assert of_case(parse_quantity("critical speed"), case).unit == unit
 
 
 @pytest.mark.parametrize(
@@ -100,6 +129,6 @@ def test_what_a_case_does_not_know_is_refused(small: Callable[..., Case]) -> Non
         ("depth of strip", "wear.strip"),
     ):
         with pytest.raises(CaseError, match=expected):
-            check_quantity(parse_quantity(text), small("example2"))
+            of_case(parse_quantity(text), small("example2"))
     with pytest.raises(CaseError, match="not on the contact"):
         value(small("example2"), "depth at 31 mm after 10 cycles")

@@ -88,16 +88,34 @@ def test_the_depth_of_a_run_scales_with_load_and_modulus(small: Callable[..., Ca
 def test_two_worn_bodies_that_slide_to_and_fro() -> None:
     """No steady state: the volume of each body follows its own coefficient alone; depths obey a similarity.
 
-    Loads and moduli times a factor, coefficients over it, leave all displacements: e_k1 + e_k2 = e_E + e_F.
+    Loads and moduli times a factor, coefficients over it, leave all displacements: e_k1 + e_k2 = e_E + e_F, which the
+    nodes that are in contact obey as such.
     """
     case = load_case("fretting", ["geometry.parameters.elements_along_contact=16", "motion.positions=3"])
     keys = ("wear.punch.coefficient", "wear.strip.coefficient", "materials.steel.young", "punch.loads.0.force.1")
     wanted = ["volume of strip after 200 cycles", "depth of strip after 200 cycles"]
-    volume, depth = sensitivity(case, wanted, keys, spread=0)
+    volume, depth = sensitivity(case, wanted, keys, spread=0, method="differences")
     assert [row.elasticity for row in volume.derivatives] == pytest.approx([0.0, 1.0, 0.0, 1.0], abs=1e-7)
     punch, strip, modulus, load = (row.elasticity for row in depth.derivatives)
     assert abs(modulus) > 0.01
     assert punch + strip == pytest.approx(modulus + load, rel=1e-5)
+
+
+@pytest.mark.parametrize("elements", [40, 80])
+def test_a_growing_scar_keeps_its_exponents(elements: int) -> None:
+    """Block on ring: widths, pressure and depth go by k^(1/3), k^(-1/3), k^(2/3); each within its error, which shrinks.
+
+    A scar of the width 2 a on a ring is a^2 / 2 R deep, and its area goes by a^3; p = F / 2 a. The bodies give way by
+    1e-3 of that depth.
+    """
+    exponents = {"scar_width": 1 / 3, "contact_width": 1 / 3, "pressure": -1 / 3, "depth": 2 / 3}
+    case = load_case("block-on-ring", [f"geometry.parameters.elements_along_contact={elements}"])
+    for found in sensitivity(case, list(exponents), ["wear.punch.coefficient"], spread=0, comm=MPI.COMM_SELF):
+        (row,) = found.derivatives
+        error = row.error * abs(row.key_value / found.value)
+        assert row.method == "window"
+        assert row.elasticity == pytest.approx(exponents[found.quantity], abs=error + 2e-3)
+        assert error < 4 / elements
 
 
 def test_a_key_at_the_end_of_its_range(small: Callable[..., Case]) -> None:

@@ -99,7 +99,7 @@ folder = Path(temporary.name) / "first-tour"
 summary, folder = run_case(case, "first-tour", folder, print)
 
 for path in sorted(folder.rglob("*")):
-    if path.is_file() and ".bp" not in str(path.parent):
+    if path.is_file():
         print(path.relative_to(folder))
 
 # %% [markdown]

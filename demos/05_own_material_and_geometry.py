@@ -49,7 +49,8 @@ folder = Path(temporary.name)
 # | the surfaces that meet | curves | `punch_contact`, `strip_contact` (these names are fixed) |
 # | places of loads, supports, held temperatures | curves or points | `punch_top`, `punch_guide`, `strip_foot` |
 #
-# Nodes of the two contact curves should lie opposite each other: give both the same `Transfinite` spacing. Put the
+# Nodes of the two contact curves should lie opposite each other: give both the same `Transfinite` spacing. With heat
+# the rail really moves under the pad, so that `strip_contact` reaches an amplitude beyond the pad on each side. Put the
 # lengths you want to vary into `DefineConstant`: then the case can set them.
 
 # %%
@@ -59,6 +60,7 @@ DefineConstant[
   slant = 6,        // how much wider the lining is at its top, on each side
   lining = 10,      // height of the lining
   back = 8,         // height of the steel back
+  reach = 5,        // how far the rail's contact surface goes beyond the lining: the amplitude
   count = 20        // elements along the contact
 ];
 rail_length = 160;
@@ -79,17 +81,18 @@ Curve Loop(2) = {5, 6, 7, -3};   Plane Surface(2) = {2};
 // The rail, below z = 0: points and lines of its own, also at the contact
 Point(11) = {-rail_length / 2, 0, 0};  Point(12) = {-a, 0, 0};
 Point(13) = {a, 0, 0};                 Point(14) = {rail_length / 2, 0, 0};
+Point(17) = {-a - reach, 0, 0};        Point(18) = {a + reach, 0, 0};
 Point(15) = {rail_length / 2, -rail_height, 0};
 Point(16) = {-rail_length / 2, -rail_height, 0};
-Line(11) = {11, 12};  Line(12) = {12, 13};  Line(13) = {13, 14};
-Line(14) = {14, 15};  Line(15) = {15, 16};  Line(16) = {16, 11};
-Curve Loop(3) = {11:16};         Plane Surface(3) = {3};
+Line(11) = {11, 17};  Line(17) = {17, 12};  Line(12) = {12, 13};  Line(18) = {13, 18};
+Line(13) = {18, 14};  Line(14) = {14, 15};  Line(15) = {15, 16};  Line(16) = {16, 11};
+Curve Loop(3) = {11, 17, 12, 18, 13:16};  Plane Surface(3) = {3};
 
 // Finest at the contact; nodes of the two contact lines opposite each other
 Transfinite Curve{1, 12} = count + 1 Using Bump 0.25;
 MeshSize{3, 4, 5, 6} = 2 * size;
 MeshSize{11, 14, 15, 16} = 6 * size;
-MeshSize{1, 2, 12, 13} = size;
+MeshSize{1, 2, 12, 13, 17, 18} = size;
 
 Physical Surface("punch_lining") = {1};
 Physical Surface("punch_back") = {2};
@@ -97,7 +100,7 @@ Physical Curve("punch_contact") = {1};
 Physical Curve("punch_top") = {6};
 Physical Curve("punch_guide") = {5};
 Physical Surface("strip_rail") = {3};
-Physical Curve("strip_contact") = {12};
+Physical Curve("strip_contact") = {17, 12, 18};
 Physical Curve("strip_foot") = {15};
 """
 (folder / "pad.geo").write_text(GEOMETRY, "utf-8")
@@ -289,7 +292,7 @@ print(case.to_toml()[:600], "...")
 # ## What to mind
 #
 # - The contact may be curved, but its smallest gap at the start is at most 1 % of its length, and the punch's contact
-#   must lie within the strip's.
+#   must lie within the strip's; with heat wherever the stroke takes it.
 # - Wear is an offset of the gap until it reaches `geometry.follow_wear` of the elements' height; then the meshes follow it.
 # - One region may have several surfaces, but all of one element type: triangles or quadrilaterals.
 # - A corner of the lining at the contact makes the first pressures depend on the mesh. They wear off.

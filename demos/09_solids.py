@@ -64,7 +64,9 @@ ax.legend(frameon=False)
 plt.show()
 print(f"largest difference of the steady state: {np.abs(state.pressure[0] / exact.values - 1).max():.1e}")
 volume = 5e-9 * (history.pressure * history.weight * history.r).sum("node") * 2 * np.pi
-print(f"volume worn in the last turn {float(history.worn_volume[-1]):.6g} mm³, by hand {float(volume[-1]):.6g} mm³")
+print(
+    f"volume worn in the last turn {float(history.worn_volume_increment[-1]):.6g} mm³, by hand {float(volume[-1]):.6g} mm³"
+)
 
 # %% [markdown]
 # ## The same rings, hot

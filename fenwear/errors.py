@@ -54,6 +54,14 @@ class OutputError(FenwearError):
         return type(self), (self.path, self.reason, self.how_to_go_on)  # crosses ranks by pickle
 
 
+class RanksError(FenwearError):
+    """What ranks should do together went wrong: one leads where all are asked for, or its answer cannot reach them."""
+
+
+class StackError(FenwearError, ImportError):
+    """A part of what fenwear is built on is missing or of the wrong kind; says which, and how to install it."""
+
+
 class InterruptedRunError(FenwearError):
     """A signal ended a run; its checkpoint allows to go on."""
 

@@ -125,6 +125,20 @@ def with_law(case: Case, law: Law) -> Case:
     return case.model_copy(update={"contact": case.contact.model_copy(update={"law": law})})
 
 
+def check_no_stick(case: Case) -> None:
+    """Make sure, before anything is built, that a case does not ask for stick where gross sliding alone is followed.
+
+    Raises:
+        CaseError: it does.
+    """
+    asked = "contact.law" if case.contact.law == "coulomb" else "stick"
+    if case.contact.law == "coulomb" or (case.contact.law == "auto" and case.stick != Stick()):
+        message = "stick and partial slip are not followed here, gross sliding alone; expected `run` or `steady` for "
+        raise CaseError(
+            InputError(asked, message + "a case with stick, or contact.law = 'gross-sliding' to leave it out")
+        )
+
+
 def check_slides(system: Tribosystem) -> None:
     """Make sure that a case of what follows gross sliding alone does not call for stick; collective.
 

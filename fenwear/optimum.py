@@ -1,15 +1,19 @@
 """The optimal pressure: the minimum of the wear dissipation power, without any elasticity.
 
-With the rigid-body wear velocity w_n = H lambda the steady pressure is p = (w_n / K)^(1/b), with
-K the mean of beta~ v^a, and zero where it would turn negative (8), (15), (16); lambda follows from
-the equilibrium of force and moment (7), (18) by Newton's method. For a tilting punch lambda is
-(lambda_F, lambda_M): w_n = lambda_F - lambda_M (x - x_O).
+With the rigid-body wear velocity w_n = H lambda the steady pressure is that which wears so fast: p = (w_n / K)^(1/b),
+with K the mean of beta~ v^a, above a threshold p_0 p = p_0 + (w_n / K)^(1/b), and zero where w_n would turn negative
+(8), (15), (16); lambda follows from the equilibrium of force and moment (7), (18) by Newton's method. For a tilting
+punch lambda is (lambda_F, lambda_M): w_n = lambda_F - lambda_M (x - x_O).
+
+With a threshold the pressure of w_n = 0 is any between 0 and p_0: where the punch turns about a place within the
+contact it jumps there; here it rises over the first `RAMP` of the mean wear rate instead. Where pressures below the
+threshold balance the loads nothing wears, and there is no optimum; nor is there one beyond a cap.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
@@ -17,9 +21,13 @@ from scipy.optimize import linprog
 from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import RigidEquilibrium
+from fenwear.sliding.pressure_law import PressureLaw
 
 MOVES = {"lambda_F": "move along z", "lambda_M": "tilt", "lambda_Mx": "tilt about x", "lambda_My": "tilt about y"}
 TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
+RAMP = 1e-6  # of the mean wear rate, over which the pressure rises to a threshold
+RAMPS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, RAMP)  # on the way there
+HALVINGS = 60  # of an interval that holds a pressure
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,92 +99,196 @@ def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) 
     )
 
 
-def optimum(
-    rigid: RigidEquilibrium,
-    friction_ratio: Array,
-    wear_rate: Array,
-    pressure_exponent: float,
-    zone: Mask | None = None,
-) -> Optimum:
+@dataclass(frozen=True)
+class WearRates:
+    """How fast pressures wear both bodies together: W(p) = sum of K_i times the law of body i.
+
+    Attributes:
+        rates: K of each body that wears (n,), the mean of beta~ v^a, mm/s MPa^-b.
+        laws: Of the pressure, of each.
+    """
+
+    rates: tuple[Array, ...]
+    laws: tuple[PressureLaw, ...]
+
+    @classmethod
+    def together(cls, rates: Sequence[Array], laws: Sequence[PressureLaw]) -> WearRates:
+        """Return those of bodies, in one where their laws are the same."""
+        if len(set(laws)) > 1:
+            return cls(tuple(rates), tuple(laws))
+        return cls((np.sum(rates, axis=0),), (laws[0],))
+
+    @property
+    def threshold(self) -> float:
+        """The pressure below which nothing wears, MPa."""
+        return min(law.threshold for law in self.laws)
+
+    @property
+    def cap(self) -> float:
+        """The pressure beyond which the wear of no body grows any more, MPa."""
+        return max(law.cap for law in self.laws)
+
+    def uncapped(self) -> WearRates:
+        """Return the same without the highest cap, so that there is a pressure for any rate."""
+        laws = (replace(law, cap=np.inf) if law.cap == self.cap else law for law in self.laws)
+        return replace(self, laws=tuple(laws))
+
+    def at(self, pressure: Array) -> Array:
+        """Return W (n,), mm/s, of pressures (n,)."""
+        return np.sum([k * law.value(pressure) for k, law in zip(self.rates, self.laws, strict=True)], axis=0)
+
+    def without_threshold(self, pressure: float) -> Array:
+        """Return the rates of a pressure (n,), mm/s, were there no thresholds."""
+        return np.sum([k * pressure**law.exponent for k, law in zip(self.rates, self.laws, strict=True)], axis=0)
+
+    def pressure(self, rate: Array) -> Array:
+        """Return the pressure (n,) that wears at a rate (n,) >= 0, at least the threshold."""
+        pairs = list(zip(self.rates, self.laws, strict=True))
+        highest = [
+            law.threshold + np.divide(rate, k, out=np.full_like(k, np.inf), where=k > 0) ** (1 / law.exponent)
+            for k, law in pairs
+            if law.cap == np.inf
+        ]
+        if len(pairs) == 1:
+            return highest[0]
+        low: Array = np.full(len(rate), self.threshold)
+        high: Array = np.min(highest, axis=0)
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            short = self.at(middle) < rate
+            low, high = np.where(short, middle, low), np.where(short, high, middle)
+        return (low + high) / 2
+
+    def slope(self, pressure: Array) -> Array:
+        """Return dW/dp (n,), mm/s MPa^-1."""
+        return np.sum([k * law.slope(pressure) for k, law in zip(self.rates, self.laws, strict=True)], axis=0)
+
+
+def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zone: Mask | None = None) -> Optimum:
     """Return the optimal pressure and the wear velocity.
 
     Args:
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
-        wear_rate: K of the nodes (n,), the mean of beta~ v^a, mm/s MPa^-b.
-        pressure_exponent: b.
+        wear: How fast pressures wear; where all its coefficients are zero, the pressure is as if they were alike.
         zone: Nodes that are in contact (n,) bool; by default all.
 
     Raises:
-        ConvergenceError: Newton's method found no equilibrium.
+        ConvergenceError: Newton's method found no equilibrium, or a threshold or a cap leaves none.
     """
-    weights_rows = rigid.equilibrium(friction_ratio)
-    modes = rigid.rigid_normal
+    balance = rigid.equilibrium(friction_ratio)
     if zone is not None:
-        weights_rows = weights_rows * zone
-    p_mean, b = rigid.mean_pressure, pressure_exponent
-    lengths = np.abs(modes).max(axis=0, initial=1e-300)
-    mean_rate = float(wear_rate.mean())
-    relative = wear_rate / mean_rate if mean_rate > 0 else np.ones_like(wear_rate)
-    shape = modes / lengths / relative[:, None]
-    rows = weights_rows / (lengths[:, None] * p_mean * rigid.pair.weights.sum())
-    resultant = rigid.resultant / (lengths * p_mean * rigid.pair.weights.sum())
-    # Unknown y: w_n / (K p_mean^b) = shape y at each node, so that p / p_mean = (shape y)_+^(1/b).
-    y = np.linalg.lstsq(shape, np.ones(len(shape)), rcond=None)[0]
-    pressure, residual = _pressure(shape @ y, b), np.inf
-    force = rows @ pressure * p_mean + resultant
+        balance = balance * zone
+    n, p_mean = balance.shape[1], rigid.mean_pressure
+    wears = any(k.any() for k in wear.rates)
+    law = (wear if wears else WearRates((np.ones(n),), wear.laws[:1])).uncapped()
+    lengths = np.abs(rigid.rigid_normal).max(axis=0, initial=1e-300)
+    even = law.without_threshold(p_mean)
+    rate = float(even.mean())
+    shape, size = rigid.rigid_normal / lengths, lengths * p_mean * rigid.pair.weights.sum()
+    rows, resultant = balance / size[:, None], rigid.resultant / size
+    if law.threshold > 0 and _balanced_below(rows, resultant, law.threshold):
+        raise ConvergenceError(
+            f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, so "
+            "that nothing wears and any of them stays"
+        )
+    # Unknown y: w_n over the mean rate at the mean pressure is shape y.
+    y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
+    for ramp in RAMPS if law.threshold > 0 else (RAMP,):
+        y, pressure, residual = _newton(law, shape * rate, rows, resultant, y, ramp * rate)
+    if residual > 1e-10:
+        raise ConvergenceError(f"the optimum did not converge: residual {residual:.3g} of the load")
+    if zone is not None:
+        pressure = pressure * zone
+    if pressure.max(initial=0.0) > wear.cap:
+        raise ConvergenceError(
+            f"no optimum: it would need {pressure.max():.4g} MPa, and beyond the pressure_cap of {wear.cap:.4g} MPa "
+            "wear grows no more"
+        )
+    velocity = rate * y / lengths
+    tilt = np.arctan2(_tangential(rigid, velocity), rigid.rigid_normal @ velocity)
+    velocities = (velocity if wears else 0 * velocity).tolist()
+    return Optimum(pressure, dict(zip(rigid.mode_names, velocities, strict=True)), residual, tilt)
+
+
+def _newton(
+    law: WearRates, modes: Array, rows: Array, resultant: Array, y: Array, ramp: float
+) -> tuple[Array, Array, float]:
+    """Return y, the pressures of the wear rates `modes` y, and the largest error of their equilibrium."""
+
+    def pressures(y: Array) -> Array:
+        return _pressure(law, modes @ y, ramp)
+
+    pressure = pressures(y)
+    force = rows @ pressure + resultant
+    residual = np.inf
     for _ in range(200):
         residual = float(np.abs(force).max(initial=0.0))
         if residual < 1e-13:
             break
-        w = shape @ y
-        slope = np.where(w > 0, np.maximum(w, 1e-12) ** (1 / b - 1) / b, 0.0)
-        step = np.linalg.lstsq((rows * p_mean * slope) @ shape, -force, rcond=None)[0]
+        slope = _slope(law, modes @ y, ramp)
+        step = np.linalg.lstsq((rows * slope) @ modes, -force, rcond=None)[0]
         for halving in range(40):
             trial = y + step / 2**halving
-            trial_pressure = _pressure(shape @ trial, b)
-            trial_force = rows @ trial_pressure * p_mean + resultant
+            trial_pressure = pressures(trial)
+            trial_force = rows @ trial_pressure + resultant
             if np.abs(trial_force).max() < residual:
                 break
         else:
             break  # at the rounding of the residual, or no descent
         y, pressure, force = trial, trial_pressure, trial_force
-    if residual > 1e-10:
-        raise ConvergenceError(f"the optimum did not converge: residual {residual:.3g} of the load")
-    velocity = mean_rate * p_mean**b * y / lengths
-    names = rigid.mode_names
-    if zone is not None:
-        pressure = pressure * zone
-    tilt = np.arctan2(_tangential(rigid, velocity), modes @ velocity)
-    return Optimum(pressure * p_mean, dict(zip(names, velocity.tolist(), strict=True)), residual, tilt)
+    return y, pressure, residual
+
+
+def _pressure(law: WearRates, rate: Array, ramp: float) -> Array:
+    """Return the pressures (n,) of wear rates (n,), which rise to the threshold over a ramp, 0 below."""
+    found = law.pressure(np.maximum(rate, 0.0))
+    return found - law.threshold * (1 - np.clip(rate / ramp, 0.0, 1.0))
+
+
+def _slope(law: WearRates, rate: Array, ramp: float) -> Array:
+    """Return the derivatives (n,) of `_pressure`; where the rate is zero that of a small one: it may be infinite."""
+    least = 1e-6 * ramp
+    slope = 1 / law.slope(law.pressure(np.maximum(rate, least))) + np.where(rate < ramp, law.threshold / ramp, 0.0)
+    return np.where(rate > 0, slope, 0.0)
+
+
+def _balanced_below(rows: Array, resultant: Array, pressure: float) -> bool:
+    """Return whether pressures of no more than this one balance the loads."""
+    found = linprog(np.zeros(rows.shape[1]), A_eq=rows, b_eq=-resultant, bounds=(0, pressure))
+    return bool(found.status == 0)
 
 
 def optimum_on_track(
     rigid: RigidEquilibrium,
     friction_ratio: Array,
-    wear_rate: Array,
-    pressure_exponent: float,
+    punch: WearRates,
+    strip: PressureLaw,
     recession: Callable[[Array], Array],
     zone: Mask | None = None,
 ) -> Optimum:
     """Return the optimum of a punch on a strip that recedes by what is spread along its closed track.
 
-    With r(p) the recession, K p^b + r(p) = w_n: the same as K_eff p^b = w_n with K_eff = K + r(p) / p^b, which is
-    taken again until the pressure repeats.
+    With r(p) the recession, W(p) + r(p) = w_n: the same as K_eff q^b = w_n with K_eff = (W(p) + r(p)) / q^b, which is
+    taken again until the pressure repeats; q^b is the law of the body that begins to wear at the lower pressure.
 
     Args:
-        rigid, friction_ratio, wear_rate, pressure_exponent, zone: As of `optimum`; K of the punch alone.
+        rigid, friction_ratio, zone: As of `optimum`.
+        punch: How fast pressures wear the punch.
+        strip: The strip's law of the pressure.
         recession: The velocity at which the strip recedes opposite each node at pressures (n,), mm/s.
 
     Raises:
-        ConvergenceError: Newton's method found no equilibrium, or the pressure does not come to rest.
+        ConvergenceError: as `optimum`, or the pressure does not come to rest.
     """
-    b, rate = pressure_exponent, wear_rate
-    pressure: Array = np.full(len(wear_rate), rigid.mean_pressure)
+    first = min((*punch.laws, strip), key=lambda law: law.threshold)
+    law = replace(first, cap=np.inf)
+    pressure: Array = np.full(rigid.rigid_normal.shape[0], law.threshold + rigid.mean_pressure)
+    rate = np.zeros_like(pressure)
     for _ in range(TRACK_ROUNDS):
-        before, powered = pressure, pressure**b
-        touches = powered > 0
-        rate = wear_rate + np.where(touches, recession(pressure), 0.0) / np.where(touches, powered, 1.0)
-        found = optimum(rigid, friction_ratio, rate, b, zone)
+        before, felt = pressure, law.value(pressure)
+        worn = punch.at(pressure) + recession(pressure)
+        rate = np.divide(worn, felt, out=rate.copy(), where=felt > 0)
+        found = optimum(rigid, friction_ratio, WearRates((rate,), (law,)), zone)
         pressure = found.pressure
         if np.abs(pressure - before).max() <= AT_REST * pressure.max():
             return found
@@ -193,7 +305,3 @@ def _tangential(rigid: RigidEquilibrium, velocity: Array) -> Array:
         return motion[:, 0] * normal[:, 1] - motion[:, 1] * normal[:, 0]
     within = motion - np.einsum("id,id->i", motion, normal)[:, None] * normal
     return np.linalg.norm(within, axis=1)
-
-
-def _pressure(w: Array, b: float) -> Array:
-    return np.maximum(w, 0.0) ** (1 / b)

@@ -24,6 +24,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from fenwear.errors import RanksError
+
 T = TypeVar("T")
 BUSY, NAP = 2e-3, 2e-4  # s that a rank looks out for an order without a pause, and its pauses afterwards
 
@@ -37,6 +39,20 @@ def on_root(comm: MPI.Comm, function: Callable[[], T]) -> T:
     return Team.of(comm).lead(function)
 
 
+def all_together(comm: MPI.Comm) -> None:
+    """Refuse what all ranks do together where one leads them: the others wait for its orders, and would for ever.
+
+    To be called where collective work begins.
+
+    Raises:
+        RanksError: this rank leads.
+    """
+    if comm.size > 1 and Team.any_leads():
+        raise RanksError(
+            "all ranks are asked for where one leads the others: what they make together has to be made before"
+        )
+
+
 def agreed(comm: MPI.Comm, found: T) -> T:
     """Return what rank 0 has found, on every rank: what decides over further collective calls; collective."""
     return Team.of(comm).lead(lambda: found)
@@ -44,6 +60,7 @@ def agreed(comm: MPI.Comm, found: T) -> T:
 
 def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the sum over the ranks, equal to the last bit on all of them; collective."""
+    all_together(comm)
     result = np.empty(partial.shape)
     comm.Reduce(np.ascontiguousarray(partial), result, op=MPI.SUM, root=0)
     comm.Bcast(result, root=0)
@@ -62,6 +79,7 @@ def lasting(comm: MPI.Comm) -> MPI.Comm:
 
 def release(comm: MPI.Comm) -> None:
     """Free the objects of PETSc that every one of these ranks has dropped; collective."""
+    all_together(comm)
     if comm.size > 1:
         PETSc.garbage_cleanup(lasting(comm))
 
@@ -91,6 +109,7 @@ class Rows:
 
     def gathered(self, part: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return all rows (size, ...) from this rank's own, the same on every rank; collective."""
+        all_together(self.comm)
         whole = np.empty((int(self.starts[-1]), *part.shape[1:]))
         counts: Any = np.diff(self.starts) * math.prod(part.shape[1:])
         self.comm.Allgatherv(np.ascontiguousarray(part), (whole, counts))
@@ -116,6 +135,11 @@ class Team:
     def leads(self) -> bool:
         """Whether this rank leads now."""
         return self._leads
+
+    @classmethod
+    def any_leads(cls) -> bool:
+        """Whether this rank leads others now."""
+        return any(team._leads for team in cls._teams)
 
     @classmethod
     def of(cls, comm: MPI.Comm) -> Team:
@@ -152,15 +176,17 @@ class Team:
         if self.comm.rank:
             return self._follow()  # type: ignore[no-any-return]
         result: T | None = None
-        failure: Exception | None = None
+        failure: BaseException | None = None
         self._leads = True
         try:
             result = function()
-        except Exception as error:  # raised again below, on all ranks
-            failure = error
+            packed = self._crossed((None, result, None))
+        except BaseException as error:  # raised again below, on all ranks, which wait for it: interrupts, too
+            failure = self._crossing(error)
+            packed = self._packed((None, None, failure))
         finally:
             self._leads = False
-        self._tell((None, result, failure))
+        self._tell(packed)
         if failure is not None:
             raise failure
         return result  # type: ignore[return-value]
@@ -174,7 +200,7 @@ class Team:
                 if failure is not None:
                     raise failure
                 return result
-            self.comm.gather(self._packed(self._done(*order)))
+            self.comm.gather(self._answer(*order))
 
     def call(self, part: object, method: str, *arguments: Any) -> list[Any]:
         """Call a method of each rank's part and return what each has returned; on rank 0, while it leads.
@@ -184,7 +210,7 @@ class Team:
         """
         if self.comm.size == 1:
             return [getattr(part, method)(*arguments)]
-        self._tell(((self._number(part), method, arguments), None, None))
+        self._tell(self._packed(((self._number(part), method, arguments), None, None)))
         self._leads = False  # in what all do together another one may lead
         done = self._done(self._number(part), method, arguments)
         self._leads = True
@@ -205,14 +231,41 @@ class Team:
             return self.call(part, method, *arguments)[0]
         return getattr(part, method)(*arguments)
 
-    def _done(self, number: int | None, method: str, arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:
+    def _done(self, number: int | None, method: str, arguments: tuple[Any, ...]) -> tuple[Any, BaseException | None]:
         try:
             return getattr(self._parts[number], method)(*arguments), None  # type: ignore[index]
-        except Exception as error:  # raised again on rank 0, which all wait for
+        except BaseException as error:  # raised again on rank 0, which all wait for
             return None, error
 
-    def _tell(self, content: Any) -> None:
-        packed = self._packed(content)
+    def _answer(self, number: int | None, method: str, arguments: tuple[Any, ...]) -> bytes:
+        """Return what this rank has done for rank 0, which waits for it, in a form that reaches it."""
+        result, failure = self._done(number, method, arguments)
+        try:
+            return self._crossed((result, failure and self._crossing(failure)))
+        except RanksError as error:
+            return self._packed((None, error))
+
+    def _crossed(self, content: Any) -> bytes:
+        """Return what crosses ranks, packed.
+
+        Raises:
+            RanksError: it cannot be.
+        """
+        try:
+            return self._packed(content)
+        except Exception as error:  # of the packing, whatever the object makes of it
+            raise RanksError(f"what one rank has found cannot reach the others: {error}") from None
+
+    def _crossing(self, error: BaseException) -> BaseException:
+        """Return an error as it can cross ranks: itself, or its words where it cannot be packed or unpacked."""
+        try:
+            if type(self._unpacked(self._packed(error))) is type(error):
+                return error
+        except Exception:  # of the packing, whatever the error makes of it
+            pass
+        return RanksError(f"{type(error).__name__}: {error}")
+
+    def _tell(self, packed: bytes) -> None:
         self.comm.Ibarrier().Wait()
         self.comm.bcast(packed)
 

@@ -14,7 +14,17 @@ from mpi4py import MPI
 
 from fenwear.assembly import Preparation, Tribosystem, assemble
 from fenwear.case import Case, doubts
-from fenwear.cycle import Block, Span, follow_program, jump, march, stability_number, stationary_growth
+from fenwear.cycle import (
+    Block,
+    Span,
+    follow_program,
+    heat_gain,
+    heat_warnings,
+    jump,
+    march,
+    stability_number,
+    stationary_growth,
+)
 from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
@@ -34,22 +44,28 @@ from fenwear.results.history import (
     write_case,
     write_summary,
 )
-from fenwear.results.summary import summarise
+from fenwear.results.summary import HOTTEST, summarise
 from fenwear.signals import Signals
 from fenwear.stick import checkpoint as stick_checkpoint
 from fenwear.stick.run import check_touching, run_stick
 from fenwear.stick.setup import make_rig
-from fenwear.watch import Watch, size_warnings, stroke_warnings
+from fenwear.watch import Watch, fineness_warnings, size_warnings, stroke_warnings
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
 
 
+def told(message: str) -> None:
+    """Print a message, once on all ranks."""
+    if MPI.COMM_WORLD.rank == 0:
+        print(message)
+
+
 def run_case(
     case: Case,
-    name: str,
-    output: Path | None,
-    log: Log,
+    name: str = "run",
+    output: Path | str | None = None,
+    log: Log = told,
     *,
     resume: bool = False,
     progress: How = "bar",
@@ -61,9 +77,9 @@ def run_case(
 
     Args:
         case: The problem.
-        name: Names the folder results/NAME where `output` is None.
+        name: Names the folder results/NAME where `output` is None: a new one, NAME-2 where there is NAME.
         output: New folder of the results, or with `resume` the folder of the run to go on with.
-        log: Called with each message.
+        log: Called with each message; by default the first rank prints it.
         resume: Go on from the checkpoint in `output`.
         progress: A bar where standard error is a terminal, a line for every block, or none.
         comm: The ranks.
@@ -96,7 +112,7 @@ def run_case(
     if not resume:
         touching()
     how = {"setup_seconds": time.perf_counter() - begin, **found.numbers}
-    directory = output or on_root(comm, lambda: free_directory(Path("results") / name))
+    directory = Path(output) if output else on_root(comm, lambda: free_directory(Path("results") / name))
     try:
         return drive(directory, log, progress, how, Signals(comm, last=last), resume=resume), directory
     except OutputError as error:
@@ -179,14 +195,20 @@ class _Run:
         self.start = start
         self.state = start or RunState(0, system.unworn(), (), None, none_yet(system))
         self.last: Block | None = None
-        self.extremes = {"largest_equilibrium_error": 0.0}
+        self.extremes = {} if start is None else checkpoint.extremes(directory, self.comm)  # of all half-cycles so far
+        self.numbers: dict[str, float] = {}
         self.warnings: list[str] = []
         self.remedies: Counter[str] = Counter()
         if self.case.run.integration == "explicit":
-            self.extremes["wear_step_over_explicit_limit"] = stability_number(system)
-            self.warnings = _warnings(self.extremes["wear_step_over_explicit_limit"])
-        self.warnings += [*position_warnings(system), *system.bodies.last_resorts, *doubts(self.case)]
+            self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
+            self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"])
+        self.warnings += [*position_warnings(system), *system.bodies.remarks, *doubts(self.case)]
         self.warnings += [*size_warnings(self.case, system.bodies, system.rigid), *stroke_warnings(system)]
+        before = None if start is None else joined(start.contacts)  # where a run that goes on touches
+        gain = heat_gain(system, None if before is None else before.pressure)
+        if gain is not None:
+            self.numbers["heat_gain"] = gain
+        self.warnings += [*heat_warnings(gain), *fineness_warnings(system)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._fields_at = frozenset(self.case.output.fields_at or ())
@@ -270,8 +292,10 @@ class _Run:
         self.system = block.system
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
+        self._note("largest_complementarity_error", block.complementarity_error)
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
+            self._note(HOTTEST, block.heat.max_temperature)
         self._tell_remedies(block)
         for warning in self.watch.see(block):
             self.log(f"warning: {warning}")
@@ -289,7 +313,7 @@ class _Run:
         self.remedies += block.remedies
 
     def _note(self, name: str, values: Any) -> None:
-        self.extremes[name] = max(self.extremes.get(name, 0.0), float(values.max()))
+        self.extremes[name] = max(self.extremes.get(name, -np.inf), float(values.max()))
 
     def _write_fields(self, block: Block) -> None:
         temperature = block.end.temperature
@@ -306,7 +330,7 @@ class _Run:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
         if self.state.half_cycle > 0:
             self._on_history(HistoryWriter.flush)
-            checkpoint.save(self.directory, self.system, self.state)
+            checkpoint.save(self.directory, self.system, self.state, self.extremes)
 
     def stop(self, failure: Exception | None) -> str:
         """Return how the half-cycles ended."""
@@ -335,7 +359,7 @@ class _Run:
         reason = self._note_growth(self.last)
         if reason:
             how = {**how, "no_growth_rate": reason}
-        summary = summarise(self.system, self.last, self.extremes, how)
+        summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
             from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
@@ -353,7 +377,7 @@ class _Run:
         change = float(last.periodicity[-motion.half_cycles :].max())
         rate, reason = stationary_growth(self.system, contacts.pressure, surfaces, phase, change)
         if rate is not None:
-            self.extremes["growth_rate_per_s"] = rate
+            self.numbers["growth_rate_per_s"] = rate
         else:
             self.log(f"no growth rate of disturbances: {reason}")
         return reason

@@ -12,14 +12,20 @@ DefineConstant[
   flat_width = 4,         // along y
   flat_height = 1.6,
   stroke = 0.1,           // by which the square is longer along x on the flat, on each side
-  across = 8,             // elements over the square
+  across = 8,             // elements over the square, without those of its core
+  core = 0,               // side of a square in its middle, where the contact begins, with elements of its own; 0: none
+  core_elements = 0,      // over the core
   stroke_elements = 2,    // over the stroke on each side of it
   margin_elements = 2,    // over each margin
   ball_layers = 4,        // elements over the height
   flat_layers = 5,
-  growth = 2              // of an element's height over that of its neighbour towards the contact
+  growth = 2,             // of an element's height over that of its neighbour towards the contact
+  diffusion_length = 0    // diffusivity over the speed of a strip that slides one way, mm; 0: not known
 ];
 
+If(diffusion_length < 0)
+  Error("diffusion_length must not be negative");
+EndIf
 If(radius <= 0 || contact_width <= 0 || ball_margin <= 0 || ball_height <= 0 || flat_height <= 0 || stroke < 0)
   Error("lengths must be positive");
 EndIf
@@ -32,32 +38,55 @@ EndIf
 If(flat_length <= contact_width + 2 * stroke || flat_width <= contact_width)
   Error("flat_length and flat_width must be larger than the square that the ball sweeps");
 EndIf
+If(core < 0 || core >= contact_width || (core > 0 && (core_elements < 1 || across % 2 != 0)))
+  Error("core must be smaller than contact_width, with core_elements in it and half of across, which is even, on each side");
+EndIf
 If(across < 1 || stroke_elements < 1 || margin_elements < 1 || ball_layers < 1 || flat_layers < 1 || growth <= 0)
   Error("across, stroke_elements, margin_elements, ball_layers and flat_layers must be at least 1, growth positive");
 EndIf
+
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_length * contact_width);
+whole = 0;
+For i In {0 : flat_layers - 1}
+  whole += growth^i;
+EndFor
+top_growth = growth;
+If(layer > 0 && flat_height / whole > layer)
+  top_growth = (growth > 1.5) ? growth : 1.5;
+  top_count = Ceil(Log(1 + (top_growth - 1) * flat_height / layer) / Log(top_growth));
+  flat_layers = (top_count > flat_layers) ? top_count : flat_layers;
+EndIf
+growths[] = {growth, top_growth};
 
 heights[] = {ball_height, -flat_height};
 layers[] = {ball_layers, flat_layers};
 h = contact_width / 2;
 centre = newp; Point(centre) = {0, 0, radius};
+// Lines within the square, and the elements between them.
+inner[] = {}; n_inner[] = {across}; even[] = {1};
+If(core > 0)
+  inner[] = {-core / 2, core / 2};
+  n_inner[] = {across / 2, core_elements, across / 2}; even[] = {1, 1, 1};
+EndIf
 For body In {0 : 1}
   // Lines of the grid along x and y, the elements between them and the ratio of their sizes.
   x[] = {}; y[] = {}; nx[] = {}; ny[] = {}; grade_x[] = {}; grade_y[] = {};
   If(body == 0)
-    x[] = {-h - ball_margin, -h, h, h + ball_margin}; y[] = x[];
-    nx[] = {margin_elements, across, margin_elements}; ny[] = nx[];
-    grade_x[] = {1 / growth, 1, growth}; grade_y[] = grade_x[];
+    x[] = {-h - ball_margin, -h, inner[], h, h + ball_margin}; y[] = x[];
+    nx[] = {margin_elements, n_inner[], margin_elements}; ny[] = nx[];
+    grade_x[] = {1 / growth, even[], growth}; grade_y[] = grade_x[];
   Else
     If(stroke > 0)
-      x[] = {-flat_length / 2, -h - stroke, -h, h, h + stroke, flat_length / 2};
-      nx[] = {margin_elements, stroke_elements, across, stroke_elements, margin_elements};
-      grade_x[] = {1 / growth, 1, 1, 1, growth};
+      x[] = {-flat_length / 2, -h - stroke, -h, inner[], h, h + stroke, flat_length / 2};
+      nx[] = {margin_elements, stroke_elements, n_inner[], stroke_elements, margin_elements};
+      grade_x[] = {1 / growth, 1, even[], 1, growth};
     Else
-      x[] = {-flat_length / 2, -h, h, flat_length / 2};
-      nx[] = {margin_elements, across, margin_elements}; grade_x[] = {1 / growth, 1, growth};
+      x[] = {-flat_length / 2, -h, inner[], h, flat_length / 2};
+      nx[] = {margin_elements, n_inner[], margin_elements}; grade_x[] = {1 / growth, even[], growth};
     EndIf
-    y[] = {-flat_width / 2, -h, h, flat_width / 2};
-    ny[] = {margin_elements, across, margin_elements}; grade_y[] = {1 / growth, 1, growth};
+    y[] = {-flat_width / 2, -h, inner[], h, flat_width / 2};
+    ny[] = {margin_elements, n_inner[], margin_elements}; grade_y[] = {1 / growth, even[], growth};
   EndIf
   mx = #x[]; my = #y[];
 
@@ -102,7 +131,7 @@ For body In {0 : 1}
   For j In {0 : my - 1}
     For i In {0 : mx - 1}
       l = newl; Line(l) = {p[i + mx * j], p[i + mx * (j + my)]};
-      Transfinite Curve{l} = layers[body] + 1 Using Progression growth;
+      Transfinite Curve{l} = layers[body] + 1 Using Progression growths[body];
       lz[] += l;
     EndFor
   EndFor
@@ -160,14 +189,12 @@ For body In {0 : 1}
   For j In {0 : my - 2}
     ends~{body}[] += {fx[mx * j], fx[mx - 1 + mx * j]};
   EndFor
-  If(body == 0)
-    contact~{body}[] = {fz[4]};
-  Else
-    contact~{body}[] = {};
+  contact~{body}[] = {};
+  For j In {1 : my - 3}
     For i In {1 : mx - 3}
-      contact~{body}[] += {fz[i + (mx - 1)]};
+      contact~{body}[] += {fz[i + (mx - 1) * j]};
     EndFor
-  EndIf
+  EndFor
 EndFor
 
 Physical Volume("punch_body") = volumes_0[];

@@ -15,9 +15,13 @@ DefineConstant[
   contact_width = 4,            // width with even elements, centred at x = 0: the scar must stay within it
   overlap = 0.1,                // how far the ring's contact reaches beyond
   elements_along_contact = 80,  // even, so that a node lies at x = 0
-  growth = 0.3                  // growth of the element size per length away from the contact
+  growth = 0.3,                 // growth of the element size per length away from the contact
+  diffusion_area = 0            // diffusivity over the angular speed of a strip that turns, mm²/rad; 0: not known
 ];
 
+If(diffusion_area < 0)
+  Error("diffusion_area must not be negative");
+EndIf
 If(radius <= 0 || ring_wall <= 0 || ring_wall >= radius || block_height <= 0 || contact_width <= 0 || overlap <= 0)
   Error("lengths must be positive, ring_wall smaller than radius");
 EndIf
@@ -81,7 +85,10 @@ EndFor
 // ---- Ring: the contact, its overlap and the rest, on both sides of x = 0 -----------------------
 o = newp; Point(o) = {0, 0, 0};
 inner_radius = radius - ring_wall;
-Ratio = 1 + growth * ring_wall / size;
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_area * contact_width / radius);
+top_size = (layer > 0 && layer < size) ? layer : size;
+Ratio = 1 + growth * ring_wall / top_size;
 down_count = Ceil(Log(Ratio) / Log(1 + growth));
 down_ratio = Ratio ^ (1 / down_count);
 contact_angle = Asin(half_width / radius);

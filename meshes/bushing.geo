@@ -16,9 +16,13 @@ DefineConstant[
   margin_angle = 20,            // by which both bodies go on beyond; at most 80 degrees in all
   elements_along_contact = 60,  // even, so that a node lies at x = 0
   margin_elements = 6,
-  growth = 0.5                  // growth of the element size per length away from the contact
+  growth = 0.5,                 // growth of the element size per length away from the contact
+  diffusion_area = 0            // diffusivity over the angular speed of a strip that turns, mm²/rad; 0: not known
 ];
 
+If(diffusion_area < 0)
+  Error("diffusion_area must not be negative");
+EndIf
 If(radius <= 0 || clearance <= 0 || wall <= 0 || shaft_wall <= 0 || shaft_wall >= radius)
   Error("radius, clearance, wall and shaft_wall must be positive, shaft_wall smaller than radius");
 EndIf
@@ -42,11 +46,14 @@ counts[] = {half_count, overlap_count, margin_elements};
 // Both bodies: sectors between the circle of the contact and another one about the same centre.
 near[] = {radius + clearance, radius};
 far[] = {radius + clearance + wall, radius - shaft_wall};
+// At the shaft's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_area * 2 * contact_angle * degree);
+sizes[] = {size, (layer > 0 && layer < size) ? layer : size};
 centres[] = {-clearance, 0};    // the bushing rests on the shaft's top
 For body In {0 : 1}
   z = centres[body];
   span = Fabs(far[body] - near[body]);
-  Ratio = 1 + growth * span / size;
+  Ratio = 1 + growth * span / sizes[body];
   Count = Ceil(Log(Ratio) / Log(1 + growth));
   Ratio = Ratio ^ (1 / Count);
   o = newp; Point(o) = {0, z, 0};

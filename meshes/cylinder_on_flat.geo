@@ -14,9 +14,13 @@ DefineConstant[
   contact_width = 0.6,          // width with even elements, centred at x = 0: the scar must stay within it
   overlap = 0.05,               // how far strip_contact reaches beyond, for a flat that moves under the cylinder
   elements_along_contact = 60,  // even, so that a node lies at x = 0
-  growth = 0.3                  // growth of the element size per length away from the contact
+  growth = 0.3,                 // growth of the element size per length away from the contact
+  diffusion_length = 0          // diffusivity over the speed of a strip that slides one way, mm; 0: not known
 ];
 
+If(diffusion_length < 0)
+  Error("diffusion_length must not be negative");
+EndIf
 If(radius <= 0 || strip_height <= 0 || contact_width <= 0 || overlap < 0)
   Error("radius, strip_height and contact_width must be positive, and overlap not negative");
 EndIf
@@ -87,7 +91,10 @@ strip[] = {}; strip_contact[] = {}; strip_free[] = {}; strip_ends[] = {}; strip_
 p = newp; Point(p) = {0, strip_height, 0}; middle_top = p;
 p = newp; Point(p) = {0, 0, 0}; middle_bottom = p;
 l = newl; Line(l) = {middle_top, middle_bottom}; middle_line = l;
-Ratio = 1 + growth * strip_height / size;
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_length * contact_width);
+top_size = (layer > 0 && layer < size) ? layer : size;
+Ratio = 1 + growth * strip_height / top_size;
 deep_count = Ceil(Log(Ratio) / Log(1 + growth));
 deep_ratio = Ratio ^ (1 / deep_count);
 Transfinite Curve{l} = deep_count + 1 Using Progression deep_ratio;

@@ -20,9 +20,13 @@ DefineConstant[
   disc_layers = 2,
   growth = 1,             // of an element's height over that of its neighbour towards the contact
   edge_grading = 1,       // of an element's width in the pad's middle over that at its sides
-  margin_growth = 1       // of an element's width over that of its neighbour towards the pad, in the disc's margins
+  margin_growth = 1,      // of an element's width over that of its neighbour towards the pad, in the disc's margins
+  diffusion_area = 0      // diffusivity over the angular speed of a strip that turns, mm²/rad; 0: not known
 ];
 
+If(diffusion_area < 0)
+  Error("diffusion_area must not be negative");
+EndIf
 If(inner_radius <= 0 || outer_radius <= inner_radius || pad_height <= 0 || disc_height <= 0)
   Error("expected 0 < inner_radius < outer_radius, and positive heights");
 EndIf
@@ -41,6 +45,20 @@ EndIf
 If(growth <= 0 || edge_grading <= 0 || margin_growth <= 0)
   Error("growth, edge_grading and margin_growth must be positive");
 EndIf
+
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_area * angle * Pi / 180);
+whole = 0;
+For i In {0 : disc_layers - 1}
+  whole += growth^i;
+EndFor
+top_growth = growth;
+If(layer > 0 && disc_height / whole > layer)
+  top_growth = (growth > 1.5) ? growth : 1.5;
+  top_count = Ceil(Log(1 + (top_growth - 1) * disc_height / layer) / Log(top_growth));
+  disc_layers = (top_count > disc_layers) ? top_count : disc_layers;
+EndIf
+growths[] = {growth, top_growth};
 
 For body In {0 : 1}
   // Radii and angles of the grid, and the elements between them.
@@ -105,7 +123,7 @@ For body In {0 : 1}
     For j In {0 : my - 1}
       For i In {0 : mx - 1}
         l = newl; Line(l) = {p[i + mx * (j + my * k)], p[i + mx * (j + my * (k + 1))]};
-        Transfinite Curve{l} = nz[k] + 1 Using Progression (k == 0) ? growth : 1;
+        Transfinite Curve{l} = nz[k] + 1 Using Progression (k == 0) ? growths[body] : 1;
         lz[] += l;
       EndFor
     EndFor

@@ -17,9 +17,13 @@ DefineConstant[
   spread = 2,             // of such an element's width over that of its neighbour towards the pin
   pin_layers = 5,         // elements over the height
   disc_layers = 4,
-  growth = 1.8            // of an element's height over that of its neighbour towards the contact
+  growth = 1.8,           // of an element's height over that of its neighbour towards the contact
+  diffusion_area = 0      // diffusivity over the angular speed of a strip that turns, mm²/rad; 0: not known
 ];
 
+If(diffusion_area < 0)
+  Error("diffusion_area must not be negative");
+EndIf
 If(pin_radius <= 0 || pin_height <= 0 || disc_height <= 0 || disc_radius <= pin_radius || track_radius < 0)
   Error("lengths must be positive, disc_radius larger than pin_radius");
 EndIf
@@ -32,6 +36,24 @@ EndIf
 If(growth <= 0 || spread <= 0 || edge_grading <= 0)
   Error("growth, spread and edge_grading must be positive");
 EndIf
+
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+turned = Pi; // the angle under the pin; both branches of a ? : are evaluated, a 1 / 0 in either is an error
+If(track_radius > pin_radius)
+  turned = 2 * pin_radius / track_radius;
+EndIf
+layer = Sqrt(diffusion_area * turned);
+whole = 0;
+For i In {0 : disc_layers - 1}
+  whole += growth^i;
+EndFor
+top_growth = growth;
+If(layer > 0 && disc_height / whole > layer)
+  top_growth = (growth > 1.5) ? growth : 1.5;
+  top_count = Ceil(Log(1 + (top_growth - 1) * disc_height / layer) / Log(top_growth));
+  disc_layers = (top_count > disc_layers) ? top_count : disc_layers;
+EndIf
+growths[] = {growth, top_growth};
 
 heights[] = {pin_height, -disc_height};
 layers[] = {pin_layers, disc_layers};
@@ -84,11 +106,11 @@ Recombine Surface{faces[]};
 For body In {0 : 1}
   ones[] = {}; levels[] = {}; level = 0; height = 1; whole = 0;
   For i In {1 : layers[body]}
-    whole += height; height *= growth;
+    whole += height; height *= growths[body];
   EndFor
   height = 1;
   For i In {1 : layers[body]}
-    level += height / whole; height *= growth;
+    level += height / whole; height *= growths[body];
     ones[] += 1; levels[] += level;
   EndFor
   last = 4 * (1 + body);

@@ -16,9 +16,13 @@ DefineConstant[
   overlap = 0,                  // how far strip_contact reaches beyond the punch, for a strip that moves under it
   elements_along_contact = 16,  // even, so that a node lies at x = 0
   edge_grading = 4,             // element size in the middle of the contact over that at its edges
-  growth = 0.5                  // growth of the element size per length away from the contact
+  growth = 0.5,                 // growth of the element size per length away from the contact
+  diffusion_length = 0          // diffusivity over the speed of a strip that slides one way, mm; 0: not known
 ];
 
+If(diffusion_length < 0)
+  Error("diffusion_length must not be negative");
+EndIf
 If(punch_width <= 0 || punch_height <= 0 || strip_height <= 0)
   Error("punch_width, punch_height and strip_height must be positive");
 EndIf
@@ -125,7 +129,10 @@ If(overlap > 0)
   distances[] += {half_width + overlap};
 EndIf
 distances[] += {strip_length / 2};
-Ratio = 1 + growth * strip_height / edge_size;
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_length * punch_width);
+top_size = (layer > 0 && layer < edge_size) ? layer : edge_size;
+Ratio = 1 + growth * strip_height / top_size;
 deep_count = Ceil(Log(Ratio) / Log(1 + growth));
 deep_ratio = Ratio ^ (1 / deep_count);
 

@@ -17,9 +17,13 @@ DefineConstant[
   elements_along_flat = 20,     // even, so that a node lies at x = 0
   elements_along_edge = 8,      // of each rounded edge
   flat_grading = 8,             // element size in the middle over that at the ends of the flat
-  growth = 0.5                  // growth of the element size per length away from the contact
+  growth = 0.5,                 // growth of the element size per length away from the contact
+  diffusion_length = 0          // diffusivity over the speed of a strip that slides one way, mm; 0: not known
 ];
 
+If(diffusion_length < 0)
+  Error("diffusion_length must not be negative");
+EndIf
 If(flat_width <= 0 || flat_width >= punch_width || edge_radius <= 0 || crown_radius < 0)
   Error("expected 0 < flat_width < punch_width, a positive edge_radius and a crown_radius that is not negative");
 EndIf
@@ -53,7 +57,7 @@ If(punch_height <= 2 * edge_drop)
 EndIf
 
 half_count = elements_along_flat / 2;
-flat_ratio = (half_count > 1) ? flat_grading ^ (-1 / (half_count - 1)) : 1;
+flat_ratio = flat_grading ^ (-1 / ((half_count > 1) ? half_count - 1 : 1)); // both branches are evaluated: no 1 / 0
 size = 0;
 For i In {0 : half_count - 1}
   size += flat_ratio ^ (-i);
@@ -108,7 +112,10 @@ If(overlap > 0)
   distances[] += {punch_width / 2 + overlap};
 EndIf
 distances[] += {strip_length / 2};
-Ratio = 1 + growth * strip_height / size;
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_length * punch_width);
+top_size = (layer > 0 && layer < size) ? layer : size;
+Ratio = 1 + growth * strip_height / top_size;
 deep_count = Ceil(Log(Ratio) / Log(1 + growth));
 deep_ratio = Ratio ^ (1 / deep_count);
 outer_size = (punch_width / 2 - flat_end) / elements_along_edge;

@@ -21,9 +21,13 @@ DefineConstant[
   strip_layers = 2,
   growth = 1,             // of an element's height over that of its neighbour towards the contact
   punch_tetrahedra = 0,   // 1: tetrahedra in place of hexahedra
-  strip_tetrahedra = 0
+  strip_tetrahedra = 0,
+  diffusion_length = 0    // diffusivity over the speed of a strip that slides one way, mm; 0: not known
 ];
 
+If(diffusion_length < 0)
+  Error("diffusion_length must not be negative");
+EndIf
 If(width <= 0 || depth <= 0 || punch_height <= 0 || strip_height <= 0 || margin_x < 0 || margin_y < 0)
   Error("width, depth, punch_height and strip_height must be positive, margin_x and margin_y not negative");
 EndIf
@@ -33,6 +37,20 @@ EndIf
 If(growth <= 0 || spread <= 0)
   Error("growth and spread must be positive");
 EndIf
+
+// At the strip's surface elements are at most as high as the layer that heats up while it passes.
+layer = Sqrt(diffusion_length * ((width < depth) ? width : depth));
+whole = 0;
+For i In {0 : strip_layers - 1}
+  whole += growth^i;
+EndFor
+top_growth = growth;
+If(layer > 0 && strip_height / whole > layer)
+  top_growth = (growth > 1.5) ? growth : 1.5;
+  top_count = Ceil(Log(1 + (top_growth - 1) * strip_height / layer) / Log(top_growth));
+  strip_layers = (top_count > strip_layers) ? top_count : strip_layers;
+EndIf
+growths[] = {growth, top_growth};
 
 heights[] = {punch_height, -strip_height};
 layers[] = {punch_layers, strip_layers};
@@ -87,7 +105,7 @@ For body In {0 : 1}
   For j In {0 : my - 1}
     For i In {0 : mx - 1}
       l = newl; Line(l) = {p[i + mx * j], p[i + mx * (j + my)]};
-      Transfinite Curve{l} = layers[body] + 1 Using Progression growth;
+      Transfinite Curve{l} = layers[body] + 1 Using Progression growths[body];
       lz[] += l;
     EndFor
   EndFor

@@ -30,7 +30,7 @@ SHIM = f"""#!/bin/sh
 forked="{sys.executable} -IS {ROOT}/tests/forked.py DOOR"
 case " $* " in *" -- "*) forked="{sys.executable}" ;; esac
 case $1 in
-  run|steady|optimum|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|export|info|new|schema)
+  run|steady|optimum|shape|check|mesh|plot|compare|verify|sensitivity|calibrate|life|sweep|export|info|new|schema)
     exec $forked -m fenwear "$@" ;;
   python3) case $2 in *.py) shift && exec $forked "$@" ;; esac ;;
 esac

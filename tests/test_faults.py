@@ -204,8 +204,8 @@ def test_full_disk_for_other_commands(fenwear: Run, small_disk: Callable[[int], 
     folder = tmp_path / "run"
     done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=4"))
     assert done.returncode == 0, done.stderr
-    disk = small_disk(1000)
-    shutil.copytree(folder, disk / "run", ignore=shutil.ignore_patterns("figures", "report.html", "*.bp"))
+    disk = small_disk(4000)
+    shutil.copytree(folder, disk / "run", ignore=shutil.ignore_patterns("figures", "report.html"))
     (disk / "filler").write_bytes(b"0" * (shutil.disk_usage(disk).free - 8192))
     commands = (
         ("plot", disk / "run"),
@@ -335,7 +335,8 @@ def test_killed_with_more_to_remember(fenwear: Run, tmp_path: Path, name: str) -
         assert done.returncode == 0, done.stderr
     one, other = (load_history(folder) for folder in (resumed, whole))
     np.testing.assert_array_equal(one.half_cycle, other.half_cycle)
-    for variable in sorted(set(other.data_vars) - {"equilibrium_error", "heat_balance_error", "periodicity"}):
+    rounding = {"equilibrium_error", "complementarity_error", "heat_balance_error", "periodicity"}
+    for variable in sorted(set(other.data_vars) - rounding):
         measure = {"gap": "wear"}.get(variable, "heat_friction" if str(variable).startswith("heat_") else variable)
         scale = float(np.abs(other[measure]).max())
         np.testing.assert_allclose(one[variable], other[variable], rtol=0, atol=1e-9 * scale, err_msg=str(variable))
@@ -440,7 +441,7 @@ def test_divergence_during_a_run(fenwear: Run, tmp_path: Path) -> None:
     check_goes_on(fenwear, folder)
 
 
-@pytest.mark.parametrize("name", ["state.npz", "case.toml", "temperature_punch.bp/md.idx"])
+@pytest.mark.parametrize("name", ["state.npz", "case.toml", "temperature_punch.npz"])
 def test_damaged_checkpoint(fenwear: Run, tmp_path: Path, name: str) -> None:
     """Cut in half it is refused, on one rank and on two, and nothing is changed."""
     folder = tmp_path / "run"

@@ -6,9 +6,9 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-import click
 import numpy as np
 import pytest
+import typer
 from mpi4py import MPI
 
 from fenwear import __main__, cli
@@ -19,7 +19,7 @@ from fenwear.versions import versions
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (click.Abort(), "fenwear: interrupted\n"),
+        (typer.Abort(), "fenwear: interrupted\n"),
         (KeyboardInterrupt(), "fenwear: interrupted\n"),
         (OutputError(Path("x.nc"), "no space left"), "fenwear: x.nc cannot be written: no space left\n"),
     ],

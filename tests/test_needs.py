@@ -74,7 +74,7 @@ def test_columns_of_frames() -> None:
     found = needs_of(ball)
     assert found.punch.columns == len(ball.pair.weights)
     assert found.strip.columns == len(ball.pair.strip.trace)
-    assert (found.interfaces, found.phases) == (5, 10)
+    assert (found.interfaces, found.phases) == (7, 14)
     curved = needs(ball, (True, False, False))
     assert curved.strip.columns == 3 * found.strip.columns
     assert curved.memory > found.memory
@@ -278,6 +278,6 @@ def test_what_each_rank_does(way: str, told: str) -> None:
 
 def test_a_contact_too_large_is_refused_before_the_bodies_are_meshed() -> None:
     """160,000 contact nodes: hundreds of GiB, told within seconds, where meshing alone takes minutes and gigabytes."""
-    case = load_case("ball-on-flat", ["geometry.parameters.across=200"])
+    case = load_case("ball-on-flat", ["geometry.parameters.across=200", "geometry.parameters.core=0"])
     with pytest.raises(CaseError, match=r"geometry: about 160,000 contact nodes take [56]\d\d\.\d GiB at least, but"):
         assemble(case)

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import fsolve
 
-from fenwear import CaseError, Tribosystem, assemble, load_case
+from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, load_case, march
 from fenwear.arrays import Array
 
 A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
@@ -71,6 +71,89 @@ def test_open_contact_is_a_triangle(assembled: Callable[..., Tribosystem], direc
         errors.append(np.abs(found.pressure - exact).max() / exact.max())
         assert found.residual < 1e-10
     assert errors[1] < min(1e-3, errors[0] / 8)
+
+
+@pytest.mark.parametrize(
+    ("wear", "shape", "start"),
+    [
+        (
+            "{punch={coefficient=1e-8, pressure_exponent=2, pressure_threshold=4}}",
+            lambda w: 4 + np.sqrt(np.maximum(w, 0)),
+            (170.0, -3.0),
+        ),
+        (  # 1e-8 p + 2e-10 p^2 = 1e-8 w
+            "{punch={coefficient=1e-8}, strip={coefficient=2e-10, pressure_exponent=2}}",
+            lambda w: 25 * (np.sqrt(1 + 0.08 * w) - 1),
+            (21.0, -0.4),
+        ),
+    ],
+    ids=["threshold", "two laws"],
+)
+def test_any_law_against_adaptive_quadrature(
+    assembled: Callable[..., Tribosystem], wear: str, shape: Callable[[float], float], start: tuple[float, float]
+) -> None:
+    """Pressure and wear velocity where laws have a threshold, or both bodies wear by other exponents: w_n linear in x,
+    the pressure its inverse, force and moment by QUADPACK and MINPACK."""
+    moving = ("motion.positions=2", "geometry.parameters.overlap=3", "contact.friction=0.1")
+    system = assembled("example1", *moving, f"wear={wear}")
+
+    def balance(unknown: Array) -> list[float]:
+        f, g = unknown
+        moments = [quad(lambda x, k=k: shape(f + g * x) * x**k, -A, A, epsabs=1e-11)[0] for k in (0, 1)]  # type: ignore[misc]
+        return [moments[0] / 1000 - 1, moments[1] / 1000 + 0.1 * 20]
+
+    f, g = fsolve(balance, start, xtol=1e-12)
+    found = system.optimum(1)
+    np.testing.assert_allclose(found.pressure, shape(f + g * system.pair.x), rtol=2e-5)
+    rate = 1e-8 * 3.0 / (np.pi / 10)  # the mean of beta~ v
+    at_pin = found.velocity["lambda_F"] - found.velocity["lambda_M"] * (system.pair.x - A)
+    np.testing.assert_allclose(at_pin, rate * (f + g * system.pair.x), rtol=2e-5)
+
+
+def test_threshold_where_the_punch_turns_within_the_contact(assembled: Callable[..., Tribosystem]) -> None:
+    """A trapezium p_0 + g (l - x) over a length l: from force and moment. The error falls with the elements."""
+    mu, height, threshold = 0.4, 40, 8.0
+
+    def balance(unknown: Array) -> list[float]:
+        length, g = unknown
+        force = threshold * length + g * length**2 / 2
+        moment = threshold * length**2 / 2 + g * length**3 / 6
+        return [force / 1000 - 1, moment / 1000 / (A - mu * height) - 1]
+
+    length, g = fsolve(balance, [40.0, 1.0])
+    errors = []
+    for count in (16, 64, 256):
+        system = assembled(
+            "monotonic-lz40",
+            "geometry.degree=1",
+            f"contact.friction={mu}",
+            f"geometry.parameters.elements_along_contact={count}",
+            f"wear.punch={{coefficient=1e-5, pressure_threshold={threshold}}}",
+        )
+        found, x = system.optimum(1), system.pair.x + A
+        exact = np.where(x < length, threshold + g * (length - x), 0.0)
+        beside = np.abs(x - length) > 120 / count  # the jump lies within an element
+        errors.append(np.abs(found.pressure - exact)[beside].max())
+        assert found.residual < 1e-10
+        assert (np.abs(found.pressure - exact)[~beside] < threshold + g * 120 / count).all()
+    assert errors[2] < min(0.1, errors[0] / 4)
+
+
+def test_no_optimum(assembled: Callable[..., Tribosystem]) -> None:
+    """Where nothing need wear, or nothing wears fast enough, none is printed, and a run goes on without it."""
+    small = ("geometry.degree=1", "geometry.parameters.elements_along_contact=8", "geometry.follow_wear=never")
+    light = assembled("example2", *small, "wear.punch={coefficient=1e-5, pressure_threshold=20}")
+    with pytest.raises(ConvergenceError, match="below the pressure_threshold of 20 MPa balance the loads"):
+        light.optimum(1)
+    (block,) = march(light, 2)
+    assert np.isnan(block.optimum_distance).all()
+    capped = assembled("example1", *small, "wear.punch={coefficient=1e-5, pressure_cap=20}")
+    with pytest.raises(ConvergenceError, match=r"would need 2\d.* beyond the pressure_cap of 20 MPa"):
+        capped.optimum(1)
+    assert (
+        np.ptp(assembled("example2", *small, "wear.punch={coefficient=1e-5, pressure_cap=20}").optimum(1).pressure)
+        < 1e-9
+    )
 
 
 def test_zone(assembled: Callable[..., Tribosystem]) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import itertools
+import json
 import re
 import shutil
 import sys
@@ -65,18 +67,19 @@ def test_dependencies_are_declared() -> None:
     """Every library that a module imports, but for what comes with the compiled stack or with a declared one."""
     comes_along = {
         "basix",
+        "cffi",
         "dolfinx",
         "ffcx",
-        "gmsh",
         "petsc4py",
         "ufl",
         "h5py",
         "markupsafe",
-        "click",
         "pydantic_core",
     }
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
-    given = [*project["dependencies"], *project["optional-dependencies"]["life"]]
+    extras = project["optional-dependencies"]
+    given = [*project["dependencies"], *itertools.chain.from_iterable(extras.values())]
+    assert not {"fenics-dolfinx", "petsc4py", "adios4dolfinx"} & {re.split(r"[<>=]", name)[0] for name in given}
     names = {re.split(r"[<>=]", name)[0].replace("-", "_").replace("pillow", "PIL") for name in given}
     for path in (ROOT / "fenwear").rglob("*.py"):
         nodes = list(ast.walk(ast.parse(path.read_text("utf-8"))))
@@ -87,8 +90,11 @@ def test_dependencies_are_declared() -> None:
 
 
 def test_one_version_everywhere() -> None:
-    """Package, citation and changelog name the same."""
-    citation, changes = ((ROOT / name).read_text("utf-8") for name in ("CITATION.cff", "CHANGELOG.md"))
+    """Package, citation, changelog and codemeta name the same."""
+    citation, changes, meta = (
+        (ROOT / name).read_text("utf-8") for name in ("CITATION.cff", "CHANGELOG.md", "codemeta.json")
+    )
+    assert json.loads(meta)["version"] == fenwear.__version__
     assert re.search(r"^version: (.*)$", citation, re.MULTILINE)[1] == fenwear.__version__  # type: ignore[index]
     assert re.search(r"^## (\S+)", changes, re.MULTILINE)[1] == fenwear.__version__  # type: ignore[index]
 

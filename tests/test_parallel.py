@@ -14,12 +14,13 @@ import scipy.linalg
 from mpi4py import MPI
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady
+from fenwear.assembly import with_reduced_heat
 from fenwear.contact.inequality import Inequality
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, growth_rate, jump_step, stability_number
 from fenwear.cycle import state as cycle_state
-from fenwear.errors import InputError
+from fenwear.errors import InputError, RanksError
 from fenwear.heat.fluxes import FluxMap
-from fenwear.parallel import on_root
+from fenwear.parallel import Team, on_root, total
 from fenwear.sliding.friction import Friction
 from fenwear.sliding.wear import PhasesWear
 from fenwear.stick.equations import Step
@@ -223,6 +224,68 @@ def test_on_root() -> None:
 
     with pytest.raises(CaseError, match="key: on rank 0"):
         on_root(COMM, fail)
+
+
+@pytest.fixture
+def small() -> Callable[[], Tribosystem]:
+    """Return small(): a small system with heat that is not prepared; made once."""
+    case = load_case("example1-heat", ["geometry.degree=1", "geometry.parameters.elements_along_contact=8"])
+    system = assemble(case, COMM, heat="none")
+    return lambda: system
+
+
+class Unpackable(Exception):
+    """An error that cannot cross ranks."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self.held = (value for value in ())  # no generator can be packed
+
+
+class HalfPackable(Exception):
+    """An error that can be packed, and not unpacked."""
+
+    def __init__(self, one: str, other: str) -> None:
+        super().__init__(f"{one} {other}")
+
+
+class Part:
+    """What every rank has a part of; the others' fails, or returns what cannot cross ranks."""
+
+    def answer(self, how: str) -> object:
+        if COMM.rank and how == "raise":
+            raise Unpackable("of a part")
+        return (value for value in ()) if COMM.rank else None
+
+
+@several
+@pytest.mark.mpi
+def test_whatever_fails_no_rank_waits(small: Callable[..., Tribosystem]) -> None:
+    """Errors and results that cannot cross ranks, interrupts, and what all ranks have to do together where one leads:
+    each ends in a typed error on every rank, and the ranks go on together."""
+    team, part = Team.of(COMM), Part()
+    team.serve(part)
+
+    def fail(error: BaseException) -> None:
+        raise error
+
+    case = small().case
+    led: list[tuple[Callable[[], object], type[BaseException], str]] = [
+        (lambda: fail(Unpackable("of rank 0")), RanksError, "Unpackable: of rank 0"),
+        (lambda: fail(HalfPackable("of", "rank 0")), RanksError, "HalfPackable: of rank 0"),
+        (lambda: fail(KeyboardInterrupt()), KeyboardInterrupt, ""),
+        (lambda: (value for value in ()), RanksError, "generator"),
+        (lambda: team.call(part, "answer", "raise"), RanksError, "Unpackable: of a part"),
+        (lambda: team.call(part, "answer", "return"), RanksError, "generator"),
+        (lambda: total(COMM, np.ones(2)), RanksError, "one leads the others"),
+        (lambda: assemble(case), RanksError, "one leads the others"),
+        (lambda: with_reduced_heat(small()), RanksError, "one leads the others"),
+    ]
+    for function, kind, text in led:
+        with pytest.raises(kind, match=text):
+            team.lead(function)
+        assert COMM.allreduce(1) == COMM.size
+        assert team.lead(lambda: 7) == 7
 
 
 FEW = """

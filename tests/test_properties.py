@@ -94,6 +94,8 @@ class Parameters:
                  "pin_height_1": self.pins[0]}  # fmt: skip
         if self.example == 2:
             sizes["pin_height_2"] = self.pins[1]
+        if self.heat is not None:
+            sizes["overlap"] = 30
         found = {f"geometry.parameters.{name}": size * length for name, size in sizes.items()}
         found |= {
             "geometry.parameters.elements_along_contact": self.elements,
@@ -209,7 +211,7 @@ def check_contact(system: Tribosystem, parameters: Parameters, block: Block) -> 
     assert (block.gap > -1e-8 * depth).all()
     assert (np.minimum(block.pressure * 60 / load, block.gap / depth) < 1e-8).all()
     worn = parameters.coefficient * load * 2 * parameters.amplitude
-    np.testing.assert_allclose(block.worn_area, worn, rtol=1e-9)
+    np.testing.assert_allclose(block.worn_area_increment, worn, rtol=1e-9)
     np.testing.assert_allclose(np.diff(block.wear @ weights), worn, rtol=1e-9)
     assert (block.equilibrium_error < 1e-8).all()
 

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from fenwear import CaseError, Tribosystem, load_case
-from fenwear.assembly import place_case
+from fenwear.assembly import assemble, place_case
+from fenwear.case import Case
 from fenwear.cycle import march, steady
+from fenwear.verify.solid import describe
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
 
@@ -103,3 +107,34 @@ def test_heat_of_rings(assembled: Callable[..., Tribosystem]) -> None:
     assert (block.pressure == 0).any()
     assert block.heat is not None
     assert block.heat.balance_error.max() < 1e-9
+
+
+def blocks(tmp_path: Path, *, turned: bool, **punch: Any) -> Case:
+    """Return two cubes, one on the other, or turned about y: side by side then, with the plane x = 0 between them."""
+    mesh = Path(__file__).parents[1] / "meshes" / "solid_blocks.geo"
+    geometry = tmp_path / "blocks.geo"
+    geometry.write_text(
+        f'Include "{mesh}";\nRotate {{{{0, 1, 0}}, {{0, 0, 0}}, {int(turned)} * Pi / 2}} {{Volume{{:}};}}\n'
+    )
+    held = {"supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]}
+    along = {"kind": "reciprocating", "amplitude": 0.01, "period": 1.0, "along": [0, 1, 0], "positions": 1}
+    return describe({"file": str(geometry), "degree": 1}, punch, held, motion=along)
+
+
+def test_a_free_body_whose_contact_does_not_face_z(tmp_path: Path) -> None:
+    """It is refused for where its contact looks, not for supports that fit it: all but x held."""
+    punch = {"supports": [{"on": "punch_far", "fix": ["y", "z"]}], "loads": [{"on": "punch_far", "force": [-9, 0, 0]}]}
+    with pytest.raises(CaseError, match="geometry: punch_contact looks along x, and the punch is not held"):
+        place_case(blocks(tmp_path, turned=True, **punch))
+
+
+def test_a_held_body_may_face_any_way(tmp_path: Path) -> None:
+    """Pressed by a displacement of its back: the pressure is that of the same blocks upright."""
+    pressure = {}
+    for turned, by in ((False, [0, 0, -1e-3]), (True, [-1e-3, 0, 0])):
+        supports = [{"on": "punch_far", "fix": ["x", "y", "z"], "by": by}]
+        system = assemble(blocks(tmp_path, turned=turned, supports=supports))
+        found = system.contact((1,)).solve(system.gap(0, system.unworn())).pressure[0]
+        pressure[turned] = np.sort(found)
+    np.testing.assert_allclose(pressure[True], pressure[False], rtol=1e-9)
+    assert pressure[True].min() > 0

@@ -14,17 +14,23 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
-from fenwear import Tribosystem, assemble, load_case, make_case, march, steady
+from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
 from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
+from fenwear.case import doubts
+from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError
 from fenwear.report.page import page
-from fenwear.run import run_case
+from fenwear.results.summary import net_of
+from fenwear.run import position_warnings, run_case
 from fenwear.stick.cycle import Records
 from fenwear.stick.setup import make_rig
+from fenwear.verify.solid import STEEL, describe
 from fenwear.watch import Watch, elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
 from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import contact_ends
+from fenwear.watch.few import few_text
+from fenwear.watch.layer import heated_layer, layer_warnings
 from fenwear.watch.rim import contact_rim
 from fenwear.watch.thickness import thickness
 
@@ -106,7 +112,9 @@ def test_a_ball_that_needs_more(assembled: Assembled) -> None:
     assert rim.width_needed(0.0, 600.0) == pytest.approx(2 * (0.75 * 600 * 5 / modulus) ** (1 / 3), rel=2e-3)
     assert rim.width_needed(np.pi * 0.4**4 / (4 * 5), 0.0) == pytest.approx(0.8, rel=2e-3)
     (warning, _) = initial_warnings(system)
-    assert re.search(r"at \d+ nodes of its rim, \(0\.2, 0, 0\.004\d*\) mm among them, where the bodies go on", warning)
+    assert re.search(
+        r"at \d+ nodes of its rim, \((0\.2, 0|0, 0\.2), 0\.004\d*\) mm among them, where the bodies go on", warning
+    )
     assert "a width of about 0.538 mm is needed, it has 0.4 mm; set geometry.parameters.contact_width" in warning
     inside = assembled("ball-on-flat", "geometry.degree=1", "punch.loads.0.force=[0, 0, -20]")
     assert not any("clipped" in text for text in initial_warnings(inside))
@@ -146,7 +154,7 @@ def test_clipped_contact_is_told(tmp_path: Path) -> None:
     (tmp_path / "wide").mkdir()
     wide, _ = run(tmp_path / "wide", "fretting", *settings, "run.half_cycles=4000",
                   f"geometry.parameters.contact_width={1.1 * needed}")  # fmt: skip
-    assert wide["warnings"] == []  # the width that it names is enough
+    assert not [text for text in wide["warnings"] if "clipped" in text]  # the width that it names is enough
     assert wide["rightward"]["contact_width_mm"] == pytest.approx(needed, rel=0.15)  # and not far from what is used
 
 
@@ -377,3 +385,120 @@ def test_thickness(name: str, punch: float, strip: float) -> None:
     bodies = place_case(load_case(name)).bodies
     assert thickness(bodies.punch).max() == pytest.approx(punch, rel=1e-9)
     np.testing.assert_allclose(thickness(bodies.strip), strip, rtol=1e-5)
+
+
+GROWING = ["block-on-ring", "fretting", "rounded-punch", "block-on-ring.toml", "bushing.toml", "cylinder-on-flat.toml",
+           "fretting.toml"]  # fmt: skip
+SOLIDS = ["ball-on-flat", "brake-pad", "pin-on-disc", "ball-on-flat.toml", "pin-on-disc.toml"]
+
+
+def case_of(name: str, folder: Path) -> Case:
+    """Return a built-in case, or that of the template of such a name."""
+    if not name.endswith(".toml"):
+        return load_case(name)
+    write_case_of(name.removesuffix(".toml"), folder / name)
+    return load_case(folder / name)
+
+
+@pytest.mark.parametrize("name", GROWING)
+def test_cases_and_templates_warn_of_nothing(name: str, tmp_path: Path) -> None:
+    """What `check` would say of them as they stand."""
+    system = assemble(case_of(name, tmp_path), heat="none")
+    assert [*position_warnings(system), *system.bodies.remarks, *doubts(system.case), *initial_warnings(system)] == []
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_warn_of_nothing(name: str, tmp_path: Path) -> None:
+    """Without solving for their contact: that of balls is as wide as Hertz's."""
+    placed = place_case(case_of(name, tmp_path))
+    assert [*position_warnings(placed), *doubts(placed.case)] == []
+    rim, x = contact_rim(placed), placed.pair.punch.x
+    if rim is not None:
+        width = rim.hertzian(placed.normal_force)
+        assert width is not None
+        touching = np.where(np.hypot(*x[:, :2].T) < width / 2, 1.0, 0.0)
+        assert few_text(placed.case, net_of(placed), touching, "at the start") == ""
+
+
+def start(system: Tribosystem) -> np.ndarray:
+    """Return the pressure of the unworn bodies (n,), MPa."""
+    return system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure[0]
+
+
+@pytest.mark.parametrize(("elements", "few"), [(60, False), (16, True), (8, True), (4, True)])
+def test_contact_on_a_few_nodes_is_told(assembled: Assembled, elements: int, few: bool) -> None:
+    """Of a cylinder, by `check`; with the elements that it names there is nothing to say.
+
+    Reference: Hertz's width over the distance of the nodes.
+    """
+    key = "geometry.parameters.elements_along_contact"
+    system = assembled("fretting", f"{key}={elements}", "motion.positions=2")
+    pressure = start(system)
+    zone = net_of(system).zone(pressure)
+    assert zone is not None
+    width = 2 * np.sqrt(4 * 18.5 * 6 / (np.pi * 2e5 / (2 * (1 - 0.09))))
+    assert abs(zone.nodes[0] - width / (0.6 / (2 * elements))) < 2
+    assert zone.free[0] == 2
+    told = [text for text in initial_warnings(system) if "across the contact" in text]
+    assert bool(told) is few
+    if few:
+        wanted = int(told[0].rpartition(f"{key} = ")[2])
+        assert 32 <= wanted <= 60  # with 60 there are 15 nodes
+        finer = assembled("fretting", f"{key}={wanted}", "motion.positions=2")
+        assert not [text for text in initial_warnings(finer) if "across the contact" in text]
+
+
+def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: Path) -> None:
+    """Told once by a run, and in its summary; of an own mesh the size of elements; the ends of a flat are its own."""
+    coarse = ("geometry.parameters.elements_along_contact=8", "motion.positions=2")
+    summary, said = run(tmp_path, "fretting", *coarse, "run.half_cycles=2", "run.integration=implicit",
+                        "output.report=false")  # fmt: skip
+    (told,) = [text for text in summary["warnings"] if "across the contact at the start" in text]
+    assert said.count(f"warning: {told}") == 1
+    system = assembled("fretting", *coarse)
+    (tmp_path / "own.msh").touch()
+    geometry = system.case.geometry.model_copy(update={"file": "own.msh", "order": 1, "parameters": {}})
+    own = system.case.model_copy(update={"geometry": geometry}).at(tmp_path)
+    text = few_text(own, net_of(system), start(system), "at the start")
+    size = float(re.findall(r"elements at the contact ([\d.e-]+) mm long", text)[0])
+    assert 0.6 / 60 < size < 0.6 / 32  # with 60 there are 15 nodes
+    state = steady(assembled("example1", "geometry.degree=1", "geometry.parameters.elements_along_contact=4"))
+    assert (state.phase_pressure > 0).all(axis=1).any()
+    assert not [text for text in steady_warnings(state.system, state) if "across" in text]  # five nodes, all of them
+
+
+def test_elements_thicker_than_the_layer_that_heats_up() -> None:
+    """A pad at 100 rad/s: the number that is told is what it needs, and the ready mesh has it without being asked."""
+    layer = np.sqrt(50e3 / 3.6e6 * 1e3 * np.pi / 3 / 100)  # a = k / (rho c), over the time of 60 degrees
+    bare = ["motion.angular_speed=100", "geometry.parameters.diffusion_area=0"]
+
+    def told(*settings: str) -> list[str]:
+        return layer_warnings(place_case(load_case("brake-pad", list(settings))))
+
+    (coarse,) = told(*bare, "geometry.parameters.growth=1", "geometry.parameters.disc_layers=3")
+    assert "up to 4 mm high" in coarse
+    assert f"{layer:.3g} mm thick" in coarse
+    needed = float(re.search(r"at most (\S+) mm", coarse)[1])  # type: ignore[index]
+    layers = int(np.ceil(12 / needed))
+    assert told(*bare, "geometry.parameters.growth=1", f"geometry.parameters.disc_layers={layers}") == []
+    assert told(*bare, "geometry.parameters.growth=1", f"geometry.parameters.disc_layers={layers - 1}") != []
+    assert told("motion.angular_speed=100") == []
+
+
+@pytest.mark.parametrize("tetrahedra", [0, 1])
+def test_height_of_elements_that_the_layer_is_held_against(tetrahedra: int) -> None:
+    """That of hexahedra, and of the tetrahedra that they are cut into."""
+    sizes = {"strip_height": 1.0, "strip_layers": 4, "strip_tetrahedra": tetrahedra, "diffusion_length": 0.0}
+    steel = {**STEEL, "conductivity": 50.0, "heat_capacity": 4.6e8, "density": 7.8e-9, "expansion": 0.0}
+    case = describe(
+        {"file": "solid_blocks.geo", "degree": 2, "parameters": sizes},
+        {"supports": [{"on": "punch_sides", "fix": ["x", "y"]}], "loads": [{"on": "punch_far", "force": [0, 0, -1]}]},
+        {"supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        materials=(steel, steel),
+        motion={"kind": "one-way", "direction": "rightward", "speed": 1e4, "duration": 1.0},
+        heat={},
+    )
+    layer = heated_layer(place_case(case))
+    assert layer is not None
+    assert layer.height == pytest.approx(0.25, rel=1e-9)
+    assert layer.thickness == pytest.approx(np.sqrt(50.0 / (4.6e8 * 7.8e-9) * 1.0 / 1e4), rel=1e-9)

@@ -131,6 +131,7 @@ class Results(Written):
             },
             "Where the strip wears": history.STRIP_VARIABLES,
             "With a program": {**history.PROGRAM_VARIABLES, **history.AMBIENT},
+            "With a program, where the strip turns": history.ANGULAR_SPEED,
             "With heat": {**history.HEAT_VARIABLES, **heat},
             "With heat.track": history.BULK,
             "Of solids and rings instead, or as well": _of_surfaces(),

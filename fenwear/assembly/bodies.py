@@ -9,17 +9,21 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import profiled
 from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic, nodal_function
 from fenwear.bodies.mesh import BodyMesh, build_meshes
 from fenwear.bodies.regions import contact_regions
-from fenwear.bodies.shape import follow_wear
+from fenwear.bodies.shape import follow_wear, movable_surface
 from fenwear.case import Body, Case
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
+from fenwear.interface import pair
 from fenwear.parallel import release
 from fenwear.sliding.wear import Worn
+
+SWALLOWED = 0.2  # of a load: nodes at the end of its group that a support beside it holds may take less of it
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,30 @@ class Bodies:
             if body.surface.cell == "triangle" and body.surface.degree == 1
         ]
 
+    @property
+    def remarks(self) -> list[str]:
+        """What is to be said of the bodies before anything is computed with them."""
+        return [*self.last_resorts, *self.swallowed_loads]
+
+    @property
+    def swallowed_loads(self) -> list[str]:
+        """What is to be said of loads where supports hold what they push: nothing else feels them."""
+        texts = []
+        for body in (self.punch, self.strip):
+            lost = np.abs(body.swallowed) > SWALLOWED * np.abs(body.given).max(initial=0.0)
+            names = ("x", "z") if body.dim == 2 else ("x", "y", "z")
+            parts = [
+                f"{lost_force:.4g} of {force:.4g} N along {axis}"
+                for axis, force, lost_force, told in zip(names, body.given, body.swallowed, lost, strict=True)
+                if told
+            ]
+            if parts:
+                texts.append(
+                    f"{body.body.name}.loads: {' and '.join(parts)} act where supports hold that very motion: the "
+                    "contact does not feel them; load a group that is free to move that way"
+                )
+        return texts
+
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""
         punch, strip = (
@@ -105,7 +133,7 @@ def build_bodies(
         MeshQualityError: an element does not survive the motion.
     """
     release(comm)  # what earlier systems have left
-    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, _owners(case, comm))
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, _owners(case, comm), case.diffusion)
     moved = None if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (
@@ -175,16 +203,22 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
         at = nodal_function(mesh, case.geometry.degree, theta)
         law = isotropic(mesh, regions, case.materials, kind, at)
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
-    return ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
+    body = ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
+    if description.profile is not None:
+        body.surface = profiled(body.surface, np.array(description.profile.points))
+    return body
 
 
 def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Worn:
     """Let the meshes follow the wear; return how far their contact nodes have moved into the bodies."""
+    punch, strip = (movable_surface(mesh, case.geometry.degree, case.model.law) for mesh in meshes)
+    facing = pair(punch.surface, strip.surface, axisymmetric=case.model.law == "axisymmetric")
     moved = []
-    for mesh, depth, description in zip(
-        meshes, (followed.punch, followed.strip), (case.punch, case.strip), strict=True
+    for movable, depth, into, description in (
+        (punch, followed.punch, facing.normal, case.punch),
+        (strip, followed.strip, -strip.surface.outward, case.strip),
     ):
         pins = [np.array(support.at) for support in description.supports if support.at is not None]
-        groups = [point for points in mesh.points.values() for point in points]
-        moved.append(follow_wear(mesh, depth, case.geometry.degree, case.model.law, [*pins, *groups]))
+        groups = [point for points in movable.body.points.values() for point in points]
+        moved.append(follow_wear(movable, depth, into, [*pins, *groups]))
     return Worn(moved[0], moved[1])

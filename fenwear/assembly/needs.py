@@ -18,7 +18,7 @@ import numpy as np
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.elasticity import ElasticBody, Solver
 from fenwear.bodies.response import BLOCK, SURFACE_SHARE, Request
-from fenwear.heat.prepare import MANY
+from fenwear.heat.passing_strip import MANY
 from fenwear.memory import GIB, memory_size
 
 NUMBER = 8  # bytes

@@ -16,6 +16,7 @@ from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
 from fenwear.errors import CaseError, InputError
+from fenwear.heat.passage import Passage
 from fenwear.interface import (
     ContactPair,
     RigidEquilibrium,
@@ -25,7 +26,7 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import in_model, in_space
-from fenwear.optimum import Optimum, check_equilibrium, optimum, optimum_on_track
+from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
 from fenwear.sliding.friction import ContactConditions, Friction
@@ -34,6 +35,7 @@ from fenwear.sliding.track import on_closed_track
 from fenwear.sliding.wear import PhasesWear, Wear, Worn
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
+STILL = 0.1  # of the distance of contact nodes: how far a strip moves that stays in its place for the heat
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,7 @@ class Placed:
         loaded: The bodies under the loads of each phase.
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
         rigid: The same in the middle position under the mean loads.
+        passage: Where the punch is on a strip that conducts and passes under it to and fro; None where none does.
         remedies: What had to be solved in another way.
         clock: When its motion began.
     """
@@ -76,6 +79,7 @@ class Placed:
     loaded: tuple[Bodies, ...]
     rigids: tuple[RigidEquilibrium, ...]
     rigid: RigidEquilibrium
+    passage: Passage | None = None
     remedies: Remedies = field(default_factory=Remedies)
     clock: Clock = Clock()
 
@@ -313,8 +317,8 @@ class Placed:
     def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
 
-        K is the sum over both bodies of the mean of beta~ v^a (the punch's alone where their pressure
-        exponents differ), at the mean pressure. On a closed track the strip recedes by what is spread along it.
+        The wear rate is the sum over both bodies of the mean of beta~ v^a times their laws of the pressure, at the mean
+        pressure. On a closed track the strip recedes by what is spread along it.
 
         Args:
             direction: Sliding direction d.
@@ -322,29 +326,29 @@ class Placed:
 
         Raises:
             CaseError: a node of the contact lies on the axis of rotation.
+            ConvergenceError: a pressure_threshold or a pressure_cap leaves no optimum.
         """
         slides = self.sliding.field.rate(self.pair.opposite, self.pair.normal)
         if not (slides > ROUNDING * slides.max()).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
             raise CaseError(InputError("motion.centre", message))
-        wear = self.phases_wear
-        laws = [law for law in self.sliding.wear if law is not None]
-        exponent = laws[0].pressure_exponent
-        bodies = [body for body in (wear.punch, wear.strip) if body is not None and body.law.exponent == exponent]
-        on_track = self.sliding.track is not None and wear.strip is not None
-        rates = [body.rate.sum(axis=0) / self.motion.period for body in bodies]
-        ratio, phases = self.friction_ratio(direction), len(self.motion.phases)
+        wear, ratio = self.phases_wear, self.friction_ratio(direction)
+        bodies = [body for body in (wear.punch, wear.strip) if body is not None]
+        rates = tuple(body.rate.sum(axis=0) / self.motion.period for body in bodies)
+        laws = tuple(body.law for body in bodies)
+        if self.sliding.track is None or wear.strip is None:
+            return optimum(self.rigid, ratio, WearRates.together(rates, laws), zone)
 
         def recession(pressure: Array) -> Array:
-            worn = wear.worn(np.tile(pressure, (phases, 1)))
+            worn = wear.worn(np.tile(pressure, (len(self.motion.phases), 1)))
             return np.asarray(self.pair.material @ worn.strip / self.motion.period)
 
-        if on_track and wear.punch is not None:
-            return optimum_on_track(self.rigid, ratio, rates[0], exponent, recession, zone)
-        if on_track:  # the strip alone: of all pressures that wear it evenly, one that is even along it
-            rates = [recession(np.ones(len(self.pair.weights)))]
-        rate = np.sum([np.zeros(len(self.pair.weights)), *rates], axis=0)
-        return optimum(self.rigid, ratio, rate, exponent, zone)
+        if wear.punch is not None:
+            return optimum_on_track(self.rigid, ratio, WearRates(rates[:1], laws[:1]), laws[1], recession, zone)
+        # The strip alone: of all pressures that wear it evenly, one that is even along it.
+        law = laws[0]
+        some = np.full(len(self.pair.weights), min(law.threshold + 1.0, law.cap))
+        return optimum(self.rigid, ratio, WearRates((recession(some) / law.value(some),), laws), zone)
 
 
 def place(
@@ -352,8 +356,8 @@ def place(
 ) -> Placed:
     """Bring the surfaces opposite each other in every phase of the motion; collective.
 
-    Without heat the strip moves as a whole. With heat it is described in the punch's frame, where its
-    material moves: then only its worn depth changes place.
+    Without heat the strip moves as a whole. With heat its elasticity is that of the middle position: then only its
+    worn depth and, to and fro, its temperature change place.
 
     Args:
         bodies: Both bodies.
@@ -363,7 +367,7 @@ def place(
         case: What they were made from: it gives the loads of each phase, and whether meshes follow the wear.
 
     Raises:
-        CaseError: the surfaces do not face each other, or no pressure balances the loads.
+        CaseError: the surfaces do not face each other, the stroke runs off them, or no pressure balances the loads.
     """
     rings = bodies.punch.law.kind == "axisymmetric"
     middle = pair(bodies.punch.surface, bodies.strip.surface, axisymmetric=rings)
@@ -399,10 +403,25 @@ def place(
         loaded=loaded,
         rigids=tuple(rigids),
         rigid=rigid,
+        passage=None if heat is None else _passage(middle, sliding),
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         check_equilibrium(one, placed.direction_words[phase.direction], ratio)
     return placed
+
+
+def _passage(middle: ContactPair, sliding: Sliding) -> Passage | None:
+    """Return where the punch is on a strip that passes under it to and fro; None where it hardly moves.
+
+    Raises:
+        CaseError: the stroke runs off the strip's contact surface.
+    """
+    motion, here = sliding.motion, middle.strip.trace
+    if len(set(motion.directions)) == 1:
+        return None
+    farthest = sliding.field.placement(float(np.abs(motion.offsets(1)).max())).points(here)
+    moved = float(np.linalg.norm(farthest - here, axis=1).max())
+    return Passage(middle, sliding.field, motion) if moved > STILL * middle.punch.spacing() else None
 
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
@@ -18,20 +18,24 @@ from fenwear.assembly.needs import Needs, contact_memory, needs
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.ways import chosen, free_on_ranks, settle
 from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.response import Request
+from fenwear.case.program import speeds_of
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
 from fenwear.contact.full import FullContact
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium, join
 from fenwear.memory import GIB
-from fenwear.parallel import Rows, lasting
+from fenwear.parallel import Rows, all_together, lasting
 
 T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
 SHARED = 2 * GIB  # of the whole contact, from which on ranks share the rows of its compliance
 COPIES = 4  # times as much as all ranks together may take for a contact that each has whole
+CARRIED = 1e-6  # of the loads: what the contact carries by rounding
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
 
 
@@ -44,12 +48,15 @@ class Condensed:
         strip: Onto its own trace nodes where it moves as a whole, else onto the contact nodes opposite.
         strip_moves: Which of the two.
         rows: Of the contact nodes on each rank, where ranks share what both answer; None where every rank has all.
+        passed: What each kelvin of this rank's nodes moves the strip's surface along its normal at the trace nodes of
+            its passage (q, owned), mm/K, where it conducts and passes under the punch.
     """
 
     punch: CondensedBody
     strip: CondensedBody
     strip_moves: bool
     rows: Rows | None = None
+    passed: Array | None = None
 
     def join(self, rigid: RigidEquilibrium) -> Interface:
         """Return both joined at the place of a pair; collective where ranks share the rows."""
@@ -130,6 +137,7 @@ class Tribosystem(Placed):
         for phase in range(len(self.motion.phases)):
             contact = self.phase_contact((phase,)).solve(self.gap(phase, self.unworn()))
             if contact.pressure.max() > 0:
+                self._check_carried(float(self.pairs[phase].weights @ contact.pressure[0]))
                 return
             gaps.append(float(contact.gap.min()))
         raise CaseError(
@@ -137,6 +145,24 @@ class Tribosystem(Placed):
                 "geometry",
                 f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
                 "expected a punch that its supports let come down, or that starts in contact",
+            )
+        )
+
+    def _check_carried(self, force: float) -> None:
+        """Raise where supports carry all of the loads.
+
+        Args:
+            force: Of the contact, N/mm in the plane, N else.
+        """
+        bodies = (self.bodies.punch, self.bodies.strip)
+        given = max(float(np.abs(body.given).max(initial=0.0)) for body in bodies)
+        if self.rigid.mode_names or any(body.moved for body in bodies) or force * bodies[0].thickness > CARRIED * given:
+            return
+        raise CaseError(
+            InputError(
+                "punch.supports",
+                f"they carry all of the load of {given:.4g} N: none of it reaches the contact. Expected a punch that "
+                "is free to come down, or a support that is moved `by` an approach in place of the load",
             )
         )
 
@@ -206,11 +232,26 @@ def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None =
     else:
         opposite = csr_array(middle.transfer.T)
         onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1], of_strip)
+    if placed.passage is not None:
+        onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
     punch, strip = condense_together([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()
-    return Condensed(punch, strip, moves, rows)
+    if placed.passage is None or strip.by_temperature is None:
+        return Condensed(punch, strip, moves, rows)
+    n = len(middle.weights)
+    return Condensed(punch, strip.first(n), moves, rows, strip.by_temperature[n:])
+
+
+def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> Request:
+    """Return the request with the strip's trace nodes of the passage, along its normal, after the others."""
+    nodes = passage.nodes
+    outward = strip.extension @ strip.outward
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    picked = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(strip.trace), len(nodes)))
+    patterns = csr_array(hstack([request.patterns, picked]))
+    return replace(request, patterns=patterns, directions=np.vstack([request.along[:, :, 0], outward[nodes]]))
 
 
 def shared_rows(placed: Placed) -> Rows | None:
@@ -266,6 +307,9 @@ def answers_for(condensed: Condensed, before: Placed, placed: Placed) -> bool:
     frame = _frame(placed)
     if _frame(before) != frame:
         return False
+    first, second = (np.zeros(0) if one.passage is None else one.passage.nodes for one in (before, placed))
+    if not np.array_equal(first, second):
+        return False
     have = condensed.strip.kept
     _, needed = _kept(placed, condensed.rows, moves=frame[0])
     return bool(placed.comm.allreduce(have is None or needed is None or np.isin(needed, have).all(), op=MPI.LAND))
@@ -300,6 +344,7 @@ def with_exchange(
     """
     if system.heat is None or system.bodies.heat is None:
         return system
+    all_together(system.comm)
     reduced = system.heat.operator == "reduced" if reduced is None else reduced
     exchange = prepare_exchange(
         system.heat,
@@ -311,6 +356,8 @@ def with_exchange(
         heating_friction(system),
         system.bodies.punch.thickness,
         reduced=reduced,
+        passage=system.passage,
+        others=[] if system.made_from is None else speeds_of(system.made_from),
         keep=keep,
         fresh=fresh,
     )
@@ -343,7 +390,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         system.heat,
         system.bodies.heat,
         system.pair,
-        expansions(system),
+        expansions(system, in_middle=True),
         system.sliding.field,
         velocities,
         heating_friction(system),
@@ -351,9 +398,20 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
     )
 
 
-def expansions(system: Tribosystem) -> tuple[Array, Array]:
-    """Return what each kelvin of this rank's nodes moves each surface along the normal, (n, owned) each, mm/K."""
-    punch, strip = system.condensed.punch.by_temperature, system.condensed.strip.by_temperature
+def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, Array]:
+    """Return what each kelvin of this rank's nodes moves each surface along the normal, mm/K.
+
+    Args:
+        system: With condensed bodies.
+        in_middle: Whether the strip is in its middle position, even where it passes under the punch.
+
+    Returns:
+        At the contact nodes (n, owned) each, or of a strip that passes under the punch at its passage's (q, owned).
+    """
+    condensed = system.condensed
+    punch, strip = condensed.punch.by_temperature, condensed.strip.by_temperature
+    if condensed.passed is not None and not in_middle:
+        strip = condensed.passed
     if punch is None or strip is None:
         raise CaseError(InputError("heat", "missing, but required here"))
     return punch, strip

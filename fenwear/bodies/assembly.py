@@ -18,6 +18,7 @@ from scipy.sparse import bsr_array
 from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.parallel import lasting
+from fenwear.stack import compiling
 
 
 def compiled(form: Any) -> fem.Form:
@@ -27,7 +28,15 @@ def compiled(form: Any) -> fem.Form:
     than to assemble where there were a thousand.
     """
     options = jit.get_options()
-    return fem.form(form, jit_options={"cache_dir": options["cache_dir"] / form.signature()[:2]})
+    with compiling():
+        return fem.form(form, jit_options={"cache_dir": options["cache_dir"] / form.signature()[:2]})
+
+
+def interpolate(expression: Any, function: fem.Function) -> None:
+    """Give a function the values of an expression of UFL at its space's points; collective."""
+    with compiling():
+        compiled_at = fem.Expression(expression, compat.interpolation_points(function.function_space))
+    function.interpolate(compiled_at)
 
 
 def assembled(form: Any, bcs: Sequence[fem.DirichletBC] = (), *, first_column: bool = False) -> PETSc.Mat:

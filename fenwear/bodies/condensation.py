@@ -59,6 +59,12 @@ class CondensedBody:
         found = {"response": self.response, "by_load": self.by_load}
         return found if self.by_temperature is None else {**found, "by_temperature": self.by_temperature}
 
+    def first(self, count: int) -> CondensedBody:
+        """Return the body condensed onto its first patterns alone, of those that it has all of."""
+        warm = None if self.by_temperature is None else self.by_temperature[:count]
+        answers = self.response[:count, :, :count]
+        return CondensedBody(self.patterns[:, :count], self.directions[:count], answers, self.by_load[:count], warm)
+
     def normal_response(self, normal: Array, reading: csr_array | None = None, own: slice = EVERY) -> Array:
         """Return the displacement along e_n at contact nodes from unit forces along the axes at each (rows, n, d).
 

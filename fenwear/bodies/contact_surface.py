@@ -10,7 +10,7 @@ is zero there: no pressure lives on it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,14 +20,17 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.mesh import BodyMesh
+from fenwear.errors import CaseError, InputError
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
 NO_WEIGHT = 1e-9  # of the largest: what rounding leaves
+REACH = 1e-6  # of the surface's size: how far it may reach beyond the points of its profile
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class ContactSurface:
             the plane, mm² in a solid and in an axisymmetric body.
         outward: Unit normals out of the body at the pressure nodes (n, d).
         spread: Forces at the trace nodes from a unit force at each pressure node (N, n).
+        profile: By how much the surface lies deeper in the body than its mesh at the pressure nodes (n,), mm; None
+            where they are the same.
     """
 
     body: str
@@ -56,11 +61,17 @@ class ContactSurface:
     weights: Array
     outward: Array
     spread: csr_array
+    profile: Array | None = None
 
     @cached_property
     def x(self) -> Array:
         """Coordinates of the pressure nodes (n, d), mm."""
         return self.trace[self.nodes]
+
+    @property
+    def unworn(self) -> Array:
+        """Where the unworn surface is at the pressure nodes (n, d), mm: that of the mesh, and its profile."""
+        return self.x if self.profile is None else self.x - self.profile[:, None] * self.outward
 
     @cached_property
     def extension(self) -> csr_array:
@@ -90,6 +101,46 @@ class ContactSurface:
     def extent(self) -> float:
         """Return the largest extent of the surface along an axis, mm."""
         return float(np.ptp(self.trace, axis=0).max())
+
+    def spacing(self) -> float:
+        """Return how far contact nodes are apart, mm: the median."""
+        if self.dim == 3:
+            return float(np.sqrt(np.median(self.weights)))
+        return float(np.median(np.diff(np.unique(self.x[:, 0].round(12)))))
+
+
+def profiled(surface: ContactSurface, points: Array) -> ContactSurface:
+    """Return a surface with a profile: linear between points, in space on Delaunay's triangles.
+
+    Args:
+        surface: As it was meshed.
+        points: Coordinates along the surface and depths (k, d), mm: x (r) and depth; of solids two coordinates, those
+            across the mean normal, and depth.
+
+    Raises:
+        CaseError: the points do not reach over the whole surface, or two of them are at one place.
+    """
+    key, axis = f"{surface.body}.profile.points", int(np.abs(surface.weights @ surface.outward).argmax())
+    places, depth, x = points[:, :-1], points[:, -1], np.delete(surface.x, axis, axis=1)
+    if places.shape[1] != x.shape[1]:
+        expected = "[x, depth]" if x.shape[1] == 1 else "[x, y, depth]"
+        raise CaseError(InputError(key, f"expected rows {expected} for this model, got {points.shape[1]} numbers"))
+    slack = REACH * float(np.ptp(x, axis=0).max())
+    low, high = places.min(axis=0), places.max(axis=0)
+    if len(np.unique(places, axis=0)) < len(places):
+        raise CaseError(InputError(key, "two points are at the same place; expected each place once"))
+    if (x.min(axis=0) < low - slack).any() or (x.max(axis=0) > high + slack).any():
+        spans = [f"{a:g} to {b:g} mm" for a, b in ((low[0], high[0]), (x[:, 0].min(), x[:, 0].max()))]
+        raise CaseError(
+            InputError(key, f"spans x = {spans[0]}, but the contact surface {spans[1]}: expected all of it")
+        )
+    if x.shape[1] == 1:
+        order = places[:, 0].argsort()
+        return replace(surface, profile=np.interp(x[:, 0], places[order, 0], depth[order]))
+    values = LinearNDInterpolator(places, depth)(x)
+    outside = np.isnan(values)  # by rounding, or in a corner that the points' hull leaves out
+    values[outside] = NearestNDInterpolator(places, depth)(x[outside]) if outside.any() else 0.0
+    return replace(surface, profile=values)
 
 
 class Trace:

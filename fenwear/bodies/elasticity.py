@@ -50,6 +50,9 @@ class ElasticBody:
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
+        imposed: The displacements that supports prescribe, mm; zero elsewhere.
+        given: Resultant of the loads (d,), N.
+        swallowed: What of it acts where supports hold that very component (d,), N: it reaches nothing else.
         setup: How it is condensed.
         solver: What solves for its columns; set before the first solution, by the memory that there is.
         holders: How many ranks have its factor at once and share its columns; set likewise.
@@ -88,28 +91,44 @@ class ElasticBody:
         element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(dim,))
         self.space = fem.functionspace(mesh, element)
         self.surface, self.trace = contact_surface(body, self.space, measure(mesh, law.kind))
-        self._held = held = Supports(body, self.space, description, law.kind, self.trace.local)
+        self._held = held = Supports(body, self.space, description, law.kind, self.trace)
         self.pivot, self.rigid_modes, self.mode_names = held.pivot, held.modes, held.names
-        self._bcs, self.supported = held.conditions, held.held
+        self._bcs, self.supported, self.imposed = held.conditions, held.held, held.imposed
 
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
         dx = ufl.dx(metadata=_quadrature(mesh, degree))
         a = ufl.inner(law.stress(u), strain_of(v, law.kind)) * measure(mesh, law.kind) * dx
-        self._set_loads(description.loads)
         try:
             self._ufl, self._form = a, compiled(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
+        self._set_loads(description.loads)
         # None or one of each, of all bodies that differ by their loads.
         self._factors: list[Factor] = []
         self._substructures: list[Substructures] = []
 
     def _set_loads(self, loads: Sequence[Load]) -> None:
-        load = self._assemble_load(loads)
+        comm, load = self.body.mesh.comm, self._assemble_load(loads)
         resultant = np.array([mode @ load for mode in self.rigid_modes])
-        self.rigid_resultant = total(self.body.mesh.comm, resultant)
+        self.rigid_resultant = total(comm, resultant)
+        onto = [load.reshape(-1, self.dim).sum(axis=0), np.zeros(self.dim)]
+        np.add.at(onto[1], self.supported % self.dim, load[self.supported])
+        self.given, self.swallowed = (self.thickness * total(comm, part) for part in onto)
+        load += self._moved_supports
         load[self.supported] = 0.0
         self.load = load
+
+    @cached_property
+    def _moved_supports(self) -> Array:
+        """-K u of the displacements u that supports prescribe, at the owned degrees of freedom, N/mm; collective."""
+        if not self.moved:
+            return np.zeros(self.dim * self.space.dofmap.index_map.size_local)
+        return -assembled_vector(ufl.action(self._ufl, self.imposed))
+
+    @cached_property
+    def moved(self) -> bool:
+        """Whether supports prescribe a displacement; collective at first use."""
+        return bool(total(self.body.mesh.comm, np.array([np.abs(self.imposed.x.array).max(initial=0.0)]))[0] > 0)
 
     def with_loads(self, loads: Sequence[Load]) -> ElasticBody:
         """Return the same body under other loads, with the same stiffness and factor; collective."""

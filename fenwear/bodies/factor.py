@@ -23,7 +23,9 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import dense, destroy
 from fenwear.bodies.schur import eliminate_last, schur_complement
+from fenwear.compat import least_fill
 from fenwear.errors import ConvergenceError
+from fenwear.parallel import all_together
 
 SPREAD = 4 * 2**30  # bytes of a factor: larger ones are spread over the ranks
 
@@ -242,6 +244,7 @@ def make_together(factors: Sequence[Factor]) -> None:
     """
     if not factors:
         return
+    all_together(factors[0].comm)
     error: ConvergenceError | None = None
     for factor in factors:
         try:
@@ -265,6 +268,7 @@ def raised_together(comm: MPI.Comm, error: ConvergenceError | None) -> None:
     Raises:
         ConvergenceError: there is one.
     """
+    all_together(comm)
     found = [one for one in comm.allgather(error) if one is not None]
     if found:
         raise found[0]
@@ -295,6 +299,8 @@ def solved(factor: PETSc.Mat, right: Array, sizes: tuple[int, int] | None = None
 
 def solve_together(factors: Sequence[Factor], rights: Sequence[Array]) -> list[Array]:
     """Return the solutions of each factor for its right-hand sides (owned,) or (owned, k), at once; collective."""
+    for factor in factors:
+        all_together(factor.comm)
     columns = [right.reshape(len(right), math.prod(right.shape[1:])) for right in rights]
     whole = [factor.gather(one) for factor, one in zip(factors, columns, strict=True)]
     found = [factor.solve_here(one) for factor, one in zip(factors, whole, strict=True)]
@@ -349,7 +355,7 @@ def _factored(
     ksp.pc.setType(kind)
     if repeated:  # PETSc's own factor answers four times as fast as MUMPS
         ksp.pc.setFactorSolverType("petsc")
-        ksp.pc.setFactorOrdering("amd")
+        ksp.pc.setFactorOrdering(least_fill())
     else:
         ksp.pc.setFactorSolverType("mumps")
     ksp.setFromOptions()

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -22,17 +23,20 @@ from numpy.typing import NDArray
 
 from fenwear import compat
 from fenwear.arrays import Array, Mask
+from fenwear.bodies.constants import constants
 from fenwear.bodies.mesh_check import element_problems
 from fenwear.case import Geometry, Kind
 from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.memory import free_memory, memory_size
 from fenwear.parallel import on_root
+from fenwear.stack import importing
 
 BODIES = ("punch", "strip")
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 TRIANGLE = 2  # gmsh's number of the cell
 MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, forces of three directions
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
+NOTHING: Mapping[str, float] = MappingProxyType({})
 SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
 
 
@@ -137,6 +141,7 @@ def build_meshes(
     comm: MPI.Comm,
     kind: Kind = "stress",
     owners: tuple[int, int] | None = None,
+    known: Mapping[str, float] = NOTHING,
 ) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
 
@@ -146,15 +151,22 @@ def build_meshes(
         comm: The ranks.
         kind: Of the model: solids are meshed in volumes.
         owners: The ranks that have the whole punch and the whole strip; by default all have parts of both.
+        known: Values of parameters that a geometry may have and does not set itself.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
+        StackError: there is no gmsh.
     """
-    on_root(comm, lambda: find_geometry(geometry, folder))
+
+    def check() -> None:
+        find_geometry(geometry, folder)
+        _library()
+
+    on_root(comm, check)
     owned = owners or (None, None)
     if comm.rank == 0:
         with _gmsh() as gmsh:
-            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind))
+            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind, known))
             punch, strip = (_distribute(gmsh, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     else:
         on_root(comm, lambda: None)
@@ -166,7 +178,13 @@ def _dim(kind: Kind) -> int:
     return 3 if kind == "solid" else 2
 
 
-def write_msh(geometry: Geometry, folder: Path | None, path: Path, kind: Kind = "stress") -> None:
+def write_msh(
+    geometry: Geometry,
+    folder: Path | None,
+    path: Path,
+    kind: Kind = "stress",
+    known: Mapping[str, float] = NOTHING,
+) -> None:
     """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
 
     Raises:
@@ -174,7 +192,7 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path, kind: Kind = 
         OutputError: there is no room for it.
     """
     with _gmsh() as gmsh:
-        _load(gmsh, geometry, find_geometry(geometry, folder), kind)
+        _load(gmsh, geometry, find_geometry(geometry, folder), kind, known)
         try:
             path.touch()
         except OSError as error:
@@ -185,11 +203,21 @@ def write_msh(geometry: Geometry, folder: Path | None, path: Path, kind: Kind = 
             raise OutputError(path, "gmsh wrote only a part of it; is there room?")
 
 
+def _library() -> Any:
+    """Return gmsh.
+
+    Raises:
+        StackError: it is missing, or a library that it needs.
+    """
+    with importing():
+        import gmsh
+    return gmsh
+
+
 @contextmanager
 def _gmsh() -> Iterator[Any]:
     """Open gmsh quietly, and close it unless someone else had opened it."""
-    import gmsh
-
+    gmsh = _library()
     was_open = gmsh.isInitialized()
     if not was_open:
         gmsh.initialize(readConfigFiles=False, interruptible=False)
@@ -204,12 +232,13 @@ def _gmsh() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind) -> None:
+def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[str, float]) -> None:
     """Read and mesh the geometry in the current gmsh model, and check the contract."""
     gmsh.parser.clear()
-    for name, value in geometry.parameters.items():
+    defined = _checked_parameters(geometry, path)
+    asked_for = {name: value for name, value in known.items() if name in defined}
+    for name, value in {**asked_for, **geometry.parameters}.items():
         gmsh.parser.setNumber(name, [value])
-    _check_parameters(geometry, path)
     gmsh.option.setNumber(SCALING, 1.0)  # not of a geometry that was read before
     too_large = ""
     try:
@@ -266,25 +295,17 @@ def _merge(gmsh: Any, path: Path) -> None:
         raise RuntimeError(errors[0])
 
 
-def _check_parameters(geometry: Geometry, path: Path) -> None:
-    """Refuse parameters that the .geo file does not define by DefineConstant."""
-    import re
-
+def _checked_parameters(geometry: Geometry, path: Path) -> list[str]:
+    """Return the parameters that the .geo file defines by DefineConstant, and refuse others."""
     if path.suffix != ".geo":
-        return
-    text = re.sub(r"//.*", "", path.read_text("utf-8"))
-    if re.search(r"^\s*(Macro|Function)\b", text, re.MULTILINE):
-        message = (
-            f"{path.name} defines a Macro, which gmsh reads safely only once in a process: write it out, or give a .msh"
-        )
-        raise CaseError(InputError("geometry.file", message))
-    blocks = re.findall(r"DefineConstant\s*\[(.*?)\]\s*;", text, re.DOTALL)
-    known = sorted({name for block in blocks for name in re.findall(r"(\w+)\s*=", block)})
+        return []
+    known = sorted(constants(path))
     unknown = [name for name in geometry.parameters if name not in known]
     if unknown:
         raise CaseError(
             [InputError(f"geometry.parameters.{name}", _no_parameter(path, name, known)) for name in unknown]
         )
+    return known
 
 
 def _no_parameter(path: Path, name: str, known: list[str]) -> str:

@@ -1,18 +1,21 @@
 """The worn shape: meshes that follow the wear, and how far it is still from their elements' size.
 
 Small wear is an offset of the gap. Where it comes near the height of the elements at the contact, their
-nodes move instead: the depth worn at the contact is extended harmonically into the body,
+nodes move instead: each node of the contact by its depth along e, the normal of the contact there, in which the gap
+counts the depth. The motion u is extended harmonically into the body, component by component,
 
-    integral of grad s . grad v dx = 0,   s = depth at the contact,   s = 0 at all other boundaries
-    that a motion along the contact's normal would bend, and at points that the case names,
+    integral of grad u . grad v dx = 0,   u = depth e at the contact,   u = 0 at points that the case names;
 
-and every node moves by s into the body. The motion always starts from the mesh as it was made, so
-that it depends on the depth alone and not on the steps in which it was reached.
+along the mean normal of the contact u = 0 at all other boundaries that such a motion would bend, across it at all
+others. The motion always starts from the mesh as it was made, so that it depends on the depth alone and not on the
+steps in which it was reached. Volumes and pressures are then those of the moved surface: on one of the radius R they
+differ from those of the offset by the depth over R.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import dolfinx.fem.petsc  # noqa: F401  (makes fem.petsc)
 import numpy as np
@@ -24,13 +27,13 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled_vector, compiled, destroy
-from fenwear.bodies.contact_surface import Trace, contact_surface, contact_tag, trace_of
+from fenwear.bodies.assembly import assembled_vector, compiled, destroy, interpolate
+from fenwear.bodies.contact_surface import ContactSurface, Trace, contact_surface, contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import measure
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Kind
-from fenwear.compat import facet_nodes, geometry_degree, geometry_dofmap, interpolation_points
+from fenwear.compat import facet_nodes, geometry_degree, geometry_dofmap
 from fenwear.errors import MeshQualityError
 
 LEAST = 0.2  # of an element's volume that the motion may leave anywhere in it
@@ -38,43 +41,75 @@ ACROSS = 1e-3  # cosine between a boundary's normal and the motion below which n
 PREFIX = "fenwear_shape_"
 
 
-def follow_wear(body: BodyMesh, depth: Array, degree: int, kind: Kind, held: Sequence[Array]) -> Array:
+@dataclass(frozen=True)
+class MovableSurface:
+    """The contact surface of a body as its mesh was made.
+
+    Attributes:
+        body: Its geometry can be changed.
+        space: Scalar, of the degree of the displacements.
+        trace: Of that space.
+    """
+
+    body: BodyMesh
+    space: fem.FunctionSpace
+    trace: Trace
+
+    @property
+    def surface(self) -> ContactSurface:
+        """The contact surface."""
+        return self.trace.surface
+
+
+def movable_surface(body: BodyMesh, degree: int, kind: Kind) -> MovableSurface:
+    """Gather the contact surface of a mesh that is to move; collective.
+
+    Args:
+        body: The mesh.
+        degree: Of the displacements.
+        kind: Of the model.
+    """
+    vectors = fem.functionspace(body.mesh, ("Lagrange", degree, (body.mesh.geometry.dim,)))
+    _, trace = contact_surface(body, vectors, measure(body.mesh, kind))
+    space = fem.functionspace(body.mesh, ("Lagrange", degree))
+    return MovableSurface(body, space, trace_of(trace, vectors, space))
+
+
+def follow_wear(movable: MovableSurface, depth: Array, into: Array, held: Sequence[Array]) -> Array:
     """Move a mesh, as it was made, by the depth worn off its contact surface; collective.
 
     Args:
-        body: Its geometry is changed.
-        depth: At the pressure nodes of this degree (n,), mm.
-        degree: Of the nodes.
-        kind: Of the model.
+        movable: The geometry of its mesh is changed.
+        depth: At the pressure nodes (n,), mm.
+        into: Unit vectors into the body at the pressure nodes, along which depth is counted (n, d).
         held: Points that keep their place, such as pins, mm.
 
     Returns:
-        How far the pressure nodes have moved into the body (n,), mm: the depth as far as the geometry's
+        How far the pressure nodes have moved along `into` (n,), mm: the depth as far as the geometry's
         polynomials reach, which may be of a lower degree.
 
     Raises:
         MeshQualityError: an element is left with less than a fifth of its size somewhere.
     """
-    mesh, dim = body.mesh, body.mesh.geometry.dim
-    space = fem.functionspace(mesh, ("Lagrange", degree))
-    trace = _trace(body, space, degree, kind)
+    body, space, trace = movable.body, movable.space, movable.trace
+    mesh, dim, surface = body.mesh, body.mesh.geometry.dim, movable.surface
     x = space.tabulate_dof_coordinates()
     contact = _contact_dofs(body, space)
-    shift = fem.Function(space)
-    shift.x.array[trace.local] = (trace.surface.extension @ depth)[trace.own]
-    shift.x.scatter_forward()
     normal = _mean_normal(body)
-    fixed = np.setdiff1d(_bent_dofs(body, space, normal), contact)
+    bent, others = _free_dofs(body, space, normal)
     pins = [np.flatnonzero(np.linalg.norm(x[:, :dim] - point, axis=1) < 1e-6 * np.ptp(x[:, 0])) for point in held]
-    fixed = np.union1d(fixed, np.setdiff1d(np.concatenate([*pins, []]).astype(np.int32), contact)).astype(np.int32)
-    zero = fem.Function(space)
-    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
-    a = compiled(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
-    bcs = [fem.dirichletbc(shift, contact), fem.dirichletbc(zero, fixed)]
-    solution = _solve(a, bcs, space)
+    pinned = np.concatenate([*pins, []]).astype(np.int32)
+    motion = surface.extension @ (depth[:, None] * into)
     before = _sizes(body)
-    _move(body, solution, -normal)
-    displaced = (x - space.tabulate_dof_coordinates())[:, :dim] @ normal
+    axes = np.vstack([normal, np.linalg.svd(normal[None])[2][1:]])
+    moves = np.zeros((len(x), dim))
+    for axis, edge in zip(axes, (bent, *(others,) * (dim - 1)), strict=True):
+        part = motion @ axis
+        if np.abs(part).max(initial=0.0) > 1e-12 * np.abs(motion).max(initial=0.0):
+            fixed = np.setdiff1d(np.union1d(edge, pinned), contact).astype(np.int32)
+            moves += np.outer(_extended(space, trace, part, contact, fixed), axis)
+    _move(body, space, moves)
+    displaced = (space.tabulate_dof_coordinates() - x)[:, :dim]
     ratio = mesh.comm.allreduce(float((_sizes(body) / before).min(initial=np.inf)), MPI.MIN)
     if ratio < LEAST:
         raise MeshQualityError(
@@ -83,7 +118,8 @@ def follow_wear(body: BodyMesh, depth: Array, degree: int, kind: Kind, held: Seq
             "where it wears, a chamfer beside the contact that is part of it, or less wear"
         )
     owned = space.dofmap.index_map.size_local
-    return trace.pick(displaced[:owned, None])[trace.surface.nodes, 0, 0]
+    moved = np.stack([trace.pick(part[:owned, None])[surface.nodes, 0, 0] for part in displaced.T], axis=1)
+    return np.einsum("nd,nd->n", moved, into)
 
 
 def element_height(elastic: ElasticBody) -> Array:
@@ -105,12 +141,6 @@ def element_height(elastic: ElasticBody) -> Array:
     return sums[0] / sums[1]
 
 
-def _trace(body: BodyMesh, space: fem.FunctionSpace, degree: int, kind: Kind) -> Trace:
-    vectors = fem.functionspace(body.mesh, ("Lagrange", degree, (body.mesh.geometry.dim,)))
-    _, trace = contact_surface(body, vectors, measure(body.mesh, kind))
-    return trace_of(trace, vectors, space)
-
-
 def _contact_dofs(body: BodyMesh, space: fem.FunctionSpace) -> NDArray[np.int32]:
     facets = body.facet_tags.find(contact_tag(body))
     return fem.locate_dofs_topological(space, body.mesh.topology.dim - 1, facets)
@@ -126,8 +156,11 @@ def _mean_normal(body: BodyMesh) -> Array:
     return normal / np.linalg.norm(normal)
 
 
-def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArray[np.int32]:
-    """Return the nodes on boundary facets whose shape a motion along `normal` would change; collective."""
+def _free_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the nodes of the boundary beside the contact, those where a motion along `normal` bends it and all.
+
+    Collective.
+    """
     mesh, dim = body.mesh, body.mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = exterior_facet_indices(mesh.topology)
@@ -136,7 +169,20 @@ def _bent_dofs(body: BodyMesh, space: fem.FunctionSpace, normal: Array) -> NDArr
     sides = corners[:, 1:dim] - corners[:, :1]  # one of a line, two of a triangle or quadrilateral
     across = np.cross(sides[:, 0], sides[:, 1]) if dim == 3 else sides[:, 0, ::-1] * [1.0, -1.0]
     bent = np.abs(across @ normal) > ACROSS * np.linalg.norm(across, axis=1)
-    return fem.locate_dofs_topological(space, dim - 1, facets[bent])
+    some, all_ = (fem.locate_dofs_topological(space, dim - 1, chosen) for chosen in (facets[bent], facets))
+    return some, all_
+
+
+def _extended(
+    space: fem.FunctionSpace, trace: Trace, values: Array, contact: NDArray[np.int32], fixed: NDArray[np.int32]
+) -> Array:
+    """Return the harmonic function of values at the trace nodes (N,), 0 at `fixed`, at all nodes; collective."""
+    given, zero = fem.Function(space), fem.Function(space)
+    given.x.array[trace.local] = values[trace.own]
+    given.x.scatter_forward()
+    u, v = ufl.TrialFunction(space), ufl.TestFunction(space)
+    a = compiled(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx)
+    return _solve(a, [fem.dirichletbc(given, contact), fem.dirichletbc(zero, fixed)], space).x.array
 
 
 def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) -> fem.Function:
@@ -160,16 +206,18 @@ def _solve(a: fem.Form, bcs: list[fem.DirichletBC], space: fem.FunctionSpace) ->
     return solution
 
 
-def _move(body: BodyMesh, shift: fem.Function, direction: Array) -> None:
-    """Move the nodes of the geometry by `shift` along `direction`."""
+def _move(body: BodyMesh, space: fem.FunctionSpace, moves: Array) -> None:
+    """Move the nodes of the geometry by a function of the space, given at its nodes (dofs, d)."""
     mesh = body.mesh
-    space = fem.functionspace(mesh, ("Lagrange", geometry_degree(mesh)))
-    of_geometry = fem.Function(space)
-    of_geometry.interpolate(shift)
-    x = mesh.geometry.x
-    nodes, dofs = geometry_dofmap(mesh).ravel(), space.dofmap.list.ravel()
-    moved, dim = x.copy(), mesh.geometry.dim
-    moved[nodes, :dim] = x[nodes, :dim] + of_geometry.x.array[dofs, None] * direction
+    of_geometry = fem.Function(fem.functionspace(mesh, ("Lagrange", geometry_degree(mesh))))
+    of_space = fem.Function(space)
+    x, dim = mesh.geometry.x, mesh.geometry.dim
+    nodes, dofs = geometry_dofmap(mesh).ravel(), of_geometry.function_space.dofmap.list.ravel()
+    moved = x.copy()
+    for k in range(dim):
+        of_space.x.array[:] = moves[:, k]
+        of_geometry.interpolate(of_space)
+        moved[nodes, k] = x[nodes, k] + of_geometry.x.array[dofs]
     x[:] = moved
 
 
@@ -177,5 +225,5 @@ def _sizes(body: BodyMesh) -> Array:
     """Return the determinant of the Jacobian at points of each element: its local size."""
     space = fem.functionspace(body.mesh, ("DG", 2))
     sizes = fem.Function(space)
-    sizes.interpolate(fem.Expression(ufl.JacobianDeterminant(body.mesh), interpolation_points(space)))
+    interpolate(ufl.JacobianDeterminant(body.mesh), sizes)
     return sizes.x.array.copy()

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear import compat
+from fenwear.bodies.contact_surface import ContactSurface, Trace
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
+from fenwear.bodies.parts import connected_parts, part_boxes
 from fenwear.case import Body, Kind, Support
 from fenwear.errors import CaseError, InputError
 
@@ -41,14 +43,13 @@ class Supports:
     Attributes:
         conditions: All of them, as u = 0 on the degrees of freedom of a component.
         held: The owned degrees of freedom that they hold.
+        imposed: The displacements that supports prescribe, mm; zero elsewhere.
         pivot: The point about which rotations are taken, mm.
         modes: Columns of R on the owned degrees of freedom; the displacement of each for a unit velocity.
         names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
     """
 
-    def __init__(
-        self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: NDArray[np.int64]
-    ) -> None:
+    def __init__(self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: Trace) -> None:
         """Find what is held; collective.
 
         Args:
@@ -56,26 +57,32 @@ class Supports:
             space: Vector space of the displacement, mm.
             description: The supports and the pivot.
             kind: The model.
-            contact: Owned nodes at the contact surface, from which the further supports keep away.
+            contact: The contact surface, from which the further supports keep away.
 
         Raises:
-            CaseError: an unknown group, a support off the body, a body free to slide.
+            CaseError: an unknown group, a support off the body, a body free to slide, or free and not facing z.
         """
-        self.body, self.space, self.kind, self.contact = body, space, kind, contact
+        self.body, self.space, self.kind, self.contact = body, space, kind, contact.local
         self.dim = body.mesh.geometry.dim
         self.pivot = _pivot(body, description)
+        self.imposed = fem.Function(space)
         own = [*self._described(description.supports), *self._on_axis()]
-        self.modes, self.names = self._free_modes(own)
+        self._check_parts(own)
+        self.modes, self.names = self._free_modes(own, contact.surface)
         self.conditions = own + self._regularise()
         self.held = self._owned(self.conditions)
 
     def _described(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
-        key = f"{self.body.name}.supports"
-        return [
-            self._condition(component, self._support_dofs(support, component, f"{key}.{number}"))
-            for number, support in enumerate(supports)
-            for component in (self._component(axis, f"{key}.{number}.fix") for axis in support.fix)
-        ]
+        key, found = f"{self.body.name}.supports", []
+        for number, support in enumerate(supports):
+            for axis, moved in zip(support.fix, support.by or (0.0,) * len(support.fix), strict=True):
+                component = self._component(axis, f"{key}.{number}.fix")
+                dofs = self._support_dofs(support, component, f"{key}.{number}")
+                found.append(self._condition(component, dofs))
+                if moved:
+                    self.imposed.x.array[dofs] = moved
+        self.imposed.x.scatter_forward()
+        return found
 
     def _on_axis(self) -> list[fem.DirichletBC]:
         """Return the support u_r = 0 at r = 0 of an axisymmetric body, without which u_r / r is not finite."""
@@ -135,11 +142,14 @@ class Supports:
         shifts = np.broadcast_to(np.eye(dim), (owned, dim, dim))
         return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, dim + turns.shape[2])
 
-    def _free_modes(self, supports: list[fem.DirichletBC]) -> tuple[list[NDArray[np.float64]], list[str]]:
+    def _free_modes(
+        self, supports: list[fem.DirichletBC], surface: ContactSurface
+    ) -> tuple[list[NDArray[np.float64]], list[str]]:
         """Return the rigid modes that the supports leave, and their names.
 
         Raises:
-            CaseError: the body is free to slide along the contact, or to spin about its normal.
+            CaseError: the body is free to slide along the contact, or to spin about its normal; or it is free, and its
+                contact looks another way than z.
         """
         names, forbidden = RIGID_MODES[self.kind]
         columns = [*names, *forbidden]
@@ -149,6 +159,8 @@ class Supports:
         scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
         eigenvalues, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
         free = vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)] * scale[:, None]
+        if free.shape[1]:
+            _check_facing(surface)
         # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
         echelon, pivots = _column_echelon(free)
         loose = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
@@ -157,6 +169,29 @@ class Supports:
             message = f"the {name} is free to {' and to '.join(loose)}, friction pulls it"
             raise CaseError(InputError(f"{name}.supports", message))
         return list((basis @ echelon).T.copy()), [names[columns[p]] for p in pivots]
+
+    def _check_parts(self, supports: list[fem.DirichletBC]) -> None:
+        """Make sure that a body of several parts is held in each of them; collective.
+
+        Raises:
+            CaseError: a part would go its own way, which the rigid modes of the whole body do not have.
+        """
+        mesh, comm, owned = self.body.mesh, self.body.mesh.comm, self.space.dofmap.index_map.size_local
+        part = connected_parts(mesh)
+        count = comm.allreduce(int(part.max(initial=0)), MPI.MAX) + 1
+        if count == 1:
+            return
+        node = np.zeros(owned + self.space.dofmap.index_map.num_ghosts, dtype=np.int64)
+        node[self.space.dofmap.list[: len(part)]] = part[:, None]
+        names, forbidden = RIGID_MODES[self.kind]
+        held = self._owned(supports)
+        rows, where = self.rigid_basis()[held][:, [*names, *forbidden]], node[held // self.dim]
+        rows[:, np.array([*names, *forbidden]) >= self.dim] /= self._size()
+        grams = [comm.allreduce(rows[where == k].T @ rows[where == k]) for k in range(count)]
+        loose = [k for k, gram in enumerate(grams) if np.linalg.eigvalsh(gram)[0] <= 1e-12 * max(gram.max(), 1.0)]
+        if loose:
+            boxes = part_boxes(mesh, part, count)
+            raise CaseError(InputError(f"{self.body.name}.supports", _parts_text(self.body.name, boxes, loose)))
 
     def _owned(self, supports: list[fem.DirichletBC]) -> NDArray[np.int32]:
         parts = [bc.dof_indices()[0][: bc.dof_indices()[1]] for bc in supports]
@@ -196,6 +231,25 @@ class Supports:
         return [self._condition(component, held[held % self.dim == component]) for component in range(self.dim)]
 
 
+def _check_facing(surface: ContactSurface) -> None:
+    """Make sure that pressure on a body that is not held acts along z, the only direction in which it may be free.
+
+    Raises:
+        CaseError: all of its contact surface looks nearer to x or y than to z.
+    """
+    across = np.abs(surface.outward[:, :-1]).max(axis=1) - np.abs(surface.outward[:, -1])
+    if (across > 1e-9).all():  # a wedge of 45 degrees still works
+        mean = surface.weights @ np.abs(surface.outward)
+        name, axis = surface.body, next(a for a, c in axes(surface.dim).items() if c == mean.argmax())
+        message = (
+            f"{name}_contact looks along {axis}, and the {name} is not held: pressure would have to carry its loads "
+            f"along z, the only direction in which a body may be free to move. Expected a contact whose normal is "
+            f"nearest to z somewhere (turn the geometry, and with it supports, loads and motion), or a {name} that "
+            "supports hold in all directions and press by a displacement (by)"
+        )
+        raise CaseError(InputError("geometry", message))
+
+
 def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.float64]:
     if support.at is not None:
         return np.array([support.at])
@@ -205,6 +259,17 @@ def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.fl
         message = f"no physical {entity} or point {support.on!r} on the {body.name}; the geometry has {known}"
         raise CaseError(InputError(f"{key}.on", message))
     return body.points[support.on]
+
+
+def _parts_text(name: str, boxes: NDArray[np.float64], loose: Sequence[int]) -> str:
+    """Say that parts of a body are joined by nothing and not all held."""
+    spans = [f"x = {box[0, 0]:.4g} to {box[1, 0]:.4g} mm" for box in boxes]
+    which = f"part {loose[0] + 1}" if len(loose) == 1 else f"parts {' and '.join(str(k + 1) for k in loose)}"
+    return (
+        f"the {name} is of {len(boxes)} parts that share no node ({'; '.join(spans)}), and {which} could move "
+        "alone: pressure on it would be balanced by loads on the others. Expected parts that are joined in the mesh "
+        "(in gmsh Coherence, or BooleanFragments), or each part held against every motion of its own"
+    )
 
 
 def _pivot(body: BodyMesh, description: Body) -> NDArray[np.float64]:

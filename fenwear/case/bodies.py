@@ -86,17 +86,28 @@ class Model(Part):
 
 
 class Support(Part):
-    """Displacement components held at zero, on a named group or at a point."""
+    """Displacement components held, at zero or at what is prescribed, on a named group or at a point."""
 
     on: str | None = Field(default=None, description="group of the geometry")
     at: Point | None = Field(default=None, description="or a point [x, z], in a solid [x, y, z], at a mesh node")
-    fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero")
+    fix: Annotated[tuple[Axis, ...], Field(min_length=1)] = Field(description="components held at zero, or moved by")
+    by: Annotated[tuple[Length, ...], Field(min_length=1)] | None = Field(
+        default=None,
+        description="displacement of each of these components, such as an approach in place of a load; by default zero",
+    )
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
         if (self.on is None) == (self.at is None):
             raise ValueError("give either on = (a group) or at = (a point)")
+        if self.by is not None and len(self.by) != len(self.fix):
+            raise ValueError(f"by: expected a displacement for each of fix, {len(self.fix)}, got {len(self.by)}")
         return self
+
+    @property
+    def moves(self) -> bool:
+        """Whether it prescribes a displacement."""
+        return self.by is not None and any(self.by)
 
 
 class Load(Part):
@@ -152,6 +163,17 @@ class Prescribed(Part):
     temperature: Temperature = Field(default=0.0, description="theta held there")
 
 
+class Profile(Part):
+    """What the surface that touches differs by from the mesh's: a depth at places on it, straight in between."""
+
+    points: Annotated[
+        tuple[Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)], ...], Field(min_length=2)
+    ] = Field(
+        description="[x, depth] of plane bodies and rings (x the radius), of solids [x, y, depth]; positive where the "
+        "surface lies deeper. In place of them file = a CSV file with these columns and their units"
+    )
+
+
 class Body(Part):
     """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
@@ -161,4 +183,7 @@ class Body(Part):
     temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
     pivot: Point | None = Field(
         default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
+    )
+    profile: Profile | None = Field(
+        default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"
     )

@@ -55,10 +55,10 @@ class ProgramStep(Part):
         default=None, description="or: all loads of the case times this"
     )
     speed: _ramp(Annotated[Speed, Field(ge=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="of one-way sliding"
+        default=None, description="of one-way sliding; 0: a rest"
     )
     angular_speed: _ramp(Annotated[AngularFrequency, Field(ge=0)]) = Field(  # type: ignore[valid-type]
-        default=None, description="of a rotation"
+        default=None, description="of a rotation; 0: a rest"
     )
     amplitude: _ramp(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
         default=None, description="of reciprocating sliding"
@@ -81,8 +81,9 @@ class ProgramStep(Part):
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 raise ValueError(f"{one}: give either {one} or {other}")
         for key in ("speed", "angular_speed"):
-            if getattr(self, key) is not None and not any(getattr(self, key)):
-                raise ValueError(f"{key}: expected more than zero: nothing slides in this step")
+            rests = getattr(self, key) is not None and not any(getattr(self, key))
+            if rests and self.distance is not None:
+                raise ValueError(f"distance: expected time or cycles: {key} is zero, and nothing slides in this step")
         return self
 
 
@@ -90,6 +91,9 @@ class Program(Part):
     """A test program: steps one after the other. What a step does not name stays as it was."""
 
     steps: Annotated[tuple[ProgramStep, ...], Field(min_length=1)] = Field(description="in their order")
+    radius: Annotated[Length, Field(gt=0)] | None = Field(
+        default=None, description="of the wear track, at which a distance is slid where the strip turns"
+    )
     levels: Annotated[int, Field(ge=1, le=10000, strict=True)] = Field(
         default=20,
         description="that a ramp of motion or ambient temperature is cut into; loads change continuously",

@@ -15,8 +15,10 @@ SCALARS = ("number", "integer", "string")
 def json_schema() -> dict[str, Any]:
     """Return the JSON schema of a case file; what is missing may stand in the base."""
     schema = _explained(_for_parts(Case.model_json_schema(mode="validation")))
-    schema["properties"] = {"base": _text("base"), **schema["properties"]}
-    schema["$defs"]["Program"]["properties"]["file"] = _text("program.file")
+    unset = {"type": "array", "items": {"type": "string"}, "description": READ_FIRST["unset"].meaning}
+    schema["properties"] = {"base": _text("base"), "unset": unset, **schema["properties"]}
+    for table, path in (("Program", "program.file"), ("Profile", "BODY.profile.file")):
+        schema["$defs"][table]["properties"]["file"] = _text(path)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 
 

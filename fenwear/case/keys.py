@@ -56,16 +56,21 @@ READ_FIRST = {
     key.path: key
     for key in (
         Key("base", "", "text", "", "a built-in case, or a .toml beside this file: its keys hold where none is given"),
+        Key("unset", "", "list", "", 'keys of the base that are taken away: ["heat.inflow", "wear.punch"]'),
         Key("program.file", "", "text", "", "in place of steps: a CSV file beside this file, a step in each line"),
+        Key("BODY.profile.file", "", "text", "", "in place of points: a CSV file beside this file, one in each line"),
     )
 }
 
 
 def all_keys() -> list[Key]:
     """Return every key of a case file, tables before what is in them."""
-    found = [READ_FIRST["base"], *_keys(Case, "", "")]
-    place = next(n for n, key in enumerate(found) if key.path == "program") + 1
-    return [*found[:place], READ_FIRST["program.file"], *found[place:]]
+    found = [*(key for key in READ_FIRST.values() if "." not in key.path), *_keys(Case, "", "")]
+    for path, key in READ_FIRST.items():
+        if "." in path:
+            table = next(n for n, other in enumerate(found) if other.path == path.rpartition(".")[0])
+            found.insert(table + 1, key)
+    return found
 
 
 def find_keys(path: str) -> list[Key]:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import difflib
 import itertools
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from fenwear.case.course import ProgramStep
+from fenwear.case.csv_table import CsvTable, read_csv
 from fenwear.case.motions import OneWay, Rotation, Tabulated
 from fenwear.case.schema import Case
-from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 
 LENGTHS = {"cycles": "", "distance": "mm", "time": "s"}
@@ -31,7 +28,6 @@ COLUMNS = {
     "ambient": "K",
 }
 MOTION = ("speed", "angular_speed", "amplitude", "angular_frequency", "period")
-_HEADING = re.compile(r"\s*(?P<name>[A-Za-z_]+)\s*([(\[]\s*(?P<unit>[^)\]]*?)\s*[)\]])?\s*")
 MIDDLES = (np.arange(200) + 0.5) / 200  # of a ramp, over which durations are averaged
 
 
@@ -59,6 +55,30 @@ class Stage:
     step: int
 
 
+@dataclass(frozen=True)
+class Held:
+    """What acts at the end of a step of a program, as if it went on for ever.
+
+    Attributes:
+        step: Its number, from 0.
+        steps: How many the program has.
+        case: With its motion and ambient temperature, and without a program.
+        load: The normal force, N; None where it is not given.
+        load_factor: All loads over those of the case, where `load` is None.
+    """
+
+    step: int
+    steps: int
+    case: Case
+    load: float | None
+    load_factor: float
+
+    @property
+    def key(self) -> str:
+        """That of the step."""
+        return f"program.steps.{self.step}"
+
+
 def read_program(path: Path) -> list[dict[str, Any]]:
     """Return the steps of a table in a CSV file: straight lines between its rows, jumps where one is repeated.
 
@@ -68,16 +88,13 @@ def read_program(path: Path) -> list[dict[str, Any]]:
     Raises:
         CaseError: it cannot be read, runs backwards or overlaps; names column and row.
     """
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = [(n, row) for n, row in enumerate(csv.reader(file), 1) if any(cell.strip() for cell in row)]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise _wrong(path, f"cannot be read: {getattr(error, 'strerror', None) or 'not a CSV file in UTF-8'}") from None
-    if len(rows) < 3:
-        raise _wrong(path, f"expected a row of headings and at least two rows of numbers, got {len(rows)} in all")
-    names, units = _headings(path, rows[0][1])
-    values = [_numbers(path, line, row, names, units) for line, row in rows[1:]]
-    _check_order(path, names[0], [line for line, _ in rows[1:]], [row[0] for row in values])
+    table = read_csv(path, "program.file", {**LENGTHS, **COLUMNS}, least=2)
+    names, values = table.names, table.rows
+    if names[0] not in LENGTHS or any(name in LENGTHS for name in names[1:]) or len(set(names)) < len(names):
+        raise table.wrong("expected one of cycles, distance and time as the first column, and no column twice")
+    if len(names) < 2:
+        raise table.wrong(f"expected a column of what changes: {', '.join(COLUMNS)}")
+    _check_order(table)
     steps = []
     for before, after in itertools.pairwise(values):
         length = after[0] - before[0]
@@ -90,63 +107,23 @@ def read_program(path: Path) -> list[dict[str, Any]]:
     return steps
 
 
-def _wrong(path: Path, message: str) -> CaseError:
-    return CaseError(InputError("program.file", f"{path}: {message}"))
-
-
-def _headings(path: Path, row: Sequence[str]) -> tuple[list[str], list[str]]:
-    names, units = [], []
-    for cell in row:
-        match, known = _HEADING.fullmatch(cell), [*LENGTHS, *COLUMNS]
-        name = match["name"] if match else cell.strip()
-        if name not in known:
-            close = difflib.get_close_matches(name, known, 1)
-            hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(known)}"
-            raise _wrong(path, f"the column {name!r} is not known; {hint}")
-        unit = (match["unit"] if match else None) or ""
-        wanted = {**LENGTHS, **COLUMNS}[name]
-        if wanted and not unit:
-            raise _wrong(path, f"the column {name} has no unit; expected such as '{name} ({wanted})'")
-        try:
-            convert(f"1 {unit}" if unit else 1.0, wanted)
-        except ValueError as error:
-            raise _wrong(path, f"the column {name}: {error}") from None
-        names.append(name)
-        units.append(unit)
-    if names[0] not in LENGTHS or any(name in LENGTHS for name in names[1:]) or len(set(names)) < len(names):
-        raise _wrong(path, "expected one of cycles, distance and time as the first column, and no column twice")
-    if len(names) < 2:
-        raise _wrong(path, f"expected a column of what changes: {', '.join(COLUMNS)}")
-    return names, units
-
-
-def _numbers(path: Path, line: int, row: Sequence[str], names: list[str], units: list[str]) -> list[float]:
-    if len(row) != len(names):
-        raise _wrong(path, f"row {line}: expected {len(names)} values, got {len(row)}")
-    found = []
-    for cell, name, unit in zip(row, names, units, strict=True):
-        try:
-            found.append(convert(f"{cell.strip()} {unit}".strip(), {**LENGTHS, **COLUMNS}[name]))
-        except ValueError:
-            raise _wrong(path, f"row {line}: {name}: expected a finite number, got {cell.strip()!r}") from None
-        if name == "cycles" and found[-1] != round(found[-1]):
-            raise _wrong(path, f"row {line}: cycles: expected a whole number, got {cell.strip()!r}")
-    return found
-
-
-def _check_order(path: Path, name: str, lines: Sequence[int], places: Sequence[float]) -> None:
+def _check_order(table: CsvTable) -> None:
     """Raise where a table does not begin at zero, runs backwards, or has a place more than twice."""
+    name, lines, places = table.names[0], table.lines, [row[0] for row in table.rows]
+    for line, place in zip(lines, places, strict=True):
+        if name == "cycles" and place != round(place):
+            raise table.wrong(f"row {line}: cycles: expected a whole number, got {place:g}")
     if places[0] != 0:
-        raise _wrong(path, f"row {lines[0]}: expected {name} = 0 in the first row, got {places[0]:g}")
+        raise table.wrong(f"row {lines[0]}: expected {name} = 0 in the first row, got {places[0]:g}")
     for k in range(1, len(places)):
         if places[k] < places[k - 1]:
-            raise _wrong(path, f"row {lines[k]}: {name} runs backwards, from {places[k - 1]:g} to {places[k]:g}")
+            raise table.wrong(f"row {lines[k]}: {name} runs backwards, from {places[k - 1]:g} to {places[k]:g}")
         if k > 1 and places[k] == places[k - 2]:
-            raise _wrong(
-                path, f"row {lines[k]}: {name} = {places[k]:g} stands there three times; expected two for a jump"
+            raise table.wrong(
+                f"row {lines[k]}: {name} = {places[k]:g} stands there three times; expected two for a jump"
             )
     if places[-1] == 0:
-        raise _wrong(path, f"{name} ends at 0; expected a table that goes on")
+        raise table.wrong(f"{name} ends at 0; expected a table that goes on")
 
 
 def with_program(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
@@ -165,13 +142,55 @@ def with_program(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]
     return {**data, "program": {**rest, "steps": read_program(path)}}
 
 
-@dataclass
-class _Now:
-    """What acts at the end of the steps so far."""
+@dataclass(frozen=True)
+class _Acting:
+    """What acts over a step, from its begin to its end: `given` of the motion and the ambient temperature."""
 
-    load: float | None = None
-    load_factor: float = 1.0
-    values: dict[str, float] = field(default_factory=dict)
+    loads: tuple[float, float] | None = None
+    factors: tuple[float, float] = (1.0, 1.0)
+    given: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+
+def _acting(steps: Sequence[ProgramStep]) -> Iterator[_Acting]:
+    """Yield what acts over each step: what it does not name stays as it was."""
+    now = _Acting()
+    for step in steps:
+        ramps = {key: _ends(getattr(step, key), now.given.get(key)) for key in (*MOTION, "ambient")}
+        now = _Acting(
+            _ends(step.load, now.loads if step.load_factor is None else None),
+            _ends(step.load_factor, now.factors) or (1.0, 1.0),
+            {key: ends for key, ends in ramps.items() if ends is not None},
+        )
+        yield now
+
+
+def held_at(case: Case, step: int | None = None) -> Held | None:
+    """Return what acts at the end of a step of a case's program; None without a program.
+
+    Args:
+        step: Its number from 0; by default the last.
+
+    Raises:
+        CaseError: there is no such step, or nothing slides at its end.
+    """
+    program = case.program
+    if program is None:
+        if step is not None:
+            raise CaseError(InputError("program", "missing: there are no steps to choose from"))
+        return None
+    count = len(program.steps)
+    number = count - 1 if step is None else step
+    if not 0 <= number < count:
+        raise CaseError(InputError("program.steps", f"the program has {count} steps, and none of number {number + 1}"))
+    acting = list(_acting(program.steps))[number]
+    for key in ("speed", "angular_speed"):
+        if acting.given.get(key, (1.0, 1.0))[1] == 0:
+            reason = (
+                f"nothing slides at the end of step {number + 1}, so that it has no state of its own: choose another"
+            )
+            raise CaseError(InputError(f"program.steps.{number}.{key}", reason))
+    at_end = _at(case, acting.given, 1.0).model_copy(update={"program": None})
+    return Held(number, count, at_end, acting.loads and acting.loads[1], acting.factors[1])
 
 
 def stages_of(case: Case) -> tuple[Stage, ...]:
@@ -187,13 +206,10 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
     if program is None:
         return ()
     stages: list[Stage] = []
-    now, half_cycle, time, slid = _Now(), 0, 0.0, 0.0
-    for number, step in enumerate(program.steps):
-        ramps = {key: _ends(getattr(step, key), now.values.get(key)) for key in (*MOTION, "ambient")}
-        given = {key: ends for key, ends in ramps.items() if ends is not None}
+    half_cycle, time, slid = 0, 0.0, 0.0
+    for number, (step, acting) in enumerate(zip(program.steps, _acting(program.steps), strict=True)):
+        given, loads, factors = acting.given, acting.loads, acting.factors
         strokes, cycles = _cycles(case, step, given, number)
-        loads = _ends(step.load, now.load if step.load_factor is None else None)
-        factors = _ends(step.load_factor, now.load_factor) or (1.0, 1.0)
         count = min(cycles, program.levels) if any(a != b for a, b in given.values()) else 1
         edges = [round(cycles * k / count) for k in range(count + 1)]
         for low, high in itertools.pairwise(edges):
@@ -215,16 +231,14 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
             time += (high - low) * period
             slid += (high - low) * distance
         half_cycle += strokes * cycles
-        last = {key: ends[1] for key, ends in given.items()}
-        now = _Now(None if loads is None else loads[1], factors[1], last)
     return tuple(stages)
 
 
-def _ends(ramp: tuple[float, ...] | None, before: float | None) -> tuple[float, float] | None:
-    """Return the values at the begin and the end of a step: those given, or what was before."""
+def _ends(ramp: tuple[float, ...] | None, before: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return the values at the begin and the end of a step: those given, or what the step before has ended with."""
     if ramp is not None:
         return ramp[0], ramp[-1]
-    return None if before is None else (before, before)
+    return None if before is None else (before[1], before[1])
 
 
 def _between(ends: tuple[float, float], part: tuple[float, float]) -> tuple[float, float]:
@@ -243,7 +257,7 @@ def _at(case: Case, ramps: Mapping[str, tuple[float, float]], share: float) -> C
     update: dict[str, Any] = {"motion": case.motion.model_copy(update=motion)}
     if "ambient" in values and case.heat is not None:
         update["heat"] = case.heat.model_copy(update={"ambient": values["ambient"]})
-    return case.model_copy(update=update)
+    return case.stage(update)
 
 
 def _cycles(case: Case, step: ProgramStep, ramps: Mapping[str, tuple[float, float]], number: int) -> tuple[int, int]:
@@ -254,7 +268,8 @@ def _cycles(case: Case, step: ProgramStep, ramps: Mapping[str, tuple[float, floa
     varies = any(a != b for a, b in ramps.values())
     found = [cycle_of(_at(case, ramps, share)) for share in (MIDDLES if varies else MIDDLES[:1])]
     duration, distance = (float(np.mean([one[k] for one in found])) for k in (0, 1))
-    key, whole, each, unit = "distance", step.distance, distance, "mm"
+    radius = None if case.program is None else case.program.radius
+    key, whole, each, unit = "distance", step.distance, distance * (radius or 1.0), "mm"
     if step.time is not None:
         key, whole, each, unit = "time", step.time, duration, "s"
     cycles = round((whole or 0.0) / each)
@@ -276,6 +291,15 @@ def cycle_of(case: Case) -> tuple[float, float, int]:
         ways = np.sign(moved[moved != 0])
         return motion.times[-1], float(np.abs(moved).sum()), 1 + int(np.count_nonzero(np.diff(ways)))
     return 2 * motion.half_period, 4 * motion.amplitude, 2
+
+
+def speeds_of(case: Case) -> list[float]:
+    """Return the velocities of all stages of a program one way, mm/s or rad/s, with their signs; none without one."""
+    if not isinstance(case.motion, OneWay | Rotation):
+        return []
+    way = 1 if case.motion.direction in ("rightward", "counterclockwise") else -1
+    cycles = (cycle_of(stage.case) for stage in stages_of(case))
+    return sorted({way * distance / duration for duration, distance, _ in cycles})
 
 
 def half_cycles_of(case: Case) -> int:

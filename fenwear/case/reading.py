@@ -11,14 +11,17 @@ from typing import Any
 
 import pydantic
 
+from fenwear.case.keys import find_keys
 from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
+from fenwear.case.profile import with_profiles
 from fenwear.case.program import check_length, half_cycles_of, with_program
 from fenwear.case.schema import Case, Written
 from fenwear.case.units import shown
 from fenwear.errors import CaseError, InputError
 
 PLACEHOLDER = 2  # half-cycles, until the program is read
+UNSET = "unset"  # the key that takes keys of the base away
 
 
 def builtin_cases() -> dict[str, str]:
@@ -33,7 +36,8 @@ def load_case(source: str | Path, settings: Sequence[str] = ()) -> Case:
 
     Args:
         source: Path of a TOML file, or one of `builtin_cases()`.
-        settings: Overrides `key.path=value`, the value in TOML notation (a bare word is a string).
+        settings: Overrides `key.path=value`, the value in TOML notation (a bare word is a string); `unset=key.path`
+            takes a key away. They act in their order.
 
     Raises:
         CaseError: the file cannot be read, or anything in it is wrong; lists all problems.
@@ -62,8 +66,10 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
         raise CaseError(InputError(source, f"not a TOML file: {error}")) from None
     except RecursionError:
         raise CaseError(InputError(source, "not a TOML file that can be read: it nests too deeply")) from None
-    base = data.pop("base", None)
+    base, unset = data.pop("base", None), data.pop(UNSET, None)
     if base is None:
+        if unset is not None:
+            raise CaseError(InputError(UNSET, "expected with a base, whose keys it takes away"))
         return data, folder
     if not isinstance(base, str):
         raise CaseError(InputError("base", f"expected the name of a case, got {shown(base)}"))
@@ -74,8 +80,43 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
     below, base_folder = _read_tables(base, (*base_of, base))
     if "program" in data and isinstance(below.get("run"), dict) and "half_cycles" not in data.get("run", {}):
         below["run"].pop("half_cycles", None)  # the program tells how far the run goes
+    _take_away(below, [] if unset is None else unset)
     own_geometry = "file" in data.get("geometry", {})
     return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
+
+
+def _take_away(data: dict[str, Any], unset: Any) -> None:
+    """Take keys out of nested tables.
+
+    Args:
+        data: The tables.
+        unset: Path of a key, or a list of them.
+
+    Raises:
+        CaseError: there is no such key, or it is not given in these tables.
+    """
+    paths = [unset] if isinstance(unset, str) else unset
+    if not isinstance(paths, list) or not all(isinstance(path, str) for path in paths):
+        raise CaseError(InputError(UNSET, f"expected a list of keys, such as ['heat.inflow'], got {shown(unset)}"))
+    for path in paths:
+        *tables, last = (name.strip() for name in path.split("."))
+        place: Any = data
+        for name in tables:
+            place = _inside(place, name)
+        if isinstance(place, dict) and last in place:
+            del place[last]
+        elif isinstance(place, list) and _inside(place, last) is not None:
+            del place[int(last)]
+        else:
+            find_keys(path)  # names the nearest where there is none
+            raise CaseError(InputError(UNSET, f"{path!r} is not given in the case that it is to be taken from"))
+
+
+def _inside(place: Any, name: str) -> Any:
+    """Return what a table has of this name, or a list at this number; None without."""
+    if isinstance(place, list):
+        return place[int(name)] if name.isdigit() and int(name) < len(place) else None
+    return place.get(name) if isinstance(place, dict) else None
 
 
 def _laid_over(below: Any, above: Any) -> Any:
@@ -94,7 +135,7 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
-    data = with_program(data, folder)
+    data = with_profiles(with_program(data, folder), folder)
     open_end = isinstance(data.get("program"), Mapping) and "half_cycles" not in data.get("run", {})
     if open_end and isinstance(data.get("run", {}), Mapping):  # a program tells itself how far a run goes
         data["run"] = {**data.get("run", {}), "half_cycles": PLACEHOLDER}
@@ -124,12 +165,12 @@ def _apply(data: dict[str, Any], setting: str) -> None:
     """Set one `key.path=value` in the nested tables of `data`."""
     key, equals, text = setting.partition("=")
     names = [name.strip() for name in key.split(".")]
+    if names == [UNSET]:
+        _take_away(data, _value(text))
+        return
     if not equals or not all(names):
         raise CaseError(InputError("--set", f"expected key.path=value, got {setting!r}"))
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()
+    value = _value(text)
     place: Any = data
     for name in names[:-1]:
         place = _step(place, name, setting)
@@ -138,6 +179,14 @@ def _apply(data: dict[str, Any], setting: str) -> None:
         place[int(names[-1])] = value
     else:
         place[names[-1]] = value
+
+
+def _value(text: str) -> Any:
+    """Return a value in TOML notation; a bare word is a string."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text.strip()
 
 
 def _step(place: Any, name: str, setting: str) -> Any:
@@ -149,7 +198,7 @@ def _step(place: Any, name: str, setting: str) -> Any:
 
 
 def changed_case(case: Case, *settings: str) -> Case:
-    """Return the case with overrides `key.path=value`, as of `load_case`.
+    """Return the case with overrides `key.path=value` and `unset=key.path`, as of `load_case`.
 
     Raises:
         CaseError: an override does not fit.

@@ -16,6 +16,7 @@ from pydantic import Field, model_validator
 
 from fenwear.case.bodies import Body, Geometry, Model
 from fenwear.case.course import Output, Program, Run
+from fenwear.case.diffusion import diffusion_of
 from fenwear.case.laws import Contact, Dependence, Stick, Wear
 from fenwear.case.materials import Material
 from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
@@ -66,6 +67,7 @@ class Case(Part):
 
     _folder: Path | None = None  # where the case file lies: its geometry's paths start there
     _written: Written = Written()
+    _diffusion: dict[str, float] | None = None  # of a stage: that of its program
 
     @model_validator(mode="after")
     def _materials_known(self) -> Self:
@@ -94,8 +96,11 @@ class Case(Part):
             for body, part in (("punch", self.punch), ("strip", self.strip))
             if not part.regions
         ]
-        if not any(load.force or load.traction for load in self.punch.loads):
-            problems.append("punch.loads: expected at least one load that presses the punch on the strip")
+        held = [*self.punch.supports, *self.strip.supports]
+        if not any(load.force or load.traction for load in self.punch.loads) and not any(one.moves for one in held):
+            problems.append(
+                "punch.loads: expected at least one load that presses the punch on the strip, or a support moved `by`"
+            )
         if problems:
             raise ValueError("\n".join(problems))
         return self
@@ -152,9 +157,25 @@ class Case(Part):
         return any(self.materials[name].dependent for name in used)
 
     @property
+    def turns(self) -> bool:
+        """Whether the strip turns, so that speeds are rad/s."""
+        return isinstance(self.motion, Oscillation | Rotation)
+
+    @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
         return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
+
+    @property
+    def diffusion(self) -> dict[str, float]:
+        """What ready geometries grade the strip by, see `diffusion_of`: the same for all stages of a program."""
+        return diffusion_of(self) if self._diffusion is None else self._diffusion
+
+    def stage(self, changes: Mapping[str, Any]) -> Case:
+        """Return the case with the motion and heat of a stage of its program, whose stages have the same meshes."""
+        at = self.model_copy(update=changes)
+        at._diffusion = self.diffusion
+        return at
 
     def _sliding_problems(self) -> list[str]:
         problems = []
@@ -213,17 +234,22 @@ class Case(Part):
         if self.program is None:
             return []
         motion, problems = self.motion, []
-        turns = isinstance(motion, Oscillation | Rotation)
         for number, step in enumerate(self.program.steps):
             at = f"program.steps.{number}"
             for key in ("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
-                known = key in type(motion).model_fields and not (key == "amplitude" and turns)
+                known = key in type(motion).model_fields and not (key == "amplitude" and self.turns)
                 if getattr(step, key) is not None and not known:
                     problems.append(f"{at}.{key}: does not change with motion.kind = '{motion.kind}'")
-            if step.distance is not None and turns:
-                problems.append(f"{at}.distance: expected cycles or time where the strip turns")
             if step.ambient is not None and self.heat is None:
                 problems.append(f"{at}.ambient: expected a case with the table heat")
+        told = self.program.radius is not None
+        if told and not self.turns:
+            problems.append(f"program.radius: does not go with motion.kind = '{motion.kind}', which does not turn")
+        if not told and self.turns and any(step.distance is not None for step in self.program.steps):
+            problems.append(
+                "program.radius: missing, but required where the strip turns and a step has a distance: the radius at "
+                "which it is slid, such as that of the middle of the wear track"
+            )
         if self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' with a program")
         if self.run.periodic_within is not None:
@@ -295,9 +321,13 @@ class Case(Part):
         ]
         if self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' with heat")
+        if not isinstance(self.motion, OneWay | Rotation):
+            problems += [
+                f"heat.{key}: expected one-way sliding: to and fro the same material stays, and none enters"
+                for key in ("track", "inflow")
+                if getattr(heat, key) is not None
+            ]
         if heat.track is not None:
-            if not isinstance(self.motion, OneWay | Rotation):
-                problems.append("heat.track: expected one-way sliding: to and fro the same material stays")
             if heat.inflow is not None:
                 problems.append("heat.inflow: expected none with heat.track, whose bulk comes in")
             if heat.operator != "reduced":

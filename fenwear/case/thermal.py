@@ -68,12 +68,17 @@ class Heat(Part):
     ambient: Temperature = Field(default=0.0, description="theta_a of the surroundings, from any zero")
     inflow: Temperature | None = Field(
         default=None,
-        description="of the strip's material that enters through free ends; by default, sliding one way, the "
-        "ambient, and to and fro what has left comes back as it was",
+        description="of the strip's material that enters through free ends, sliding one way; by default the ambient",
     )
     track: Track | None = Field(default=None, description="closed track of one-way sliding, which warms up as a whole")
     initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
-    steps: Annotated[int, Field(ge=1, le=1000, strict=True)] = Field(default=5, description="in each half-cycle")
+    steps: Annotated[int, Field(ge=1, le=1000, strict=True)] | None = Field(
+        default=None, description="in each half-cycle; by default 5, or to and fro as many as step_tolerance asks for"
+    )
+    step_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=0.005,
+        description="change of contact temperatures by halving the steps, relative, to which they are chosen",
+    )
     coupling: Literal["implicit", "split"] = Field(
         default="implicit", description="heat and contact together, or in turn by the operator split"
     )
@@ -102,6 +107,11 @@ class Heat(Part):
     # Finer than 1e-8 the basis, found by squares, would be made of rounding.
     reduction_tolerance: Annotated[Number, Field(ge=1e-7, lt=1)] = Field(
         default=3e-5, description="of the reduced operator's basis, relative"
+    )
+    reduction_difference: Annotated[Number, Field(gt=0, lt=1)] = Field(
+        default=2e-3,
+        description="of contact temperatures and thermal gap from those of the whole mesh, relative: over it the "
+        "basis is enlarged, and then a run warns",
     )
 
     @model_validator(mode="before")

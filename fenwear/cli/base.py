@@ -20,6 +20,9 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+# Base of the errors that print themselves: of click, which newer versions of typer have within themselves.
+UsageError: type[Any] = next(kind for kind in reversed(typer.BadParameter.__mro__) if hasattr(kind, "show"))
+
 DEFAULT_CASE = "example1-heat"
 
 CaseArgument = Annotated[
@@ -35,7 +38,7 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help='Override a key: --set motion.amplitude="2 mm"',
+        help='Override a key: --set motion.amplitude="2 mm"; take one away: --set unset=heat.inflow',
         autocompletion=suggestions.settings,
     ),
 ]

@@ -81,11 +81,11 @@ def run(
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import elastic, needs_of, place_case, shares_text
-    from fenwear.cycle import stability_number
+    from fenwear.assembly import elastic, needs_of, place_case, shares_text, with_reduced_heat
+    from fenwear.cycle import heat_gain, heat_warnings, stability_number
     from fenwear.law import choose_law, with_law
     from fenwear.run import position_warnings
-    from fenwear.watch import initial_warnings
+    from fenwear.watch import fineness_text, fineness_warnings, initial_warnings
 
     loaded = load(case, settings)
     if loaded.sticks:
@@ -106,10 +106,14 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         system = replace(system, made_from=loaded)
     number = stability_number(system)
     system.check_touching()
-    warnings = [*position_warnings(system), *system.bodies.last_resorts, *doubts(loaded), *initial_warnings(system)]
+    warnings = [*position_warnings(system), *system.bodies.remarks, *doubts(loaded), *initial_warnings(system)]
+    warm = with_reduced_heat(system, keep=True)
+    warnings += [*heat_warnings(heat_gain(warm)), *fineness_warnings(warm)]
     for warning in warnings:
         log(f"warning: {warning}")
     show(loaded.to_toml())
+    if warm.exchange is not None:
+        log(fineness_text(warm))
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
@@ -169,5 +173,6 @@ def mesh_command(
     loaded = load(case, settings)
     if output.suffix != ".msh":
         raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
-    on_root(MPI.COMM_WORLD, lambda: write_msh(loaded.geometry, loaded.folder, output, loaded.model.law))
+    meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion)
+    on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
     log(f"mesh in {output}")

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 import sys
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from fenwear.case import doubts
+import typer
+
+from fenwear.case import Case, doubts
+from fenwear.case.program import held_at
 from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
+from fenwear.errors import CaseError, InputError
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
@@ -16,33 +20,58 @@ if TYPE_CHECKING:
     from fenwear.law import Decided
 
 
+StepOption = Annotated[
+    int | None,
+    typer.Option(
+        "--step",
+        min=1,
+        help="Of a test program: the step whose end acts for ever, counted from 1; by default the last.",
+    ),
+]
+
+
 @app.command("steady")
 def steady_command(
     case: CaseArgument,
     settings: SetOption = [],  # noqa: B006
+    step: StepOption = None,
     fresh: FreshOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Solve for the cyclic steady state directly."""
-    from fenwear.cycle import cycles_to_reach, growth_rate, steady
+    from fenwear.assembly import with_case, with_reduced_heat
+    from fenwear.cycle import cycles_to_reach, growth_rate, heat_gain, heat_warnings, held, steady
     from fenwear.law import decided
     from fenwear.results.degrees import degrees_of
-    from fenwear.watch import steady_warnings
+    from fenwear.watch import fineness_warnings, steady_warnings
 
     begin = time.perf_counter()
-    lawful = decided(load(case, settings), log, heat="reduced", fresh=fresh)
+    given = load(case, settings)
+    held_at(given, _number(step))  # before anything is set up
+    lawful = decided(given, log, heat="reduced" if given.program is None else "none", fresh=fresh)
     loaded, system = lawful.case, lawful.system
+    of_step = None if system is None else held(system, _number(step))
+    if system is not None and of_step is not None:
+        loaded = of_step[0]
+        system = with_reduced_heat(with_case(system, loaded), keep=True, fresh=fresh)
     if system is None:
         _print_final(case, lawful, as_json=as_json, fresh=fresh)
         return
     setup = time.perf_counter() - begin
     state = steady(system)
     found = state.system
-    warnings = [*system.bodies.last_resorts, *doubts(loaded), *steady_warnings(found, state)]
+    gain = heat_gain(with_reduced_heat(found), state.phase_pressure)
+    warnings = [
+        *system.bodies.remarks,
+        *doubts(loaded),
+        *steady_warnings(found, state),
+        *heat_warnings(gain),
+        *fineness_warnings(system),
+    ]
     for warning in warnings:
         log(f"warning: {warning}")
     if not as_json:
-        _print_steady(case, found, state)
+        _print_steady(case, found, state, of_step[1] if of_step else "")
     way = time.perf_counter()
     rate = growth_rate(found, state.phase_pressure, state.conductances)
     cycles = cycles_to_reach(found, state, 0.01) if rate < 0 else None
@@ -54,7 +83,8 @@ def steady_command(
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
     print_json(
         {
-            **_coordinates(found),
+            **coordinates(found),
+            **_held_json(of_step),
             "pressure_plus": pressures.get(1),
             "pressure_minus": pressures.get(-1),
             "shape": state.shape.tolist(),
@@ -62,7 +92,9 @@ def steady_command(
             "temperature_strip": None if state.heat is None else degrees.of(state.heat.strip[-1]).tolist(),
             "temperature_unit": None if state.heat is None else degrees.unit,
             "property_passes": state.passes,
-            "growth_rate": rate,
+            "growth_rate_per_s": rate,
+            "complementarity_error": state.complementarity_error,
+            "heat_gain": gain,
             "contact_width" if system.case.model.kind == "plane" else "contact_area": state.contact_width.tolist(),
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
@@ -85,7 +117,16 @@ def _print_final(name: str, lawful: Decided, *, as_json: bool, fresh: bool) -> N
         show(f"end of the wear of {name} in partial slip\n{final_text(numbers)}")
 
 
-def _coordinates(system: Tribosystem) -> dict[str, Any]:
+def _number(step: int | None) -> int | None:
+    """Return the number of a step, counted from 0, of the one that users count from 1."""
+    return None if step is None else step - 1
+
+
+def _held_json(of_step: tuple[Case, str] | None) -> dict[str, str]:
+    return {} if of_step is None else {"of": of_step[1]}
+
+
+def coordinates(system: Tribosystem) -> dict[str, Any]:
     """Return the coordinates of the contact nodes, mm: x in the plane, r and z of rings, x, y and z of a solid."""
     if system.case.model.kind == "plane":
         return {"x": system.pair.x.tolist()}
@@ -94,7 +135,7 @@ def _coordinates(system: Tribosystem) -> dict[str, Any]:
     return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
-def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
+def _print_steady(case: str, system: Tribosystem, state: Steady, step: str) -> None:
     """Print the state as soon as it is there: the way to it may take longer.
 
     The load over the whole surface is a pressure only where the surfaces lie on each other before they wear.
@@ -104,6 +145,8 @@ def _print_steady(case: str, system: Tribosystem, state: Steady) -> None:
     from fenwear.results.scar import conforming
 
     show(f"cyclic steady state of {case} ({state.iterations} Newton iterations)")
+    if step:
+        show(f"  of {step}")
     part = "width {:7.3f} mm" if system.case.model.kind == "plane" else "area {:.3f} mm²"
     words, moves = system.direction_words, "turns" if any(system.sliding.field.turn) else "moves"
     for d, p, width in zip(state.directions, state.pressure, state.contact_width, strict=True):
@@ -148,11 +191,27 @@ def _velocities(velocity: dict[str, float], per: str) -> str:
 
 
 @app.command("optimum")
-def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonOption = False) -> None:  # noqa: B006
+def optimum_command(
+    case: CaseArgument,
+    settings: SetOption = [],  # noqa: B006
+    step: StepOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """Print lambda_F, lambda_M, the optimal pressure and the angle chi of the wear velocity in both directions."""
     from fenwear.assembly import place_case
+    from fenwear.cycle import held
 
-    system = place_case(load(case, settings))
+    given = load(case, settings)
+    held_at(given, _number(step))  # before any mesh is made
+    system = place_case(given)
+    of_step = held(system, _number(step))
+    if of_step is not None:
+        system = place_case(of_step[0])
+    if not system.rigid.mode_names:
+        reason = (
+            "they hold the punch along the contact's normal: no rigid motion follows the wear, and no pressure stays"
+        )
+        raise CaseError(InputError("punch.supports", reason))
     found = {name: system.optimum(d) for d, name in reversed(system.direction_words.items())}
     if as_json:
         x = system.pair.x.tolist()
@@ -161,8 +220,11 @@ def optimum_command(case: CaseArgument, settings: SetOption = [], as_json: JsonO
                 n: {**o.velocity, "x": x, "pressure": o.pressure.tolist(), "chi": o.tilt.tolist()}
                 for n, o in found.items()
             }
+            | _held_json(of_step)
         )
         return
+    if of_step is not None:
+        show(f"of {of_step[1]}")
     for name, state in found.items():
         show(f"{name:9}  {_velocities(state.velocity, 's')}")
         for end in (0, -1):

@@ -124,7 +124,11 @@ def life_command(
     calibration: Annotated[
         Path | None, typer.Option("--from", metavar="DIR", help="Folder of a calibration whose result scatters.")
     ] = None,
-    samples: Annotated[int, typer.Option(help="Size of the sample.")] = 200,
+    samples: Annotated[int, typer.Option(help="Size of the sample: so many runs.")] = 200,
+    indices: Annotated[
+        bool,
+        typer.Option("--sobol", help="Also which of d keys the scatter comes from: d + 2 times as many runs."),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of the sample.")] = 0,
     wanted: Annotated[str | None, typer.Option(help='A life whose reliability is asked for: "1e6 cycles".')] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder of the results.")] = None,
@@ -137,8 +141,9 @@ def life_command(
 
     loaded = load(case, settings)
     found, folder = commands.run_life(
-        loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, output, log, resume=resume
-    )
+        loaded, Path(case).stem, until, scatters, calibration, samples, seed, wanted, output, log,
+        indices=indices, resume=resume,
+    )  # fmt: skip
     if as_json:
         print_json(found.as_json())
     else:

@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.by_runs import SpreadPhases
 from fenwear.contact.inequality import Inequality
@@ -293,9 +293,16 @@ class CondensedContact:
         """Number of unknowns."""
         return int(self._offset.size)
 
-    def on_closed_contact(self, use: Callable[[Solve], T]) -> T:
-        """Return what `use` makes of the solution operator of (p, a) where all nodes touch, scaled; collective."""
-        return self._team.lead(lambda: use(self._linear.factor(np.arange(self.size, dtype=np.int32))))
+    def on_closed_contact(self, use: Callable[[Solve], T], closed: Mask | None = None) -> T:
+        """Return what `use` makes of the solution operator of (p, a) where nodes touch, scaled; collective.
+
+        Args:
+            use: Called with the operator on the unknowns of `closed` and of the rigid motions.
+            closed: Nodes of the only phase that touch (n,); by default all nodes of all phases.
+        """
+        every = np.arange(self.size, dtype=np.int32)
+        kept = every if closed is None else every[np.append(closed, np.ones(self.size - len(closed), dtype=bool))]
+        return self._team.lead(lambda: use(self._linear.factor(kept)))
 
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
         """Return the solution by the first way that finds it: unknowns, residual and iterations."""

@@ -9,21 +9,26 @@ from fenwear.cycle.follow import follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
-from fenwear.cycle.program import Span, follow_program
+from fenwear.cycle.program import Span, at_step, follow_program, held
 from fenwear.cycle.stability import critical_speed, growth_rate, stability_number, stationary_growth
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
+from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 
 __all__ = [
     "Block",
     "Monotonic",
     "Span",
     "Steady",
+    "at_step",
     "critical_speed",
     "cycles_to_reach",
     "evolve",
     "follow",
     "follow_program",
     "growth_rate",
+    "heat_gain",
+    "heat_warnings",
+    "held",
     "jump",
     "march",
     "monotonic",

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
+from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.state import RunState, pressure_scales
 from fenwear.cycle.totals import Totals
+from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 
 
@@ -86,6 +88,8 @@ class Block:
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
             pressure scale (k,); NaN in the first cycle.
         equilibrium_error: Largest error of the force and moment balance relative to the contact force (k,).
+        complementarity_error: Largest error of p >= 0, gap >= 0 and p gap = 0 at a node in any phase, over their scales
+            (k,): see `fenwear.contact.complementarity`.
         retries: What had to be solved in another way in it, a count (k,).
         heat: Temperatures and heat balance; None without heat.
         remedies: How it was solved then, and how often.
@@ -106,6 +110,7 @@ class Block:
     optimum_distance: Array
     periodicity: Array
     equilibrium_error: Array
+    complementarity_error: Array
     retries: NDArray[np.int64]
     heat: BlockHeat | None = field(default=None, kw_only=True)
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
@@ -157,12 +162,12 @@ class Block:
         return self.pressure.max(axis=1)
 
     @property
-    def worn_area(self) -> Array:
+    def worn_area_increment(self) -> Array:
         """Cross-section worn off the punch in each, the integral of its wear (k,), mm²; a volume in mm³ else."""
         return self.adds.of("volume_punch") * (1 / self.system.bodies.punch.thickness)
 
     @property
-    def worn_area_strip(self) -> Array:
+    def worn_area_increment_strip(self) -> Array:
         """The same of the strip (k,), mm²."""
         return self.adds.of("volume_strip") * (1 / self.system.bodies.punch.thickness)
 
@@ -286,6 +291,7 @@ class Recorder:
             np.abs(pressure - optima).max(axis=1) / scales,
             changes,
             self._balances(),
+            self._complementarity(),
             np.array([row.retries for row in rows]),
             heat=heat,
             remedies=self._remedies,
@@ -318,16 +324,31 @@ class Recorder:
             np.maximum.at(errors, list(numbers), error)
         return errors
 
+    def _complementarity(self) -> Array:
+        """Return the largest error of Signorini's conditions in each half-cycle (k,)."""
+        length = self.system.interface.elastic_length
+        states = [[record.contact for record in row.phases] for row in self._rows]
+        pressure, gap = (
+            np.array([[getattr(c, name)[0] for c in row] for row in states]) for name in ("pressure", "gap")
+        )
+        return complementarity_error(pressure, gap, length).max(axis=1)
+
     def _optimum(self, direction: int, pressure: Array) -> Array:
-        """Return the optimal pressure on the present contact zone; solved anew only when that changes."""
+        """Return the optimal pressure on the present contact zone, NaN where a threshold or cap leaves none.
+
+        Solved anew only when the zone changes.
+        """
         zone = pressure > 0
         key = (direction, zone.tobytes())
         if key not in self._optima:
             if len(self._optima) > 1000:
                 self._optima.clear()
-            self._optima[key] = self.system.optimum(direction, zone).pressure
+            try:
+                self._optima[key] = self.system.optimum(direction, zone).pressure
+            except ConvergenceError:
+                self._optima[key] = np.full(len(zone), np.nan)
         return self._optima[key]
 
 
 def _stacked(totals: Sequence[Totals]) -> Totals:
-    return Totals(np.array([t.sums for t in totals]), np.array([t.energy for t in totals]))
+    return Totals(*(np.array([getattr(t, name) for t in totals]) for name in ("sums", "energy", "pressure")))

@@ -276,7 +276,8 @@ class Coupled:
         if heat is None:
             return np.zeros((0, 2, pressure.shape[1]))
         starts = self.through(state, pressure, conductances)[:-1]
-        return np.array([heat.exchange.contact_temperatures(heat.exchange.at(one)) for one in starts])
+        temperatures = heat.exchange.contact_temperatures
+        return np.array([temperatures(heat.exchange.at(one), phase - 1) for phase, one in enumerate(starts)])
 
     def through(self, state: Array, pressure: Array, conductances: Array | None) -> list[Array]:
         """Return the temperatures (dim,) before, between and after the phases of a cycle.

@@ -22,7 +22,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, outwarmed, preparation, warmed_system, warming_key
-from fenwear.compat import interpolation_points
+from fenwear.bodies.assembly import interpolate
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
 from fenwear.heat.field import HeatState
@@ -112,7 +112,7 @@ def _in_place(old: fem.Function, new: fem.Function) -> Array:
     largest = mesh.comm.allreduce(float(np.abs(shift).max(initial=0.0)), MPI.MAX)
     broken = fem.functionspace(mesh, ("DG", space.ufl_element().degree, (mesh.geometry.dim,)))
     gradient = fem.Function(broken)
-    gradient.interpolate(fem.Expression(ufl.grad(old), interpolation_points(broken)))
+    interpolate(ufl.grad(old), gradient)
     sums, counts = fem.Function(space), fem.Function(space)
     cells = mesh.topology.index_map(mesh.topology.dim).size_local
     to, from_ = space.dofmap.list[:cells].ravel(), broken.dofmap.list[:cells].ravel()

@@ -327,7 +327,7 @@ class Stepper:
             conductance = exchange.conductance(pressure) if self._conductances is None else self._conductances[phase]
             temperature, terms = exchange.half_cycle(temperature, phase, self.coupled.mu[phase] * pressure, conductance)
             bulk = np.nan if temperature.bulk is None else temperature.bulk
-            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature), terms, 1, bulk))
+            heats.append(HalfCycleHeat(*exchange.contact_temperatures(temperature, phase), terms, 1, bulk))
         return heats
 
 

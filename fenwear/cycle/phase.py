@@ -117,7 +117,7 @@ class PhaseStep:
         system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
-            surfaces = self._thermal.exchange.contact_temperatures(temperature)
+            surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
         conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles)
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
             mu = self._mu = system.friction.values(conditions)

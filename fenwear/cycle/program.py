@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
-from fenwear.assembly import Clock, Tribosystem, with_case
-from fenwear.case.program import Stage, stages_of
+from fenwear.assembly import Clock, Placed, Tribosystem, with_case
+from fenwear.case import Case
+from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import Loading, as_given
 from fenwear.cycle.follow import follow
@@ -94,10 +95,7 @@ def loading_of(system: Tribosystem, stage: Stage) -> Loading:
     """
     ends = stage.load_factor
     if stage.load is not None:
-        nominal = system.normal_force
-        if nominal <= 0:
-            key = f"program.steps.{stage.step}.load"
-            raise CaseError(InputError(key, "expected load_factor: supports carry the loads, not the contact alone"))
+        nominal = _nominal(system, f"program.steps.{stage.step}.load")
         ends = stage.load[0] / nominal, stage.load[1] / nominal
     if ends == (1.0, 1.0):
         return as_given
@@ -110,15 +108,74 @@ def loading_of(system: Tribosystem, stage: Stage) -> Loading:
     return loading
 
 
+def _nominal(placed: Placed, key: str) -> float:
+    """Return the normal force of the loads of a case, N."""
+    if placed.normal_force <= 0:
+        raise CaseError(InputError(key, "expected load_factor: supports carry the loads, not the contact alone"))
+    return placed.normal_force
+
+
+def held(placed: Placed, step: int | None = None) -> tuple[Case, str] | None:
+    """Return the case of what acts at the end of a step of a program, held for ever, and the step in words.
+
+    Args:
+        placed: The bodies of the case.
+        step: Its number from 0; by default the last.
+
+    Returns:
+        None without a program.
+
+    Raises:
+        CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
+            contact carry the loads.
+    """
+    if placed.made_from is None:
+        return None
+    found = held_at(placed.made_from, step)
+    if found is None:
+        return None
+    factor = found.load_factor
+    if found.load is not None:
+        factor = found.load / _nominal(placed, f"{found.key}.load")
+    force = placed.normal_force * factor
+    acts = f"normal force {force:,.6g} N" if force else f"all loads times {factor:.6g}"
+    text = f"step {found.step + 1} of {found.steps} of the program ({found.key}), as it ends, held for ever: {acts}"
+    return _loaded(found.case, factor), text
+
+
+def at_step(system: Tribosystem, step: int | None = None) -> Tribosystem:
+    """Return the system of what acts at the end of a step of its program, held for ever; collective.
+
+    A system of a case without a program is returned as it is. Operators that the step leaves are shared.
+
+    Args:
+        system: Of a case.
+        step: Number of the step from 0; by default the last.
+
+    Raises:
+        CaseError: there is no such step, nothing slides at its end, or a load is given where supports and not the
+            contact carry the loads.
+    """
+    found = held(system, step)
+    return system if found is None else with_case(system, found[0])
+
+
+def _loaded(case: Case, factor: float) -> Case:
+    """Return the case with all its loads times a factor."""
+    if factor == 1:
+        return case
+    bodies = {
+        name: body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
+        for name, body in (("punch", case.punch), ("strip", case.strip))
+    }
+    return case.model_copy(update=bodies)
+
+
 def at_loads(system: Tribosystem, factor: float) -> Tribosystem:
     """Return the system under all its loads times a factor; collective."""
     if factor == 1:
         return system
-    bodies = tuple(
-        body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
-        for body in (system.case.punch, system.case.strip)
-    )
-    case = system.case.model_copy(update={"punch": bodies[0], "strip": bodies[1]})
+    case = _loaded(system.case, factor)
     loaded = tuple(
         own.under(case, phase.fraction) for own, phase in zip(system.loaded, system.motion.phases, strict=True)
     )

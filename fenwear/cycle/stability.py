@@ -108,7 +108,7 @@ def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | Non
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
-    dim = 0 if heat is None else heat.gap_rows.shape[1]
+    dim = 0 if heat is None else heat.dim
     cycle = np.eye(dim + n)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
@@ -149,7 +149,7 @@ def _stationary_growth(
     except (CaseError, ConvergenceError) as error:
         return None, str(error)
     if heat is not None and states:
-        found = np.array(heat.exchange.contact_temperatures(states[phase]))
+        found = np.array(heat.exchange.contact_temperatures(states[phase], phase - 1))
         away = float(np.abs(found - surfaces).max())
         scale = float(np.abs(found - heat.exchange.heat.initial).max())
         if away > APART * scale:
@@ -194,7 +194,7 @@ def repeating_temperatures(
         states = [exchange.at(end.state(pressure))]
         for phase in range(len(pressure) - 1):
             states.append(exchange.half_cycle(states[-1], phase, pressure[phase], conductances[phase])[0])
-        surfaces = [exchange.contact_temperatures(state) for state in states]
+        surfaces = [exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
         found = np.array(surfaces)
         if system.friction.constant:
             return heat, states
@@ -231,7 +231,7 @@ def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | No
     n, conditions = len(pressure), system.conditions(phase, pressure)
     surfaces = conditions.temperatures
     if heat is not None and state is not None:
-        surfaces = heat.exchange.contact_temperatures(state)
+        surfaces = heat.exchange.contact_temperatures(state, phase - 1)
     around = (pressure, *surfaces)
 
     def at(p: Array, punch: Array, strip: Array) -> ContactConditions:
@@ -248,7 +248,7 @@ def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | No
     wear = system.wear.phases([at(*around)], [phase])
     mu_p, *mu_t = _slopes(friction, around)
     worn_p, *worn_t = (_opened(wear, slope) for slope in _slopes(depths, around))
-    picked = _picked(heat, n)
+    picked = _picked(heat, phase, n)
     mu_s: Array = (np.array(mu_t)[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t) @ picked).sum(axis=0)
     rate = heating_friction(system, np.ones(n))
@@ -292,7 +292,7 @@ def phase_tangent(
     state_s: Array = np.zeros((dim, dim))
     state_p: Array = np.zeros((dim, n))
     if heat is not None:
-        gap_rows = heat.gap_rows
+        gap_rows = heat.gap_rows[phase]
         if conductance is None:
             conductance = heat.exchange.conductance(pressure)
         state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
@@ -323,7 +323,7 @@ def _heated(
     exchange = heat.exchange
     unit = exchange.with_friction(np.tile(laws.rate, (len(exchange.friction), 1)))
     by_power, _ = unit.change(phase, conductance, pressure=np.eye(len(pressure)))
-    by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.gap_rows.shape[1]))
+    by_state, _ = exchange.change(phase, conductance, changes=np.eye(heat.dim))
     by_pressure: Array = by_power * (laws.mu + pressure * laws.mu_p)
     if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
         rise = np.divide(conductance, pressure, out=np.zeros_like(pressure), where=pressure > 0)
@@ -331,11 +331,11 @@ def _heated(
     return by_state + by_power @ (pressure[:, None] * laws.mu_s), by_pressure
 
 
-def _picked(heat: CycleHeat | None, n: int) -> Array:
-    """Return the rows that pick the temperatures of the punch's and the strip's surface (2, n, dim)."""
+def _picked(heat: CycleHeat | None, phase: int, n: int) -> Array:
+    """Return the rows that pick the temperatures of both surfaces at the start of a phase (2, n, dim)."""
     if heat is None:
         return np.zeros((2, n, 0))
-    return np.array(heat.exchange.contact_changes(np.eye(heat.gap_rows.shape[1])))
+    return np.array(heat.exchange.contact_changes(np.eye(heat.dim), phase - 1))
 
 
 def _opened(wear: PhasesWear, slope: Array) -> Array:
@@ -393,12 +393,13 @@ def _unstable_speed(stiffness: Array, thermal: NDArray[Any]) -> float:
 
 
 def critical_speed(system: Tribosystem, direction: int) -> float:
-    """Return the sliding speed above which full contact is thermo-elastically unstable, mm/s; collective.
+    """Return the sliding speed above which full contact is thermo-elastically unstable; collective.
 
     Of disturbances that grow without moving along the contact, and without wear: there the steady
     temperature of a pressure makes just this pressure, p = -V X Theta p, with X the elastic stiffness
     of the contact and Theta the thermal gap of the friction heat at unit speed (for a half-plane on
     an insulator: Burton, V = 2 (1 - nu) k m / (mu E alpha)). Infinite where no speed is critical.
+    In mm/s; in rad/s where the strip turns.
 
     Args:
         system: The assembled problem, with heat.

@@ -29,8 +29,10 @@ from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key, with_reduced_heat
+from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
+from fenwear.cycle.program import at_step
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.steady_inequality import OPEN, SteadyInequality, check_memory
 from fenwear.errors import CaseError, ConvergenceError
@@ -107,6 +109,11 @@ class Steady:
         """Abscissae of the contact nodes (n,), mm."""
         return self.coordinates[:, 0]
 
+    @property
+    def complementarity_error(self) -> float:
+        """Largest error of p >= 0, gap >= 0 and p gap = 0 in any half-cycle, over their scales."""
+        return float(complementarity_error(self.pressure, self.gap, self.system.interface.elastic_length).max())
+
     def __repr__(self) -> str:
         """Say in a line what it is."""
         n, most = len(self.coordinates), self.pressure.max()
@@ -116,7 +123,8 @@ class Steady:
 def steady(system: Tribosystem, *, properties_within: float | None = None) -> Steady:
     """Solve for the cyclic steady state; collective.
 
-    With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is.
+    With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is. Of a case with a
+    program it is the state of what acts at the end of its last step: see `at_step` for another one.
 
     Args:
         system: The assembled problem.
@@ -125,11 +133,12 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
 
     Raises:
         CaseError: with heat, a body that loses heat nowhere, or more nodes than fit into the memory; a property that is
-            not positive.
+            not positive; a program at whose end nothing slides.
         ConvergenceError: the inequality did not converge, or not with the nodes that conduct, or not with the
             properties of the temperatures.
     """
     begin = time.perf_counter()
+    system = at_step(system)
     state = _of_these_bodies(system)
     if warming_key(system) and system.heat is not None:
         share = LEFT if properties_within is None else properties_within / system.heat.property_tolerance
@@ -207,6 +216,11 @@ def _check_exists(system: Tribosystem) -> None:
             "wear by `run`"
         )
     first = system.interfaces[0].rigid.rigid_normal
+    if not np.abs(first).max(initial=0.0):
+        raise ConvergenceError(
+            "no cyclic steady state with any pressure exists: supports hold the bodies along the contact's normal, so "
+            "that wear goes on until nothing presses any more. Follow it by `run`"
+        )
     for own in system.interfaces[1:]:
         if np.abs(own.rigid.rigid_normal - first).max(initial=0.0) > 1e-9 * np.abs(first).max(initial=1.0):
             raise ConvergenceError(
@@ -292,7 +306,7 @@ def _steady_heat(heat: CycleHeat, solved: Solved, middle: slice) -> SteadyHeat |
     punch, strip = [], []
     for phase in range(len(solved.conductances)):
         now, _ = exchange.half_cycle(now, phase, solved.contact.pressure[phase], solved.conductances[phase])
-        temperatures = exchange.contact_temperatures(now)
+        temperatures = exchange.contact_temperatures(now, phase)
         punch.append(temperatures[0])
         strip.append(temperatures[1])
     ends = slice(middle.step - 1, None, middle.step)  # the last phase of each half-cycle

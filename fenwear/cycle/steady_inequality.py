@@ -17,6 +17,7 @@ from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.memory import GIB, free_memory, memory_size
+from fenwear.optimum import Optimum
 from fenwear.parallel import agreed
 from fenwear.sliding.friction import ContactConditions
 
@@ -181,8 +182,8 @@ class SteadyInequality:
         """Return where Newton starts: the optimum in one-way sliding, else the uniform pressure."""
         m, n, r = self.m, self.n, self.r
         x = np.zeros(self.equations.size)
-        if m == 1:
-            optimum = self.system.team.lead(lambda: self.system.optimum(self.system.motion.directions[0]))
+        optimum = self.system.team.lead(self._optimum) if m == 1 else None
+        if optimum is not None:
             x[:n] = optimum.pressure / self.p_scale
             velocity = np.array([optimum.velocity[name] for name in self.system.rigid.mode_names])
             x[n + n :] = velocity * self.system.motion.period * self.lengths / self.wear_scale
@@ -191,6 +192,13 @@ class SteadyInequality:
             if r:
                 x[-r:] = np.linalg.lstsq(self.equations.modes, np.full(n, float(m)), rcond=None)[0]
         return x
+
+    def _optimum(self) -> Optimum | None:
+        """Return the optimum of one-way sliding; None where a cap leaves none."""
+        try:
+            return self.system.optimum(self.system.motion.directions[0])
+        except ConvergenceError:
+            return None
 
     def _touching(self, x: Array) -> Array:
         """Return x with the shape that carries its first pressure, open where the motion leaves the wear behind."""

@@ -76,7 +76,7 @@ class ThermalContact:
             ConvergenceError: contact and heat do not come together.
         """
         if start is None:
-            start = self._contact.solve(gap + self.exchange.gap(temperature), None, layer)
+            start = self._contact.solve(gap + self.exchange.gap(temperature, self.phase - 1), None, layer)
         heat = self.system.heat
         if heat is not None and heat.coupling == "split":
             return self._split(temperature, gap, start, layer)
@@ -94,7 +94,7 @@ class ThermalContact:
             after, terms = exchange.half_cycle(temperature, self.phase, pressure, conductance)
             response = self._respond(conductance)
             exact = np.array_equal(response.conductance, conductance, equal_nan=True)
-            free = gap + exchange.gap(after) - response.gap @ pressure
+            free = gap + exchange.gap(after, self.phase) - response.gap @ pressure
             contact = self._contact.solve(free, contact, layer, response.gap[None, :, None, :])
             change = contact.pressure[0] - pressure
             if agreed(self.system.comm, bool(np.abs(change).max() < CLOSE * mean)):
@@ -122,7 +122,7 @@ class ThermalContact:
         if known is not None and agreed(self.system.comm, near):
             return known
         state, terms = self.exchange.change(self.phase, conductance, pressure=np.eye(len(conductance)))
-        self._response = _Response(conductance, state, terms, self.exchange.gap_change(state))
+        self._response = _Response(conductance, state, terms, self.exchange.gap_change(state, self.phase))
         return self._response
 
     def _split(
@@ -134,7 +134,7 @@ class ThermalContact:
         for iteration in range(1, MAX_ITERATIONS + 1):
             closed = np.where(contact.pressure[0] > 0, pressure, 0.0)  # relaxed pressures never get to zero
             after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(closed))
-            free = gap + exchange.gap(after)
+            free = gap + exchange.gap(after, self.phase)
             try:
                 contact = self._contact.solve(free, contact, layer)
             except ConvergenceError as error:  # the heat of a pressure too far off opens all nodes
@@ -150,7 +150,7 @@ class ThermalContact:
         )
 
     def _heat(self, state: HeatState, terms: Array, iterations: int) -> HalfCycleHeat:
-        punch, strip = self.exchange.contact_temperatures(state)
+        punch, strip = self.exchange.contact_temperatures(state, self.phase)
         return HalfCycleHeat(punch, strip, terms, iterations, np.nan if state.bulk is None else state.bulk)
 
 

@@ -4,26 +4,38 @@ In a phase in which the strip moves by ds, mm or rad, its material moves by v_i 
 by r_i ds: v_i = 1 in a translation, and r_i = v_i where the surface is not inclined to the motion.
 
     sliding distance    s = integral of <v> ds,         <v> = sum w_i p_i v_i / sum w_i p_i, the mean over the load;
-    load path           integral of sum w_i p_i r_i ds, N mm: load times s in a translation, along scars too;
+    load path           integral of sum w_i p_i r_i ds, N mm: load times s of flat contacts, in scars too;
+    load distance       integral of F <v> ds, N mm, F = sum w_i p_i (e_n + tau)_i . e_z the load: what the contact
+                        carries along the approach of the bodies, by pressure and friction, as a rig measures it;
+    drag distance       integral of |sum w_i p_i tau_i| <v> ds, N mm, of the resultant of friction, tau its traction
+                        over the pressure; in a model of rings of its sum all round;
     work of friction    integral of sum w_i mu p_i r_i ds, N mm = mJ;
     energy per area     integral of mu p_i r_i ds, mJ/mm²;
+    pressure sum        sum of the mean of p_i over each half-cycle's path, MPa: between two moments, over the
+                        half-cycles between them, it is the mean pressure, by what is worn and well posed at edges, too;
     worn volume, mass   sum w_i h_i, sum w_i rho_i h_i of the depths h_i worn in the phase, of each body.
 
-w_i are the nodes' areas, those of the plane times the thickness. With a = b = 1 volume = beta~ times the load
-path, whatever the pressure and the meshes do. A step of a jump adds these as it adds depths.
+w_i are the nodes' areas, those of the plane times the thickness. On curved contacts the integral of the pressure,
+sum w_i p_i, is more than the load. With a = b = 1 volume = beta~ times the load path, whatever the pressure and the
+meshes do. A step of a jump adds these as it adds depths.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Placed
+from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import PhasesWear
 
-SUMS = ("distance", "load_path", "work", "volume_punch", "mass_punch", "volume_strip", "mass_strip")
+SUMS = (
+    "distance", "load_path", "load_distance", "drag_distance", "work", "volume_punch", "mass_punch", "volume_strip",
+    "mass_strip",
+)  # fmt: skip
 MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
 
@@ -32,22 +44,24 @@ class Totals:
     """What has been added up, of one state or of k of them.
 
     Attributes:
-        sums: By `SUMS` (7,) or (k, 7): mm, N mm, mJ, and mm³ and mg of each body; NaN for a mass without density.
+        sums: By `SUMS` (9,) or (k, 9): mm, N mm, mJ, and mm³ and mg of each body; NaN for a mass without density.
         energy: Dissipated at the contact nodes per area (n,) or (k, n), mJ/mm².
+        pressure: Sum of their mean pressures in each half-cycle (n,) or (k, n), MPa.
     """
 
     sums: Array
     energy: Array
+    pressure: Array
 
     def __add__(self, other: Totals) -> Totals:
-        return Totals(self.sums + other.sums, self.energy + other.energy)
+        return Totals(self.sums + other.sums, self.energy + other.energy, self.pressure + other.pressure)
 
     def __sub__(self, other: Totals) -> Totals:
-        return Totals(self.sums - other.sums, self.energy - other.energy)
+        return self + other.times(-1.0)
 
     def times(self, factor: float) -> Totals:
         """Return all of it times a factor."""
-        return Totals(factor * self.sums, factor * self.energy)
+        return Totals(factor * self.sums, factor * self.energy, factor * self.pressure)
 
     def of(self, name: str) -> Array:
         """Return one of the sums () or (k,), by its name in `SUMS`."""
@@ -57,7 +71,8 @@ class Totals:
 
 def none_yet(system: Placed) -> Totals:
     """Return the totals at the start: zero."""
-    return Totals(np.zeros(len(SUMS)), np.zeros(len(system.pair.weights)))
+    nodes = len(system.pair.weights)
+    return Totals(np.zeros(len(SUMS)), np.zeros(nodes), np.zeros(nodes))
 
 
 class PhaseMeter:
@@ -75,11 +90,18 @@ class PhaseMeter:
         areas = system.bodies.punch.thickness * pair.weights
         path = system.motion.phases[phase].distance * slid
         self._energy = mu * path
+        positions, phases = system.motion.positions, system.motion.phases
+        first = phase // positions * positions
+        whole = sum(one.distance for one in phases[first : first + positions])
+        self._share = phases[phase].distance / whole if whole else 1 / positions  # at rest by the time
         speed = np.linalg.norm(system.sliding.field.velocity(pair.opposite), axis=1)
         self._weights, self._speed = pair.weights, system.motion.phases[phase].distance * speed
         self._rows = np.zeros((len(SUMS), len(areas)))
         self._rows[SUMS.index("load_path")] = areas * path
         self._rows[SUMS.index("work")] = areas * self._energy
+        self._load = areas * _along_approach(system, phase, mu)
+        friction = system.friction.ratio(system.motion.phases[phase].direction, mu, pair)
+        self._drag = areas[:, None] * friction
         self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
         for body, own, density in zip(
             ("punch", "strip"), (wear.punch, wear.strip), opposite_densities(system, phase), strict=True
@@ -97,10 +119,42 @@ class PhaseMeter:
         """Return what the phase adds at a pressure (n,)."""
         sums = self._rows @ pressure
         carried = self._weights * pressure if pressure.any() else self._weights
-        sums[0] = float(self._speed @ carried) / float(carried.sum())
+        distance = float(self._speed @ carried) / float(carried.sum())
+        sums[SUMS.index("distance")] = distance
+        sums[SUMS.index("load_distance")] = float(self._load @ pressure) * distance
+        sums[SUMS.index("drag_distance")] = float(np.linalg.norm(pressure @ self._drag)) * distance
         for rows, weigh, body in self._curved:
             sums[rows] = weigh @ body.depth(pressure[None])[0]
-        return Totals(sums, self._energy * pressure)
+        return Totals(sums, self._energy * pressure, self._share * pressure)
+
+
+def _along_approach(system: Placed, phase: int, mu: Array) -> Array:
+    """Return what pressure and friction of each node give the load, over the pressure (n,).
+
+    The load acts along the translation of the bodies that brings them together; where supports hold it,
+    along the mean normal.
+    """
+    rigid = system.rigids[phase]
+    traction = rigid.pair.normal + system.phase_friction(phase, mu)
+    if "lambda_F" in rigid.mode_names:
+        motion = rigid.motion[:, :, rigid.mode_names.index("lambda_F")]
+    else:
+        mean = rigid.pair.weights @ rigid.pair.normal
+        motion = np.broadcast_to(mean / np.linalg.norm(mean), traction.shape)
+    return np.asarray(np.einsum("id,id->i", traction, motion))
+
+
+def cycle_totals(system: Placed, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
+    """Return what a cycle adds at pressures (m, n) of its phases, with coefficients at their conditions.
+
+    Raises:
+        CaseError: a coefficient is negative or not finite there.
+    """
+    wear = system.wear.phases(conditions)
+    adds = none_yet(system)
+    for k, state in enumerate(conditions):
+        adds += PhaseMeter(system, k, system.friction.values(state), wear.some([k]))(pressure[k])
+    return adds
 
 
 def opposite_densities(system: Placed, phase: int) -> tuple[Array | None, Array | None]:

@@ -8,9 +8,9 @@ the heat of its temperature theta_in with it, and it leaves with its own:
 
     k d theta/dn = rho c (v . n) (theta - theta_in)   where v . n < 0,
 
-which makes the form coercive: its boundary part is (1/2) rho c |v . n| theta². Implicit Euler in
-time. Advection is stabilised by streamline upwinding with the whole residual (SUPG), so that the
-order of the elements is kept.
+which makes the form coercive: its boundary part is (1/2) rho c |v . n| theta². Steps are implicit
+Euler's, of which `fenwear.heat.exchange` makes a rule of second order. Advection is stabilised by
+streamline upwinding with the whole residual (SUPG), so that the order of the elements is kept.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from petsc4py import PETSc
 
 from fenwear import compat
 from fenwear.arrays import Array
-from fenwear.bodies.assembly import assembled, assembled_vector, compiled, destroy, times, transposed_times
+from fenwear.bodies.assembly import assembled, assembled_vector, compiled, destroy, interpolate, times, transposed_times
 from fenwear.bodies.contact_surface import contact_tag, trace_of
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import Factor, factored
@@ -105,6 +105,8 @@ class HeatBody:
         self.face_loss = 2 * heat.convection / elastic.thickness if faces else 0.0
         self._measure = measure(body.mesh, self.kind)
         self._flows: dict[SlidingField, _Flow] = {}
+        self.shared_bases: dict[Any, Any] = {}  # of the stages of a program
+        self.certified: dict[Any, float] = {}  # how far they are from the whole mesh
         self._conductivity_matrix: PETSc.Mat | None = None  # of material at rest
         self._tag_boundary(description)
 
@@ -181,7 +183,8 @@ class HeatBody:
             loss.destroy()
         carried = speed * flow.carried + entering
         brought = self.inflow * float(self.body.mesh.comm.allreduce(entering.sum()))
-        return HeatStep(self, a, b, f, carried, brought, entering, repeated=duration < np.inf and not at_once)
+        repeated = duration < np.inf and not at_once
+        return HeatStep(self, a, b, f, carried, brought, entering, moves=speed != 0, repeated=repeated)
 
     def _resting(self, forms: _StepForms) -> tuple[PETSc.Mat, PETSc.Mat]:
         """Return A and B of material at rest, M / dt + K and M / dt, without assembling them again; collective."""
@@ -243,6 +246,14 @@ class HeatBody:
     def store(self, theta: Array) -> Array:
         """Return the heat capacity matrix times fields (owned,) or (owned, k); collective."""
         return times(self._capacity_matrix, theta)
+
+    @cached_property
+    def capacities(self) -> Array:
+        """The diagonal of the heat capacity matrix (owned,), mJ/(mm K): above zero whatever the elements."""
+        diagonal = self._capacity_matrix.getDiagonal()
+        capacities: Array = diagonal.array.copy()
+        diagonal.destroy()
+        return capacities
 
     @cached_property
     def storage(self) -> Array:
@@ -311,7 +322,7 @@ class _Flow:
         ambient = fem.Constant(domain, PETSc.ScalarType(body.heat.ambient))
         faces = fem.Constant(domain, PETSc.ScalarType(body.face_loss))
         edges = fem.Constant(domain, PETSc.ScalarType(h))
-        tau = self._supg_time(rate, v)
+        tau = self._supg_time(v)
         upwind = tau * ufl.dot(v, ufl.grad(w))
         advected = ufl.dot(v, ufl.grad(theta))
         entering = rho_c * renewed * ufl.max_value(-ufl.dot(v, ufl.FacetNormal(domain)), 0)  # heat capacity a second
@@ -325,14 +336,15 @@ class _Flow:
         a_form, b_form, f_form, brought = (compiled(form) for form in (a, b, f, body._ds(entering * w, FREE)))
         return _StepForms(a_form, b_form, f_form, brought, rate, speed, renewed)
 
-    def _supg_time(self, rate: Any, v: Any) -> Any:
-        """Return the stabilisation time tau: 1 / sqrt((2/dt)^2 + (2 |v| p / l)^2 + (4 p^2 a / l^2)^2).
+    def _supg_time(self, v: Any) -> Any:
+        """Return the stabilisation time tau: 1 / sqrt((2 |v| p / l)^2 + (4 p^2 a / l^2)^2).
 
         l is the element's length along v, p the degree, a = k / (rho c) the diffusivity
-        (Shakib, Hughes and Johan 1991, with the node spacing l / p for the length).
+        (Shakib, Hughes and Johan 1991, with the node spacing l / p for the length). The time step is not in it: M and K
+        are those of a velocity, whatever the step, which then has its order, and the steady state is the same by any.
         """
         length = self._lengths() / self.body.space.ufl_element().degree
-        squares = (2 * rate) ** 2 + 4 * ufl.dot(v, v) / length**2 + (4 * self.body.law.diffusivity / length**2) ** 2
+        squares = 4 * ufl.dot(v, v) / length**2 + (4 * self.body.law.diffusivity / length**2) ** 2
         return 1 / ufl.sqrt(squares)
 
     def _lengths(self) -> fem.Function:
@@ -342,7 +354,7 @@ class _Flow:
         count = cells.size_local + cells.num_ghosts
         vectors = fem.functionspace(domain, ("DG", 0, (dim,)))
         flow = fem.Function(vectors)
-        flow.interpolate(fem.Expression(self.velocity, compat.interpolation_points(vectors)))
+        interpolate(self.velocity, flow)
         along = flow.x.array.reshape(-1, dim)[:count]
         speeds = np.linalg.norm(along, axis=1, keepdims=True)
         along = np.where(speeds > 0, along, np.eye(dim)[0]) / np.where(speeds > 0, speeds, 1.0)  # on an axis: any
@@ -393,6 +405,8 @@ class HeatStep:
         carried: Heat that the material carries out a second, for each kelvin (owned,), mW/(mm K).
         brought: Heat that new material brings in a second, mW/mm.
         entering: Heat capacity of what enters in a second (owned,), mW/(mm K).
+        moves: Whether the material moves.
+        is_held: Where temperatures are held (owned,).
         held_by_end, held_by_start, held_source: Sums of the rows of A, B and f that held
             temperatures replace: with them the heat that enters through these boundaries.
     """
@@ -407,8 +421,10 @@ class HeatStep:
         brought: float,
         entering: Array,
         *,
+        moves: bool,
         repeated: bool,
     ) -> None:
+        self.moves = moves
         self.body, self.carried, self.brought, self.entering = body, carried, brought, entering
         start = body.space.dofmap.index_map.local_range[0]
         rows = (body.held + start).astype(np.int32)
@@ -422,8 +438,8 @@ class HeatStep:
         self.source = f
         self.source[body.held] = body.held_values
         self.a, self.b = a, b
-        self._is_held = np.zeros(body.owned, dtype=bool)
-        self._is_held[body.held] = True
+        self.is_held = np.zeros(body.owned, dtype=bool)
+        self.is_held[body.held] = True
         self._repeated = repeated
         self._pivoted, self._solved = not repeated, 0
 
@@ -453,7 +469,7 @@ class HeatStep:
 
     def respond(self, load: Array) -> Array:
         """Return A^-1 of several loads (owned, k), mW/mm; collective."""
-        return self._solve_many(np.where(self._is_held[:, None], 0.0, load))
+        return self._solve_many(np.where(self.is_held[:, None], 0.0, load))
 
     def apply(self, fields: Array) -> tuple[Array, Array]:
         """Return A and B times several fields (owned, k); collective."""

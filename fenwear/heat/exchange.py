@@ -6,15 +6,22 @@ partition kappa,
     q_1 + q_2 = (1 - gamma_d) Q,    kappa (1 - gamma_d) Q - q_1 = h_c (theta_1 - theta_2),
 
 h_c -> infinity giving theta_1 = theta_2 (24); elsewhere both surfaces lose h (theta - theta_a). As
-each body answers a flux linearly, theta_i = theta_i without flux + T_i q_i, every step is one small
+each body answers a flux linearly, theta_i = theta_i without flux + T_i q_i, every stage is one small
 dense system for the 2 n fluxes, whatever nodes conduct: nothing is factored again.
+
+A time step dt has two stages, each an implicit Euler step E of gamma dt, gamma = 1 - 1/sqrt(2), with these conditions
+at its end:
+
+    theta* = E(theta),    theta' = E(theta + r (theta* - theta)),    r = (1 - gamma) / gamma,
+
+which is the L-stable, singly diagonally implicit Runge-Kutta rule of second order (Alexander, SIAM J. Numer. Anal. 14,
+1977). Its first stage counts r times in all balances.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
@@ -28,11 +35,13 @@ from fenwear.errors import HeatError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Basis, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
-from fenwear.heat.side import Side, StepPlan
+from fenwear.heat.side import Fineness, Side, StepPlan
 from fenwear.heat.step_map import PreparedStep, StepMap
 from fenwear.parallel import Team
 
 T = TypeVar("T")
+STAGE = 1 - 1 / np.sqrt(2)  # gamma: of a time step, how long each of its two stages is
+EARLIER = (1 - STAGE) / STAGE  # r: how often the first one counts
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
@@ -45,19 +54,6 @@ OVERSHOOT, DRIFT = 0.1, 1e-3
 TERMS = ("friction", "debris", "stored", "convected", "held", "carried")
 
 
-@dataclass(frozen=True)
-class _Ends:
-    """What there is at the ends of a half-cycle.
-
-    Attributes:
-        stored: Heat in both bodies at its start and at its end, per thickness.
-        surfaces: Temperatures of both contact surfaces at its end (n,), K, where coordinates do not say them.
-    """
-
-    stored: tuple[float, float]
-    surfaces: tuple[Array, Array] | None
-
-
 class HeatExchange:
     """Both bodies' temperatures over half-cycles, with the heat between them.
 
@@ -65,7 +61,7 @@ class HeatExchange:
         heat: Partition, conductance and convection.
         sides: The punch and the strip.
         plans: The steps of each phase.
-        duration: Of a step, s.
+        duration: Of a stage of a step, s; infinite for steady states, which have one stage.
         friction: mu of the interface nodes in each phase (phases, n).
         weights: Quadrature weights of the interface (n,), mm.
         thickness: Of the plane model, mm.
@@ -85,8 +81,11 @@ class HeatExchange:
         self.duration, self.friction, self.weights, self.thickness = duration, friction, weights, thickness
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
         self._contact_responses = [
-            side.field.contact_responses or [side.contact.of_changes(r) for r in side.field.responses] for side in sides
+            side.field.contact_responses
+            or [contact.of_changes(r) for contact, r in zip(side.contacts, side.field.responses, strict=True)]
+            for side in sides
         ]
+        self.fineness: Fineness | None = None  # of the steps, where it is known
         self._forget()
         for basis in self.bases:
             self.team.serve(basis)
@@ -147,28 +146,36 @@ class HeatExchange:
         """Return the state of coordinates (dim,) on this exchange's bases."""
         return HeatState(self.bases, values)
 
-    def gap(self, state: HeatState) -> Array:
-        """Return the gap that thermal expansion opens (n,), mm."""
+    def gap(self, state: HeatState, phase: int = -1) -> Array:
+        """Return the gap that thermal expansion opens at the end of a phase (n,), mm.
+
+        Args:
+            state: The temperatures.
+            phase: Its number: it says where the contact is; -1 for the last one, with which the first one begins.
+        """
         punch, strip = self._parts(self.own(state).values)
-        return self.sides[0].gap(punch) + self.sides[1].gap(strip)
+        return self.sides[0].readings[phase].gap(punch) + self.sides[1].readings[phase].gap(strip)
 
-    def gap_change(self, changes: Array) -> Array:
-        """Return the thermal gap of changes of the coordinates (dim, k), mm."""
+    def gap_change(self, changes: Array, phase: int = -1) -> Array:
+        """Return the thermal gap at the end of a phase of changes of the coordinates (dim, k), mm."""
         punch, strip = self._parts(changes)
-        return self.sides[0].gap.of_changes(punch) + self.sides[1].gap.of_changes(strip)
+        return self.sides[0].readings[phase].gap.of_changes(punch) + self.sides[1].readings[phase].gap.of_changes(strip)
 
-    def contact_temperatures(self, state: HeatState) -> tuple[Array, Array]:
-        """Return the temperatures of the two contact surfaces at the interface nodes (n,), K."""
+    def contact_temperatures(self, state: HeatState, phase: int = -1) -> tuple[Array, Array]:
+        """Return the temperatures of the two surfaces at the interface nodes at the end of a phase (n,), K."""
         state = self.own(state)
         if state.surfaces is not None:
             return state.surfaces
         punch, strip = self._parts(state.values)
-        return self.sides[0].contact(punch), self.sides[1].contact(strip)
+        return self.sides[0].readings[phase].contact(punch), self.sides[1].readings[phase].contact(strip)
 
-    def contact_changes(self, changes: Array) -> tuple[Array, Array]:
+    def contact_changes(self, changes: Array, phase: int = -1) -> tuple[Array, Array]:
         """Return the changes of both contact temperatures by changes of the coordinates (dim, k), (n, k) each."""
-        punch, strip = self._parts(changes)
-        return self.sides[0].contact.of_changes(punch), self.sides[1].contact.of_changes(strip)
+        first, second = (
+            side.readings[phase].contact.of_changes(part)
+            for side, part in zip(self.sides, self._parts(changes), strict=True)
+        )
+        return first, second
 
     def _parts(self, values: Array) -> tuple[Array, Array]:
         """Return the coordinates of punch and strip."""
@@ -200,9 +207,34 @@ class HeatExchange:
         Raises:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
-        values, terms, ends = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
-        self._led(partial(self._check_bounds, *ends.stored, terms[0] - terms[1]))
-        return HeatState(self.bases, values, surfaces=ends.surfaces), terms * self.thickness
+        after, terms = self.conduct(state, phase, pressure, conductance)
+        self.check_bounds(state, after, float(terms[0] - terms[1]))
+        return after, terms
+
+    def conduct(self, state: HeatState, phase: int, pressure: Array, conductance: Array) -> tuple[HeatState, Array]:
+        """Return the same, whether or not it is within its bounds: for the parts of a half-cycle."""
+        values, terms, surfaces = self._conduct(self.own(state).values, phase, pressure, conductance, sources=True)
+        return HeatState(self.bases, values, surfaces=surfaces), terms * self.thickness
+
+    def check_bounds(self, before: HeatState, after: HeatState, made: float) -> None:
+        """Hold the heat of the bodies against what can have entered them.
+
+        By the maximum principle friction raises the heat above the hottest boundary or initial temperature by
+        no more than its own, and nothing cools below the coldest of them.
+
+        Args:
+            before, after: A half-cycle.
+            made: Heat of friction in it that debris has not taken, mJ.
+
+        Raises:
+            HeatError: it is out of these bounds.
+        """
+        if np.isinf(self.duration) or not all(side.bounded for side in self.sides):
+            return
+        start, end = (
+            sum(one[0] for one in self._balances(self.own(state).values, sources=True)) for state in (before, after)
+        )
+        self._led(partial(self._check_bounds, start, end, made / self.thickness))
 
     def change(
         self, phase: int, conductance: Array, changes: Array | None = None, pressure: Array | None = None
@@ -225,8 +257,8 @@ class HeatExchange:
 
     def _conduct(
         self, values: Array, phase: int, pressure: Array, conductance: Array, *, sources: bool
-    ) -> tuple[Array, Array, _Ends]:
-        """Return the coordinates at the end, the heat terms, and what else there is at the ends.
+    ) -> tuple[Array, Array, tuple[Array, Array] | None]:
+        """Return the coordinates at the end, the heat terms, and the contact temperatures where they hold more.
 
         Args:
             values: Coordinates at the start (dim,), or without sources their changes (dim, k).
@@ -234,18 +266,35 @@ class HeatExchange:
             sources: Whether there is more than changes.
         """
         terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
-        before = start = self._balances(values, sources=sources)
+        before = self._balances(values, sources=sources)
         surfaces = None
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             heat = (self.friction[phase] * plan.speed * pressure.T).T
-            values, fluxes, bare = self._step(kinds, values, heat, conductance, sources=sources)
-            after = self._balances(values, sources=sources)
-            terms += self._led(partial(self._account, kinds, heat, fluxes, before, after, sources=sources))
-            before = after
+            for counts in self._stages:
+                ends, fluxes, _ = self._stage(kinds, values, heat, conductance, sources=sources)
+                after = self._balances(ends, sources=sources)
+                one = self._led(partial(self._account, kinds, heat, fluxes, before, after, sources=sources))
+                terms += counts * one
+                values = values + counts * (ends - values)
+                before = [a + counts * (b - a) for a, b in zip(before, after, strict=True)]
         if sources and any(side.field.contact_responses is not None for side in self.sides):
-            surfaces = self._surfaces(kinds, bare, fluxes)
-        return values, terms, _Ends((start[0][0] + start[1][0], before[0][0] + before[1][0]), surfaces)
+            surfaces = self._read(phase, values, fluxes)
+        return values, terms, surfaces
+
+    @property
+    def _stages(self) -> tuple[float, ...]:
+        """How often each stage of a step counts."""
+        return (1.0,) if np.isinf(self.duration) else (EARLIER, 1.0)
+
+    def _read(self, phase: int, values: Array, fluxes: list[Array]) -> tuple[Array, Array]:
+        """Return the temperatures of both contact surfaces at the end of a phase, from the fluxes of its last step."""
+        readings = [side.readings[phase] for side in self.sides]
+        first, second = (
+            one.contact(part) + (0.0 if one.left_out is None else one.left_out @ q)
+            for one, part, q in zip(readings, self._parts(values), fluxes, strict=True)
+        )
+        return first, second
 
     def _surfaces(self, kinds: tuple[int, int], bare: list[Array], fluxes: list[Array]) -> tuple[Array, Array]:
         """Return the temperatures of both contact surfaces at the end of a step."""
@@ -255,7 +304,7 @@ class HeatExchange:
         )
         return first, second
 
-    def _step(
+    def _stage(
         self,
         kinds: tuple[int, int],
         values: Array,
@@ -265,7 +314,7 @@ class HeatExchange:
         sources: bool,
         further: Array | None = None,
     ) -> tuple[Array, list[Array], list[Array]]:
-        """Return the coordinates at the end of a step, the fluxes q_1 and q_2, and surface temperatures without them.
+        """Return the coordinates at the end of a stage, the fluxes q_1 and q_2, and surface temperatures without them.
 
         Args:
             further: What else flows into both (2 n, k).
@@ -275,8 +324,8 @@ class HeatExchange:
             for side, kind, part in zip(self.sides, kinds, self._parts(values), strict=True)
         ]
         bare = [
-            side.contact(part) if sources else side.contact.of_changes(part)
-            for side, part in zip(self.sides, free, strict=True)
+            side.contacts[kind](part) if sources else side.contacts[kind].of_changes(part)
+            for side, kind, part in zip(self.sides, kinds, free, strict=True)
         ]
         ambient = self.heat.ambient if sources else 0.0
         fluxes = self._led(
@@ -298,16 +347,11 @@ class HeatExchange:
         ]
 
     def _check_bounds(self, start: float, end: float, friction: float) -> None:
-        """Hold the heat of the bodies against what can have entered them, all per thickness.
-
-        By the maximum principle friction raises the heat above the hottest boundary or initial temperature by
-        no more than its own, and nothing cools below the coldest of them.
+        """Hold the heat stored at both ends against that of friction, all per thickness.
 
         Raises:
-            HeatError: it is out of these bounds.
+            HeatError: it is out of bounds.
         """
-        if np.isinf(self.duration) or not all(side.bounded for side in self.sides):
-            return
         coldest, hottest = (pick(side.extremes[k] for side in self.sides) for k, pick in enumerate((min, max)))
         capacity = sum(side.capacity for side in self.sides)
         span, least = capacity * (hottest - coldest), capacity * coldest
@@ -335,12 +379,14 @@ class HeatExchange:
         changes: Array = np.zeros((len(values), n))
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
-            heat = self.friction[phase] * plan.speed * pressure
-            values, fluxes, bare = self._step(kinds, values, heat, conductance, sources=True)
-            first, second = self._surfaces(kinds, bare, fluxes)
-            missing = np.where(conducts, second - first, 0.0)
-            further = scipy.linalg.inv(self._exchanged(kinds, conductance).matrix())[:, :n] * missing
-            changes, _, _ = self._step(kinds, changes, np.zeros((n, n)), conductance, sources=False, further=further)
+            heat, inverse = self.friction[phase] * plan.speed * pressure, self._exchanged(kinds, conductance).matrix()
+            inverse = scipy.linalg.inv(inverse)[:, :n]
+            for counts in self._stages:
+                ends, fluxes, bare = self._stage(kinds, values, heat, conductance, sources=True)
+                first, second = self._surfaces(kinds, bare, fluxes)
+                further = inverse * np.where(conducts, second - first, 0.0)
+                after, _, _ = self._stage(kinds, changes, np.zeros((n, n)), conductance, sources=False, further=further)
+                values, changes = (a + counts * (b - a) for a, b in ((values, ends), (changes, after)))
         return changes
 
     def _account(
@@ -353,7 +399,7 @@ class HeatExchange:
         *,
         sources: bool,
     ) -> Array:
-        """Return the terms of a step's heat, per thickness; of a steady state per second."""
+        """Return the terms of a stage's heat, per thickness; of a steady state per second."""
         friction = self.weights @ heat
         debris = self.heat.debris * friction
         # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
@@ -364,6 +410,8 @@ class HeatExchange:
             convected = convected + a[1] - sources * side.ambient_loss
             held = held - (a[2 + 3 * k] - b[3 + 3 * k] - sources * side.held_source[k])
             carried = carried + a[4 + 3 * k] - sources * side.brought[k]
+            if side.gives_back:
+                convected = convected - a[k - len(side.contacts)]
         seconds = 1.0 if np.isinf(self.duration) else self.duration
         return np.array([friction, debris, stored, convected, held, carried]) * seconds
 
@@ -375,9 +423,11 @@ class HeatExchange:
             conductance: Of each node.
         """
         if kinds not in self._prepared:
-            fields, contacts = [side.field for side in self.sides], [side.contact for side in self.sides]
+            fields = [side.field for side in self.sides]
+            contacts = [side.contacts[kind] for side, kind in zip(self.sides, kinds, strict=True)]
             self._prepared[kinds] = PreparedStep(fields, kinds, contacts, self.heat.ambient)
-        return self._prepared[kinds].map(self._flux_map(kinds, conductance))
+        one = self._prepared[kinds].map(self._flux_map(kinds, conductance))
+        return one if len(self._stages) == 1 else one.twice(EARLIER)
 
     def _flux_map(self, kinds: tuple[int, int], conductance: Array) -> Fluxes:
         """Return the map to the fluxes; kept for conductances met before."""

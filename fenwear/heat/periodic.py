@@ -102,15 +102,21 @@ class CycleJump:
         weight: How many cycles bring it.
         matrix: Of the end (dim, dim).
         cycle: The cycle.
-        gap_rows: Thermal gap of the coordinates (n, dim), mm.
-        gap_constant: The same where they are zero (n,), mm.
+        gap_rows: Thermal gap of the coordinates at the end of each phase (n, dim), mm.
+        gap_constants: The same where they are zero (n,), mm.
     """
 
     def __init__(
-        self, start: Array, weight: float, matrix: Array, cycle: Cycle, gap_rows: Array, gap_constant: Array
+        self,
+        start: Array,
+        weight: float,
+        matrix: Array,
+        cycle: Cycle,
+        gap_rows: Sequence[Array],
+        gap_constants: Sequence[Array],
     ) -> None:
         self._start, self._weight, self._cycle = start, weight, cycle
-        self._gap_rows, self._gap_constant = gap_rows, gap_constant
+        self._gap_rows, self._gap_constants = gap_rows, gap_constants
         self._factor = scipy.linalg.lu_factor(matrix)
 
     def state(self, pressure: Array) -> Array:
@@ -122,7 +128,8 @@ class CycleJump:
         brought = self._brought(pressure)
         end = self._end(brought[-1])
         states = [through @ end + one for through, one in zip(self._cycle.through, brought, strict=True)]
-        return np.array([self._gap_rows @ state for state in states]) + self._gap_constant
+        found = zip(self._gap_rows, states, self._gap_constants, strict=True)
+        return np.array([rows @ state + constant for rows, state, constant in found])
 
     def _brought(self, pressure: Array) -> list[Array]:
         """Return the states after each phase of a cycle from zero (dim,)."""
@@ -134,25 +141,30 @@ class CycleJump:
     @cached_property
     def gap(self) -> Array:
         """The thermal gaps without pressure."""
-        return self.gaps(np.zeros((len(self._cycle.maps), len(self._gap_constant))))
+        return self.gaps(np.zeros((len(self._cycle.maps), len(self._gap_constants[0]))))
 
     @cached_property
     def coupling(self) -> Array:
         """Thermal gap of each phase from the pressure of each phase (m, n, m, n), mm/MPa."""
-        m, n, responses = len(self._cycle.maps), len(self._gap_constant), self._cycle.responses
+        m, n, responses = len(self._cycle.maps), len(self._gap_constants[0]), self._cycle.responses
         end = scipy.linalg.lu_solve(self._factor, self._weight * responses[-1])
-        pairs = zip(self._cycle.through, responses, strict=True)
-        return np.array([self._gap_rows @ (through @ end + own) for through, own in pairs]).reshape(m, n, m, n)
+        found = zip(self._gap_rows, self._cycle.through, responses, strict=True)
+        return np.array([rows @ (through @ end + own) for rows, through, own in found]).reshape(m, n, m, n)
 
 
 class CycleHeat:
-    """The maps of a cycle on the reduced state of both bodies."""
+    """The maps of a cycle on the reduced state of both bodies, of `dim` coordinates.
+
+    Attributes:
+        gap_rows: Thermal gap of the coordinates at the end of each phase (n, dim), mm.
+    """
 
     def __init__(self, exchange: HeatExchange) -> None:
         self.exchange = exchange
-        dim = sum(len(basis) for basis in exchange.bases)
-        self.gap_rows = exchange.gap_change(np.eye(dim))
-        self._gap_constant = exchange.gap(exchange.at(np.zeros(dim)))
+        self.dim = sum(len(basis) for basis in exchange.bases)
+        every, none = np.eye(self.dim), exchange.at(np.zeros(self.dim))
+        self.gap_rows = [exchange.gap_change(every, phase) for phase in range(len(exchange.plans))]
+        self._gap_constants = [exchange.gap(none, phase) for phase in range(len(exchange.plans))]
         self._cycles: dict[bytes, Cycle] = {}
 
     def initial(self) -> Array:
@@ -167,7 +179,7 @@ class CycleHeat:
         """Return the cycle for the conductances of its phases (m, n); the last few are kept."""
         key = conductances.tobytes()
         if key not in self._cycles:
-            (m, n), dim = conductances.shape, self.gap_rows.shape[1]
+            (m, n), dim = conductances.shape, self.dim
             steps = len({(plan.punch, plan.strip) for plans in self.exchange.plans for plan in plans})
             each = 8 * dim * (2 * m * dim + steps * (dim + n))
             if len(self._cycles) > min(KEPT, MEMORY // each):
@@ -191,6 +203,6 @@ class CycleHeat:
         cycle = self.cycle(conductances)
         changes = np.eye(len(state)) - cycle.through[-1]
         if np.isinf(cycles):
-            return CycleJump(np.zeros(len(state)), 1.0, changes, cycle, self.gap_rows, self._gap_constant)
+            return CycleJump(np.zeros(len(state)), 1.0, changes, cycle, self.gap_rows, self._gap_constants)
         matrix = np.eye(len(state)) + cycles * changes
-        return CycleJump(state, cycles, matrix, cycle, self.gap_rows, self._gap_constant)
+        return CycleJump(state, cycles, matrix, cycle, self.gap_rows, self._gap_constants)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,22 +11,22 @@ from scipy.sparse import csc_array, csr_array, diags_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.case import Heat, Track
-from fenwear.errors import CaseError, HeatError, InputError
+from fenwear.errors import CaseError, InputError
+from fenwear.heat.certificate import Trial, pressures, rigid_gaps
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
-from fenwear.heat.contact_response import contact_responses
-from fenwear.heat.exchange import HeatExchange
-from fenwear.heat.field import FullField, ReducedField
+from fenwear.heat.exchange import STAGE, HeatExchange
+from fenwear.heat.field import FullField, Functional, ReducedField
+from fenwear.heat.fitted import Wish, fitted_field
 from fenwear.heat.kept_basis import Way, kept_basis, made
-from fenwear.heat.reduction import ROUNDING, reduced_basis
-from fenwear.heat.side import Side, StepPlan
+from fenwear.heat.passage import Passage
+from fenwear.heat.passing import ModalField, PassingField
+from fenwear.heat.passing_strip import MANY, STEPS, PassingStrip
+from fenwear.heat.side import Fineness, Reading, Side, StepPlan
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
 from fenwear.parallel import total
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
-
-MANY = 300  # contact nodes above which a basis holds what is felt a step later alone
-NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
 
 
 def prepare_exchange(
@@ -39,7 +40,8 @@ def prepare_exchange(
     thickness: float,
     *,
     reduced: bool,
-    at_rest: bool = False,
+    passage: Passage | None = None,
+    others: Sequence[float] = (),
     keep: bool = False,
     fresh: bool = False,
 ) -> HeatExchange:
@@ -49,13 +51,15 @@ def prepare_exchange(
         heat: Settings of the heat.
         bodies: Conduction in the punch and in the strip.
         pair: The contact.
-        expansions: What each kelvin of this rank's nodes moves each surface along the normal, (n, owned) each, mm/K.
+        expansions: What each kelvin of this rank's nodes moves each surface along the normal (n, owned), mm/K, and
+            a strip that passes under the punch at the nodes of the passage (q, owned).
         sliding: The velocity of the strip's material for a unit speed.
         motion: The sliding motion.
         friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), in all phases.
         thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
-        at_rest: Whether the strip's material stays where it is, whatever the motion.
+        passage: Where the punch is on a strip that passes to and fro; None where it moves one way or not at all.
+        others: Speeds of all stages of a program one way, which share their bases.
         keep: Whether bases are kept on disk, and taken from there where they are.
         fresh: Make them whatever is kept.
 
@@ -63,48 +67,120 @@ def prepare_exchange(
         CaseError: the half-cycles of the motion last unequally long.
         HeatError: no basis gives temperatures that die out.
     """
-    plans, velocities, duration = _plans(heat, motion, at_rest=at_rest)
-    # Sliding to and fro brings back what it took away, unless the case says what comes instead.
-    renewed = heat.inflow is not None or velocities[0] * velocities[-1] > 0
-    cycles = [[getattr(step, body.body.name) for plan in plans for step in plan] for body in bodies]
-    sides = []
-    for body, inflow, rows, own, cycle in zip(
-        bodies, inflows(bodies, pair), expansions, ([0.0], velocities), cycles, strict=True
-    ):
-        around = _surroundings(body, pair, sliding, renewed=renewed)
-        steps = [body.step(velocity, duration, around, at_once=reduced) for velocity in own]
-        field: FullField | ReducedField | TrackField
-        moving = [own[step] for step in cycle]
-        if heat.track is not None and body.body.name == "strip":
-            field = _on_track(heat, heat.track, body, steps, inflow, own, duration, around, cycle, thickness)
-        elif reduced:
-            lasting = contact_rows(body, pair) if len(pair.weights) > MANY else None
-            tolerance, way = heat.reduction_tolerance, partial(kept_basis, fresh=fresh) if keep else made
-            field = _reduced(body, steps, inflow, moving, duration, tolerance, around, cycle, lasting, way)
+    one_way = len(set(motion.directions)) == 1
+    way: Way = partial(kept_basis, fresh=fresh) if keep else made
+    strip = None if passage is None else PassingStrip(heat, bodies[1], passage, way)
+    fineness = Fineness(heat.steps or STEPS)
+    if strip is not None and motion.positions < STEPS:
+        fineness = strip.fineness(motion, heat)
+    count = -(-fineness.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
+    plans, velocities, duration = _plans(motion, count, moves=one_way)
+    transfers: list[csr_array] = []
+    if passage is not None:
+        transfers, kinds = passage.steps(count)
+        plans = [
+            [replace(plan, strip=kind) for plan, kind in zip(row, own, strict=True)]
+            for row, own in zip(plans, kinds, strict=True)
+        ]
+    sides, differences = [], []
+    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True):
+        if strip is not None and body is strip.body:
+            side, difference = _passing(heat, strip, transfers, plans, rows, duration, reduced=reduced)
         else:
-            field = FullField(body, steps, inflow)
-        cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
-        sides.append(_side(field, steps, around, pair, rows, cooled=cooled))
-        for step in steps if reduced else ():  # what is left of them is in the small field
-            step.free()
-    return _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
+            around = _surroundings(body, pair, sliding, renewed=one_way)
+            steps = [body.step(velocity, duration, around, at_once=reduced) for velocity in own]
+            rated = None
+            if reduced:
+                cycle = [step.of(body) for row in plans for step in row]
+                moving = [own[step] for step in cycle] + [v for v in others if body.body.name == "strip"]
+                wish = Wish(moving, duration, heat.reduction_tolerance, heat.reduction_difference, around, cycle, way)
+                rated = wish, _trial(body, pair, inflow, rows, friction, plans)
+            side, difference = _in_place(heat, body, steps, own, pair, inflow, rows, plans, around, rated, thickness)
+        sides.append(side)
+        differences += [] if difference is None else [difference]
+    exchange = _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
+    exchange.fineness = replace(fineness, steps=count * motion.positions, difference=max(differences, default=None))
+    return exchange
 
 
-def _plans(heat: Heat, motion: Motion, *, at_rest: bool) -> tuple[list[list[StepPlan]], list[float], float]:
-    """Return the steps of each phase, the velocities of the strip's material in them, and how long each lasts, s.
+def _in_place(
+    heat: Heat,
+    body: HeatBody,
+    steps: list[HeatStep],
+    own: Sequence[float],
+    pair: ContactPair,
+    inflow: csc_array,
+    rows: Array,
+    plans: Sequence[Sequence[StepPlan]],
+    around: Surroundings,
+    rated: tuple[Wish, Trial] | None,
+    thickness: float,
+) -> tuple[Side, float | None]:
+    """Return the side of a body whose contact stays in its place, and its difference from its whole mesh; collective.
+
+    Args:
+        steps: Prepared ones.
+        own: Velocity of its material in each of them.
+        inflow: Loads of unit fluxes (owned, n).
+        rows: Of the gap that its expansion opens (n, owned), mm/K.
+        plans: The steps of each phase.
+        around: What it meets.
+        rated: What its basis is to be like, and what it is tried with; None for the whole mesh.
+        thickness: Of a plane model, mm.
+    """
+    field: FullField | ReducedField | TrackField
+    difference = None
+    if rated is None:
+        field = FullField(body, steps, inflow)
+    elif heat.track is not None and body.body.name == "strip":
+        field, difference = _on_track(heat.track, body, steps, own, *rated, thickness)
+    else:
+        lasting = contact_rows(body, pair) if len(pair.weights) > MANY else None
+        field, difference = fitted_field(body, steps, own, rated[1], rated[0], lasting)
+    cooled = any(body.loses_heat(velocity, around) for velocity in own)  # the same on every rank
+    side = _side(field, steps, around, pair, rows, [row[-1].of(body) for row in plans], cooled=cooled)
+    for step in steps if rated is not None else ():  # what is left of them is in the small field
+        step.free()
+    return side, difference
+
+
+def _trial(
+    body: HeatBody,
+    pair: ContactPair,
+    inflow: csc_array,
+    rows: Array,
+    friction: Array,
+    plans: Sequence[Sequence[StepPlan]],
+) -> Trial:
+    """Return what the reduced temperatures of a body whose contact stays in its place are tried with."""
+    fluxes = pressures(pair.punch.x) * friction[:, None]
+    speeds = [plan.speed for row in plans for plan in row]
+    entering = [fluxes * (speed if any(speeds) else 1.0) for speed in speeds]
+    return Trial(inflow, entering, contact_rows(body, pair), rows, rigid_gaps(body, pair.punch.x))
+
+
+def _plans(motion: Motion, count: int, *, moves: bool) -> tuple[list[list[StepPlan]], list[float], float]:
+    """Return the steps of each phase, the velocities of the strip's material in them, and how long stages last, s.
+
+    Args:
+        motion: The sliding motion.
+        count: Steps of each phase.
+        moves: Whether the strip's material moves through its mesh.
 
     Raises:
         CaseError: the half-cycles of the motion last unequally long.
     """
     if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
         raise CaseError(InputError("motion", "expected half-cycles of equal duration with heat"))
-    count = -(-heat.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
     speeds = motion.mean_speeds(count)
-    signed = [[0.0 if at_rest else d * float(v) for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
+    signed = [[d * float(v) if moves else 0.0 for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
     velocities = sorted({velocity for row in signed for velocity in row})
     of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
-    plans = [[StepPlan(0, of_strip[velocity], abs(velocity)) for velocity in row] for row in signed]
-    return plans, velocities, motion.phases[0].duration / count
+    plans = [
+        [StepPlan(0, of_strip[velocity], float(speeds[phase, k])) for k, velocity in enumerate(row)]
+        for phase, row in enumerate(signed)
+    ]
+    return plans, velocities, STAGE * motion.phases[0].duration / count
 
 
 def prepare_steady(
@@ -127,76 +203,85 @@ def prepare_steady(
     for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True):
         around = _surroundings(body, pair, sliding, renewed=True)
         steps = [body.step(velocity, np.inf, around) for velocity in own]
-        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, cooled=True))
+        last = [row[-1].of(body) for row in plans]
+        sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, last, cooled=True))
     return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
 
 
-def _reduced(
-    body: HeatBody,
-    steps: list[HeatStep],
-    inflow: csc_array,
-    speeds: Sequence[float],
+def _passing(
+    heat: Heat,
+    strip: PassingStrip,
+    transfers: Sequence[csr_array],
+    plans: Sequence[Sequence[StepPlan]],
+    expansion: Array,
     duration: float,
-    tolerance: float,
-    surroundings: Surroundings,
-    cycle: Sequence[int],
-    lasting: csr_array | None = None,
-    way: Way = made,
-) -> ReducedField:
-    """Return the field on a basis whose cycle of steps lets every temperature die out; collective.
+    *,
+    reduced: bool,
+) -> tuple[Side, float | None]:
+    """Return the side of a strip that passes under the punch, and its difference from the whole mesh; collective.
 
     Args:
-        lasting: Temperature at the contact nodes, for a basis of what is felt a step later; None for all.
-        way: How a basis is come by: made, or taken from what is kept.
-
-    Raises:
-        HeatError: none does.
+        strip: With its modes.
+        transfers: Of the places of each step.
+        plans: The steps of each phase.
+        expansion: Of the nodes of the passage (q, owned), mm/K.
+        duration: Of a stage, s.
+        reduced: Whether it is on its modes.
     """
-    exact = None if lasting is None else contact_responses(steps, inflow, lasting)
-    while True:
-        settings = (inflow, speeds, duration, tolerance, surroundings)
-        basis = way(partial(reduced_basis, body, *settings, lasting=lasting is not None), steps)
-        field = ReducedField(steps, inflow, basis, exact)
-        growth = field.spectral_radius(cycle)
-        if growth <= 1 + NEUTRAL:
-            return field
-        if tolerance <= ROUNDING:
-            raise HeatError(
-                f"the reduced temperatures of the {body.body.name} grow without heat, by a factor of "
-                f"{growth:.6g} a cycle, on any basis: hold the temperature where its material enters, "
-                'give heat.inflow, or set heat.operator = "full"'
-            )
-        tolerance = max(tolerance / 10, ROUNDING)  # more fields: nearer to the full steps, whose temperatures die out
+    body, around, passage = strip.body, strip.around, strip.passage
+    step = body.step(0.0, duration, around, at_once=reduced)
+    inner: FullField | ModalField
+    difference = None
+    if reduced:
+        inner, difference = strip.fitted(step, duration, transfers, plans, expansion, heat.reduction_difference)
+    else:
+        inner = FullField(body, [step], strip.loads)
+    field = PassingField(inner, strip.nodes, transfers, passage.middle.weights, heat.convection, heat.ambient)
+    initial = total(body.body.mesh.comm, expansion @ np.full(body.owned, heat.initial))
+    expanded = field.observe(expansion).less(initial).times(-1.0)
+    readings = [
+        Reading(field.reading(end), expanded.through(end), field.left_out(end, row[-1].strip))
+        for end, row in zip(passage.ends, plans, strict=True)
+    ]
+    cooled = body.loses_heat(0.0, around)
+    steps = [step] * len(transfers)
+    side = _on_balance(field, steps, around, field.contacts, readings, field.given_back, cooled=cooled)
+    if reduced:
+        step.free()
+    return side, difference
 
 
 def _on_track(
-    heat: Heat,
     track: Track,
     body: HeatBody,
     steps: list[HeatStep],
-    inflow: csc_array,
-    speeds: Sequence[float],
-    duration: float,
-    surroundings: Surroundings,
-    cycle: Sequence[int],
+    own: Sequence[float],
+    wish: Wish,
+    trial: Trial,
     thickness: float,
-) -> TrackField:
-    """Return the strip's reduced field with the bulk of its closed track; collective.
+) -> tuple[TrackField, float]:
+    """Return the strip's reduced field with the bulk of its closed track, and its difference from the whole mesh.
+
+    Collective.
 
     Raises:
         CaseError: nothing enters the mesh.
     """
-    if not surroundings.renewed or not body.flow(surroundings.sliding).is_open:
+    around = wish.surroundings
+    if not around.renewed or not body.flow(around.sliding).is_open:
         message = "expected a strip whose material enters through a free end: none leaves the mesh to come back"
         raise CaseError(InputError("heat.track", message))
     # What enters at a kelvin, as large as a unit flux: what is small against the largest is dropped from the basis.
-    comm, entering = body.body.mesh.comm, steps[0].entering
+    comm, inflow = body.body.mesh.comm, trial.inflow
+    unit_step = body.step(max(wish.velocities, key=abs) or 1.0, wish.duration, around)
+    entering = unit_step.entering
+    unit_step.free()
     fluxes, unit = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], np.abs(entering).sum()]))
     both = csc_array(hstack([inflow, csc_array(entering[:, None] * (fluxes / unit))]))
-    moving = [speeds[step] for step in cycle]
-    inner = _reduced(body, steps, both, moving, duration, heat.reduction_tolerance, surroundings, cycle)
-    kelvins = [abs(speed / speeds[0]) * unit / fluxes for speed in speeds]
-    return TrackField(inner, steps, kelvins, duration, track, thickness)
+    cold = [np.vstack([flux, np.zeros(flux.shape[1])]) for flux in trial.entering]
+    inner, difference = fitted_field(body, steps, own, replace(trial, inflow=both, entering=cold), wish)
+    kelvins = [float(total(comm, np.array(step.entering.sum()))) / fluxes for step in steps]
+    return TrackField(inner, steps, kelvins, wish.duration, track, thickness), difference
 
 
 def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, renewed: bool) -> Surroundings:
@@ -249,9 +334,34 @@ def _side(
     surroundings: Surroundings,
     pair: ContactPair,
     expansion: Array,
+    last: Sequence[int],
     *,
     cooled: bool,
 ) -> Side:
+    """Return the side of a body whose contact stays in its place, with the last step of each phase; collective."""
+    body = field.basis.body
+    comm, moves = body.body.mesh.comm, body.body.name == "strip"
+    initial = total(comm, expansion @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
+    contact = field.observe(contact_rows(body, pair))
+    gap = field.observe(expansion).less(initial).times(-1.0 if moves else 1.0)  # few rows of a basis: no copy of all
+    answers = field.contact_responses
+    beyond = {} if answers is None else {k: answers[k] - contact.of_changes(field.responses[k]) for k in set(last)}
+    readings = [Reading(contact, gap, beyond.get(kind)) for kind in last]
+    side = _on_balance(field, steps, surroundings, [contact] * len(steps), readings, cooled=cooled)
+    return field.balanced(side) if isinstance(field, TrackField) else side
+
+
+def _on_balance(
+    field: FullField | ReducedField | TrackField | PassingField,
+    steps: Sequence[HeatStep],
+    surroundings: Surroundings,
+    contacts: Sequence[Functional],
+    readings: Sequence[Reading],
+    given_back: Array | None = None,
+    *,
+    cooled: bool,
+) -> Side:
+    """Return a side with what enters the balance of its heat; collective."""
     body = field.basis.body
     convected = body.convected
     if surroundings.exposed is not None:
@@ -259,21 +369,29 @@ def _side(
     balance_rows = [body.storage, convected]
     for step in steps:
         balance_rows += [step.held_by_end, step.held_by_start, step.carried]
-    rows = np.array(balance_rows)
-    comm, moves = body.body.mesh.comm, body.body.name == "strip"
-    initial = total(comm, expansion @ np.full(body.owned, body.heat.initial))  # the bodies fit at this temperature
-    capacity, ambient_loss = (float(sums) for sums in total(comm, np.array([body.storage.sum(), convected.sum()])))
-    side = Side(
+    returned = 0.0
+    if given_back is not None:
+        balance_rows += list(given_back)
+        returned = float(given_back[0].sum())
+    rows, comm = np.array(balance_rows), body.body.mesh.comm
+    sums = total(comm, np.array([body.storage.sum(), convected.sum() - returned]))
+    capacity, ambient_loss = (float(one) for one in sums)
+    return Side(
         field,
-        field.observe(contact_rows(body, pair)),
-        field.observe(expansion).less(initial).times(-1.0 if moves else 1.0),  # few rows of a basis: no copy of all
+        contacts,
+        readings,
         field.observe(rows),
         [step.held_source for step in steps],
         [step.brought for step in steps],
         body.heat.ambient * ambient_loss,
         capacity,
         body.extremes(surroundings),
-        surroundings.renewed or not moves or not body.flow(surroundings.sliding).is_open,
+        surroundings.renewed or given_back is not None or not _moves(body, surroundings),
         cooled,
+        given_back is not None,
     )
-    return field.balanced(side) if isinstance(field, TrackField) else side
+
+
+def _moves(body: HeatBody, surroundings: Surroundings) -> bool:
+    """Return whether material moves through the ends of a mesh; collective."""
+    return body.body.name == "strip" and body.flow(surroundings.sliding).is_open

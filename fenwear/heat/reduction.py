@@ -30,8 +30,11 @@ from fenwear.heat.field import ReducedBasis
 from fenwear.parallel import total
 
 RATIO = 4.0  # of one time scale to the next
+RUNG = 3.0  # of one speed to the next, of a program of many
 SCALES = 9  # of them, from a step on; then come the last ones, to the steady state
 ROUNDING = 1e-7  # of the largest singular value: what is left of a dependent field, squared in the Gram matrix
+STAGES = 2  # of the shortest scale, which a time step begins with
+PASSES, PASSING = 4, 2  # of what moving material carries, to begin with, and of so many scales
 FAST = 4  # scales over which a motion to and fro does not average out
 SOME = 200  # fluxes that are tried at once, where there are many
 SHARPER = 0.3  # of the tolerance, for what is felt a step later: at a corner of the contact many such fields add up
@@ -46,6 +49,7 @@ def reduced_basis(
     surroundings: Surroundings = ALONE,
     *,
     lasting: bool = False,
+    passes: int = PASSES,
 ) -> ReducedBasis:
     """Return a basis, with a lift that has the held temperatures; collective.
 
@@ -57,9 +61,9 @@ def reduced_basis(
         tolerance: Singular values below this fraction of the largest are dropped.
         surroundings: What lies beyond the mesh.
         lasting: Whether it holds what is felt a step later alone.
+        passes: Over how many steps what moving material carries is followed, of the shortest scales.
     """
-    mean = float(np.mean(speeds))
-    moving = sorted({min(speeds), max(speeds)} - {mean})
+    mean, moving = _velocities(speeds)
     lift = body.initial()
     # Fluxes of the same power: the singular values then weigh temperatures as friction makes them.
     even = csc_array(inflow @ diags_array(1 / np.sqrt(total(body.body.mesh.comm, abs(inflow).sum(axis=0)))))
@@ -75,18 +79,24 @@ def reduced_basis(
         fluxes = _lasting_fluxes(body, even, later, slowest, basis, tolerance)
         slowest.free()
     block = SOME // 4 if lasting else max(fluxes.shape[1], 1)
-    unlike = len(scales) if surroundings.renewed and min(speeds) * max(speeds) < 0 else FAST
+    unlike = len(scales) if surroundings.renewed else FAST
     relaxed: list[Array] = []
     for k, scale in reversed(list(enumerate(scales))):  # the slowest first: it is the largest
-        for velocity in [mean, *(moving if k < unlike else [])]:
+        for velocity in [mean, *(v for v in moving if k < unlike and _has_scale(body, v, scale, surroundings))]:
             step = body.step(velocity, scale, surroundings, at_once=True)
+            times = passes if velocity != 0 and k < PASSING else STAGES if k == 0 else 1
             for begin in range(0, fluxes.shape[1], block):
-                if not basis.add(step.respond(fluxes[:, begin : begin + block]), tolerance):
+                if not basis.follow(step, fluxes[:, begin : begin + block], times, tolerance):
                     break  # the next ones matter less
-            if np.isinf(scale):
+            if np.isinf(scale) and velocity != mean:
+                relaxed.append(step.advance(np.zeros(body.owned))[:, None] - lift[:, None])
+            elif np.isinf(scale):
                 lift = step.advance(np.zeros(body.owned))
             else:
-                relaxed.append(step.advance(body.initial() - lift, sources=False)[:, None])
+                start = (body.initial() - lift)[:, None]
+                for _ in range(times):
+                    start = step.advance(start, sources=False)
+                    relaxed.append(start)
             step.free()
     if later is None:
         basis.compress(tolerance)
@@ -94,6 +104,25 @@ def reduced_basis(
         later.free()
     basis.start_from(body.initial() - lift, np.hstack(relaxed), tolerance)
     return ReducedBasis(body, lift, np.array(basis.columns))
+
+
+def _has_scale(body: HeatBody, velocity: float, scale: float, surroundings: Surroundings) -> bool:
+    """Return whether there is a field of this time scale: a steady one only where heat is lost; collective."""
+    return not np.isinf(scale) or body.loses_heat(velocity, surroundings)
+
+
+def _velocities(speeds: Sequence[float]) -> tuple[float, list[float]]:
+    """Return the velocity that the steady state is made of, and others whose fields a basis has.
+
+    To and fro the mean and the extremes. One way, at several speeds, the fastest and a ladder from there down.
+    """
+    low, high = min(speeds), max(speeds)
+    if low * high < 0 or low == high:
+        mean = float(np.mean(speeds))
+        return mean, sorted({low, high} - {mean})
+    fastest, slowest = max(low, high, key=abs), min((v for v in speeds if v), key=abs)
+    ladder = [fastest / RUNG**k for k in range(1, 1 + int(np.log(fastest / slowest) / np.log(RUNG)))]
+    return fastest, sorted({*ladder, slowest, *({0.0} & set(speeds))} - {fastest})
 
 
 class _Growing:
@@ -135,6 +164,15 @@ class _Growing:
         if self._later is None:
             self._added.append(total(self.body.body.mesh.comm, self.columns.T @ self.body.store(fields)))
         return len(values) > 0
+
+    def follow(self, step: HeatStep, fluxes: Array, passes: int, tolerance: float) -> bool:
+        """Add the fields of loads (owned, k) over so many steps; return whether there was anything to add."""
+        fields = step.respond(fluxes)
+        grown = self.add(fields, tolerance)
+        for _ in range(1, passes):
+            fields = step.advance(fields, sources=False)
+            grown |= self.add(fields, tolerance)
+        return grown
 
     def largest(self, fields: Array) -> float:
         """Return the largest singular value of fields (owned, k) beside the basis, as `add` would find it."""

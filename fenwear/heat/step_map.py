@@ -1,4 +1,4 @@
-"""What a step does to the small coordinates of both bodies, for given conductances, as one linear map.
+"""What a step, or a stage of it, does to the small coordinates of both bodies at given conductances, as a linear map.
 
     s' = P s + b + Q (friction heat),    P = P_0 + R M^-1 r(theta_0),
 
@@ -22,15 +22,24 @@ from fenwear.heat.fluxes import Fluxes, FluxFactor, FluxUpdate, Sources
 
 @dataclass(frozen=True)
 class StepMap:
-    """One step for given conductances: s' = propagator s + source + response Q, Q the friction heat (n,)."""
+    """One step or stage for given conductances: s' = propagator s + source + response Q, Q the friction heat (n,)."""
 
     propagator: Array
     source: Array
     response: Array
 
+    def twice(self, earlier: float) -> StepMap:
+        """Return the map of two such stages, the second from where the first leads `earlier` times as far."""
+        through = earlier * self.propagator
+        then = through.copy()
+        then[np.diag_indices_from(then)] += 1 - earlier
+        return StepMap(
+            self.propagator @ then, through @ self.source + self.source, through @ self.response + self.response
+        )
+
 
 class PreparedStep:
-    """One step of both bodies on small bases, whatever conducts.
+    """One stage of both bodies on small bases, whatever conducts.
 
     Args:
         fields: Of punch and strip.

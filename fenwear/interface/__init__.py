@@ -2,7 +2,7 @@
 
 from fenwear.interface.compliance import Interface, join
 from fenwear.interface.equilibrium import RigidEquilibrium, rigid_equilibrium
-from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material
+from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
 
 __all__ = [
@@ -16,4 +16,5 @@ __all__ = [
     "pair",
     "pass_material",
     "rigid_equilibrium",
+    "transfer_at",
 ]

@@ -2,8 +2,9 @@
 
 Pressure and gap live at the punch's pressure nodes. With the weights w_i the force of a node is w_i p_i,
 so that each node is one complementarity pair. The contact frame has its normal e_n into the punch, on
-the strip's surface opposite each node as the strip lies there: what acts on one body acts on the other
-the other way, on curved surfaces and in every place.
+the strip's surface opposite each node as the strip lies there, along which it slides; where the surfaces
+stick it is half-way between the normals of both (`frame`). What acts on one body acts on the other the
+other way, on curved surfaces and in every place.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.errors import CaseError, InputError
+from fenwear.interface.frame import common_normal, unit
 from fenwear.interface.overlap import ChartedSurface, Overlap, overlap
 from fenwear.interface.placement import HERE, Placement
 from fenwear.interface.transfer import dual_transfer, wear_transfer
@@ -81,7 +83,12 @@ class ContactPair:
 
 
 def pair(
-    punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE, *, axisymmetric: bool = False
+    punch: ContactSurface,
+    strip: ContactSurface,
+    placement: Placement = HERE,
+    *,
+    axisymmetric: bool = False,
+    halfway: bool = False,
 ) -> ContactPair:
     """Bring the punch's nodes opposite the strip's surface, moved to its place.
 
@@ -89,6 +96,7 @@ def pair(
         punch, strip: The surfaces as they were meshed.
         placement: Of the strip.
         axisymmetric: Whether they are rings, x being the radius.
+        halfway: Whether e_n is half-way between the normals of both bodies, not the strip's.
 
     Raises:
         CaseError: the surfaces do not face each other, or the strip's does not reach below the whole punch.
@@ -104,11 +112,14 @@ def pair(
     _check_covered(common, first, second, placement)
     transfer = dual_transfer(first, second, _around(common, first, punch) if axisymmetric else common)
     material = _material(first, second, transfer)
-    normal = material @ strip_outward
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = unit(material @ strip_outward)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
     _check_facing(punch, normal, facing, axis, placement)
+    if halfway:
+        normal = common_normal(punch, normal)
+        facing = -np.einsum("ic,ic->i", punch.outward, normal)
     gap = np.einsum("ic,ic->i", normal, punch.spread.T @ punch.trace - transfer @ strip_trace)
+    gap += _profiles(punch, strip, material)
     # Forces act along the common normal: a node's weight is its area seen along it.
     weights = punch.weights * facing
     deposit = _deposit(first, second, weights, strip.weights)
@@ -130,7 +141,32 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     _check_covered(common, first, second, placement)
     material = _material(first, second, dual_transfer(first, second, common))
     deposit = _deposit(first, second, middle.weights, middle.strip.weights)
-    return replace(middle, placement=placement, material=material, deposit=deposit)
+    # The profile of the strip's surface goes with its material.
+    gap = middle.initial_gap + _profiles(middle.punch, middle.strip, material)
+    gap -= _profiles(middle.punch, middle.strip, middle.material)
+    return replace(middle, placement=placement, material=material, deposit=deposit, initial_gap=gap)
+
+
+def _profiles(punch: ContactSurface, strip: ContactSurface, material: csr_array) -> Array:
+    """Return the gap opened by the profiles of both surfaces (n,), mm."""
+    gap: Array = np.zeros(len(punch.weights)) if punch.profile is None else punch.profile
+    return gap if strip.profile is None else gap + material @ strip.profile
+
+
+def transfer_at(middle: ContactPair, placement: Placement) -> csr_array:
+    """Return what takes values at the strip's trace nodes to the punch's nodes with the strip at another place (n, N).
+
+    Raises:
+        CaseError: the strip's contact surface does not reach below the whole punch there.
+    """
+    if placement == middle.placement:
+        return middle.transfer
+    axis = _chart_axis(middle.strip)
+    first = _charted(middle.punch, middle.punch.trace, axis)
+    second = _charted(middle.strip, placement.points(middle.strip.trace), axis)
+    common = overlap(first, second)
+    _check_covered(common, first, second, placement)
+    return dual_transfer(first, second, common)
 
 
 def _material(first: ChartedSurface, second: ChartedSurface, transfer: csr_array) -> csr_array:
@@ -203,9 +239,16 @@ def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurfac
         InputError(
             "motion",
             f"the stroke runs off the meshed strip: {placement}, strip_contact spans x = {spans[1]} mm, "
-            f"but punch_contact {spans[0]} mm (lengths of a mesh are taken as mm)",
+            f"but punch_contact {spans[0]} mm (lengths of a mesh are taken as mm): strip_contact has to reach "
+            f"{_missing(first, second):.4g} mm farther there",
         )
     )
+
+
+def _missing(first: ChartedSurface, second: ChartedSurface) -> float:
+    """Return how far the first surface reaches beyond the box around the second, mm."""
+    low, high = second.s.min(axis=0) - first.s.min(axis=0), first.s.max(axis=0) - second.s.max(axis=0)
+    return float(max(low.max(), high.max(), 0.0))
 
 
 def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int, placement: Placement) -> None:

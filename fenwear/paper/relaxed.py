@@ -59,7 +59,7 @@ def run_relaxed(system: Tribosystem, half_cycles: int, relaxation: float) -> Cou
     contacts = [system.phase_contact((phase,)) for phase in phases]
     laws = [system.wear.phases([system.conditions(phase)], [phase]) for phase in phases]
     worn, temperature = system.unworn(), exchange.initial()
-    states = [contacts[p].solve(system.gap(p, worn) + exchange.gap(temperature), None, None) for p in phases]
+    states = [contacts[p].solve(system.gap(p, worn) + exchange.gap(temperature, p - 1), None, None) for p in phases]
     pressure = states[0].pressure[0]
     rows: list[tuple[Array, Array, Array, float, float]] = []
     for half_cycle in range(half_cycles):
@@ -69,7 +69,7 @@ def run_relaxed(system: Tribosystem, half_cycles: int, relaxation: float) -> Cou
         conductance = exchange.conductance(np.where(state.pressure[0] > 0, pressure, 0.0))
         for _ in range(int(MOST / relaxation)):
             after, terms = exchange.half_cycle(temperature, phase, pressure, conductance)
-            free = gap + exchange.gap(after)
+            free = gap + exchange.gap(after, phase)
             state = contacts[phase].solve(free, state, None)
             pressure = pressure + relaxation * (state.pressure[0] - pressure)
             before, volume = volume, gap_volume(system, free)
@@ -80,5 +80,5 @@ def run_relaxed(system: Tribosystem, half_cycles: int, relaxation: float) -> Cou
         temperature, states[phase] = after, state
         worn = worn + laws[phase].worn(pressure[None])
         width = float(system.pair.weights @ (state.pressure[0] > 0))
-        rows.append((pressure, worn.punch, exchange.contact_temperatures(after)[0], width, float(terms[0])))
+        rows.append((pressure, worn.punch, exchange.contact_temperatures(after, phase)[0], width, float(terms[0])))
     return Course(*(np.array(column) for column in zip(*rows, strict=True)))

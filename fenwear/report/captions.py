@@ -17,8 +17,10 @@ TEXTS = {
     "wear_map": "Worn depth of {bodies} over the position along the contact and the {axis}.",
     "pressure": "Contact pressure along the contact at {chosen}: {panels}. First "
     "states far beyond all later ones have the last panel, dashed where the strip {back}.",
-    "mean_pressure": "Mean of the pressures in the two directions of a cycle along the contact.",
-    "peaks": "Largest contact pressure and width in contact{hot}, for each sliding direction, over the {axis}.",
+    "mean_pressure": "Mean contact pressure, of all directions, over the last tenth of what is done at "
+    "{chosen}: by it material is lost, and it is well posed where the edge of the contact moves.",
+    "peaks": "Largest contact pressure and width in contact{hot}, for each sliding direction, over the {axis}; "
+    "grey: the largest of the mean pressure over the last tenth of what is done.",
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
     "the sliding distance.",
     "scar": "(a) Largest worn depth and (b) width of the scar at 1 % and 5 % of it, over the {axis}.",
@@ -40,7 +42,8 @@ OF_SURFACES = {  # of solids and rings
     "contact, a line for each chosen half-cycle.",
     "pressure": "Contact pressure in megapascals along the contact, a panel for each sliding direction, a "
     "line for each chosen half-cycle. First states far beyond all later ones have the last panel.",
-    "mean_pressure": "Mean of the pressures of both sliding directions along the contact, a line for each cycle.",
+    "mean_pressure": "Mean contact pressure of all sliding directions in the last tenth of what is done, along the "
+    "contact, a line for each of these half-cycles.",
     "peaks": "Largest pressure, area in contact, largest worn depth, size of the scar along and across the sliding "
     "and, with heat, largest temperature of the contact surfaces at the end of a half-cycle, over the run.",
     "program": "Load, sliding speed and ambient temperature over the run, where they change.",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sized
+from collections.abc import Sequence, Sized
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.report.style import (
     BODY_COLOURS,
     DIRECTIONS,
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+LAST = 0.1  # of what is done, that a mean pressure is of
 MANY = 100.0  # last over first of a logarithmic axis, at least
 
 
@@ -42,6 +45,10 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     for ax, (name, label) in zip(axes, over.items(), strict=False):
         by_direction(ax, history, name, look)
         ax.set_ylabel(label)
+    if "pressure_sum" in history and len(ends := cycle_ends(history)):
+        x = look.course(history)[np.searchsorted(history.half_cycle.values, ends)]
+        late = late_pressures(history, ends).max(axis=1)
+        axes[0].plot(x, late, color="0.5", linestyle="-.", linewidth=1.0, label="of the mean over the last tenth")
     if is_conforming(history):
         mean = mean_pressure(history)
         level_line(axes[0], mean, f"mean {mean:.4g}")
@@ -58,7 +65,10 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
 def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the change against one cycle ago and the distance to the optimal pressure."""
     figure, axes = panels(2, 2.7, look=look)
-    over = {"periodicity": "change in a cycle (-)", "optimum_distance": "distance to the optimum (-)"}
+    over = {
+        "periodicity": "change in a cycle,\nlargest of a node (-)",
+        "optimum_distance": "distance to the optimum,\nlargest of a node (-)",
+    }
     for ax, (name, label) in zip(axes, over.items(), strict=True):
         by_direction(ax, history, name, look)
         ax.set_ylabel(label)
@@ -74,10 +84,10 @@ def volume_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     figure, axes = panels(2, 2.7, look=look)
     x = look.course(history)
     for body, end in BODIES.items():
-        if f"total_volume{end}" not in history:
+        if f"worn_volume{end}" not in history:
             continue
         colour = BODY_COLOURS[body]
-        axes[0].plot(x, history[f"total_volume{end}"], color=colour, label=body, **mark_few(x))
+        axes[0].plot(x, history[f"worn_volume{end}"], color=colour, label=body, **mark_few(x))
         axes[1].plot(x, history[f"wear_rate{end}"], color=colour, label=f"{body}, current", **mark_few(x))
         axes[1].plot(x, history[f"mean_wear_rate{end}"], color=colour, linestyle="--", label=f"{body}, mean")
     axes[0].set_ylabel("worn volume (mm³)")
@@ -138,7 +148,7 @@ assert WHERE_HEAT_GOES.keys() == HEAT_TERMS.keys() - {"friction"}
 
 
 def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
-    """Draw where the friction heat of each half-cycle goes."""
+    """Draw where the friction heat of each half-cycle goes; ways that none goes are left out."""
     figure, (ax,) = panels(1, 3.8, look=look)
     friction, x = history.heat_friction, look.course(history)
     largest = float(np.abs(friction).max())
@@ -149,12 +159,32 @@ def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figur
         values = history[f"heat_{name}"]
         if float(np.abs(values).max()) > threshold:
             ax.plot(x, scale * values, label=text, **run_style(number))
-        else:
-            ax.plot([], [], " ", label=f"{text}: none")
     ax.set_ylabel(f"heat per half-cycle ({unit})")
     legend_beside(ax, "")
     run_axis(ax, history, look)
     return figure
+
+
+def cycle_ends(history: xarray.Dataset) -> NDArray[np.int64]:
+    """Return the recorded half-cycles that end a cycle (k,)."""
+    strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
+    recorded = history.half_cycle.values
+    return np.asarray(recorded[recorded % strokes == 0], dtype=np.int64)
+
+
+def late_pressures(history: xarray.Dataset, half_cycles: Sequence[int] | NDArray[np.int64]) -> Array:
+    """Return mean pressures (k, n), MPa, over the last tenth of what is done at recorded ends of cycles.
+
+    From the end of a cycle before that tenth on, however far it lies back. At an instant the nodes at an edge that
+    moves are at any fraction of their coming; what they have borne since is what they have lost.
+    """
+    ends = cycle_ends(history)
+    borne = history.pressure_sum.sel(half_cycle=ends).values
+    ends, borne = np.concatenate([[0], ends]), np.vstack([np.zeros(borne.shape[1]), borne])
+    numbers = np.asarray(half_cycles)
+    at = np.searchsorted(ends, numbers)
+    before = np.searchsorted(ends, (1 - LAST) * numbers, side="right") - 1
+    return np.asarray((borne[at] - borne[before]) / (ends[at] - ends[before])[:, None], dtype=np.float64)
 
 
 def mean_pressure(history: xarray.Dataset) -> float:

@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray
 
+from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 from fenwear.report.course import (
     convergence_figure,
+    cycle_ends,
     directions_present,
     friction_figure,
     heat_balance_figure,
     is_conforming,
+    late_pressures,
     mean_pressure,
     peak_figure,
     scar_figure,
@@ -73,12 +76,14 @@ def nearest_half_cycles(history: xarray.Dataset, wanted: Sequence[int]) -> list[
     return sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in wanted})
 
 
-def cycle_means(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[int, xarray.DataArray]:
-    """Return (p+ + p-)/2 of the cycles that the half-cycles belong to, by the cycle's number."""
-    recorded = set(history.half_cycle.values.tolist())
-    cycles = sorted({(n + 1) // 2 for n in half_cycles})
-    pairs = {c: [2 * c - 1, 2 * c] for c in cycles if {2 * c - 1, 2 * c} <= recorded}
-    return {c: history.pressure.sel(half_cycle=pair).mean("half_cycle") for c, pair in pairs.items()}
+def cycle_means(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[int, Array]:
+    """Return mean pressures up to the ends of the cycles that the half-cycles belong to, by their last half-cycle."""
+    if "pressure_sum" not in history:
+        return {}
+    ends = cycle_ends(history)
+    own = np.searchsorted(ends, half_cycles)
+    wanted = [int(n) for n in np.unique(ends[own[own < len(ends)]])]
+    return dict(zip(wanted, late_pressures(history, wanted), strict=True)) if wanted else {}
 
 
 def pressure_top(history: xarray.Dataset, half_cycles: Sequence[int]) -> float:
@@ -128,20 +133,20 @@ def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: L
 
 
 def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
-    """Draw the mean of the pressures in the two directions of a cycle."""
+    """Draw mean pressures of all directions up to some cycles: what is well posed where a contact's edge moves."""
     means = cycle_means(history, half_cycles)
-    peaks = {c: float(mean.max()) for c, mean in means.items()}
+    peaks = {n: float(mean.max()) for n, mean in means.items()}
     late = max(list(peaks.values())[len(peaks) // 2 :])
-    early = [c for c in means if peaks[c] > EARLY * late]
+    early = [n for n in means if peaks[n] > EARLY * late]
     figure, axes = panels(2 if early else 1, 3.0, look=look)
-    for colour, c in shades(list(means)):
-        ax = axes[-1] if c in early else axes[0]
-        ax.plot(history.x, means[c], color=colour, label=look.name(history, 2 * c), gid=str(c))
+    for colour, n in shades(list(means)):
+        ax = axes[-1] if n in early else axes[0]
+        ax.plot(history.x, means[n], color=colour, label=look.name(history, n), gid=str(n))
     if is_conforming(history):
         mean = mean_pressure(history)
         level_line(axes[0], mean, f"mean {mean:.4g} MPa")
     for ax in axes:
-        ax.set_ylabel("(p⁺ + p⁻) / 2 (MPa)")
+        ax.set_ylabel("mean pressure (MPa)")
         ax.set_ylim(bottom=0)
         legend_beside(ax, look.of_one)
     contact_axis(axes[-1])
@@ -187,7 +192,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
         "wear_map": wear_map_figure(history, look),
         "pressure": pressure_figure(history, chosen, look),
     }
-    if cycle_means(history, chosen) and len(directions_present(history)) == 2:
+    if cycle_means(history, chosen):
         drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
     drawn["peaks"] = peak_figure(history, look)
     if "sliding_distance" in history:

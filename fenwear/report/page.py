@@ -148,6 +148,7 @@ def page(directory: Path, look: Look = STANDARD) -> str:
         retries=summary.get("retries", {}),
         convergence=_figure(images, "convergence", caption("convergence", history, look)),
         equilibrium_error=summary.get("largest_equilibrium_error"),
+        complementarity_error=summary.get("largest_complementarity_error"),
         heat_error=_heat_error(summary, history),
         heat=_heat(summary),
         heat_balance=_figure(images, "heat_balance", caption("heat_balance", history, look)),

@@ -1,27 +1,29 @@
 """Checkpoints: a state of a run on disk, whole or not at all, for any number of ranks.
 
-Arrays of the interface go to one NumPy file; temperatures are functions on the meshes, written by
-adios4dolfinx in the numbering of the geometry, so that another number of ranks can read them.
+Arrays of the interface go to one NumPy file; temperatures of each body to one of their own with the places of
+the nodes, so that another number of ranks can read them.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import tomllib
 import zipfile
+from collections.abc import Mapping
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import adios4dolfinx
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.case import Case
+from fenwear.case import Case, OneWay, Rotation
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import SUMS, Totals
@@ -29,42 +31,48 @@ from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
-from fenwear.results import gathered
+from fenwear.results import nodal
 from fenwear.results.disk import check_room, writing, writing_together
 from fenwear.sliding.wear import Worn
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
-CASE, ARRAYS = "case.toml", "state.npz"
+CASE, ARRAYS, EXTREMES = "case.toml", "state.npz", "extremes.json"
 NUMBERS, WEAR, STATES = (
     ("half_cycle", "jump_length", "periodic_phases"),
     ("wear", "wear_strip"),
     ("pressure", "gap", "rigid"),
 )
-TOTALS = ("totals", "energy")
+TOTALS = ("totals", "energy", "pressure_sum")
 WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
 BULK = "bulk"  # temperature of a closed track, NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
-BYTES_PER_NODE, BYTES_PER_RANK = 128, 65536  # that temperatures take, generously
+BYTES_PER_NODE, BYTES = 56, 65536  # that a temperature with its place takes, and a file beside its values
 # A run may go on farther than it was meant to, and keep other things.
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "setup.", "title")
 
 
-def save(directory: Path, system: Tribosystem, state: RunState) -> None:
+def save(directory: Path, system: Tribosystem, state: RunState, extremes: Mapping[str, float]) -> None:
     """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
+
+    Args:
+        directory: Of the run.
+        system: The problem.
+        state: To go on from.
+        extremes: What was largest up to it, which a run that goes on is to know, see `extremes`.
 
     Raises:
         OutputError: it cannot be written; the old one stays.
     """
     try:
-        _save(directory, system, state)
+        _save(directory, system, state, extremes)
     except OutputError:  # on all ranks
         on_root(system.comm, lambda: shutil.rmtree(directory / NEW, ignore_errors=True))
         raise
 
 
-def _save(directory: Path, system: Tribosystem, state: RunState) -> None:
+def _save(directory: Path, system: Tribosystem, state: RunState, extremes: Mapping[str, float]) -> None:
     comm, new = system.comm, directory / NEW
-    on_root(comm, lambda: _begin(new, system, state))
+    on_root(comm, lambda: _begin(new, system, state, extremes))
     if state.temperature is not None:
         write_temperatures(new, comm, state.temperature)
     if system.bodies.warmed is not None and system.bodies.heat is not None:
@@ -86,26 +94,49 @@ def write_temperatures(folder: Path, comm: MPI.Comm, state: HeatState) -> None:
 
 def _write_function(comm: MPI.Comm, new: Path, name: str, function: fem.Function) -> None:
     """Write a temperature; collective."""
-    lacks = gathered.lacks_cells(function.function_space)
-    path = new / f"{name}.{'npz' if lacks else 'bp'}"
-    size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES_PER_RANK * comm.size
+    path = _file(new, name)
+    size = BYTES_PER_NODE * function.function_space.dofmap.index_map.size_global + BYTES
     on_root(comm, partial(check_room, new, size))
     with writing_together(comm, path):
-        if lacks:
-            gathered.write(path, function)
-        else:
-            adios4dolfinx.write_function_on_input_mesh(path, function)
+        nodal.write(path, function)
 
 
-def _begin(new: Path, system: Tribosystem, state: RunState) -> None:
+def _file(folder: Path, name: str) -> Path:
+    """Return the file of a temperature."""
+    return folder / f"{name}.npz"
+
+
+def _begin(new: Path, system: Tribosystem, state: RunState, extremes: Mapping[str, float]) -> None:
     with writing(new):
-        shutil.rmtree(new, ignore_errors=True)
-        new.mkdir()
+        begin(new, system.case, extremes)
         _write(new, system, state)
 
 
+def begin(new: Path, case: Case, extremes: Mapping[str, float]) -> None:
+    """Make the folder of a new checkpoint, with its case and what was largest; for one rank."""
+    shutil.rmtree(new, ignore_errors=True)
+    new.mkdir()
+    (new / CASE).write_text(case.to_toml(), "utf-8")
+    (new / EXTREMES).write_text(json.dumps(dict(extremes)), "utf-8")
+
+
+def extremes(directory: Path, comm: MPI.Comm) -> dict[str, float]:
+    """Return what was largest in a run up to its checkpoint, by name; collective.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is damaged.
+    """
+    return on_root(comm, lambda: _extremes(find(directory)))
+
+
+def _extremes(folder: Path) -> dict[str, float]:
+    try:
+        return {str(name): float(value) for name, value in json.loads((folder / EXTREMES).read_text("utf-8")).items()}
+    except (AttributeError, OSError, TypeError, ValueError):
+        raise damaged(folder) from None
+
+
 def _write(new: Path, system: Tribosystem, state: RunState) -> None:
-    (new / CASE).write_text(system.case.to_toml(), "utf-8")
     n, r = len(system.pair.weights), len(system.rigid.resultant)
     empty = ContactState(np.full((1, n), np.nan), np.full((1, n), np.nan), np.full((1, r), np.nan), 0)
     contacts = [contact or empty for contact in state.contacts]
@@ -129,7 +160,7 @@ def _bulk(temperature: HeatState | None) -> dict[str, Any]:
 
 
 def _totals(totals: Totals) -> dict[str, Any]:
-    return dict(zip(TOTALS, (totals.sums, totals.energy), strict=True))
+    return dict(zip(TOTALS, (totals.sums, totals.energy, totals.pressure), strict=True))
 
 
 def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
@@ -156,9 +187,7 @@ def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
     """
     comm, bodies = system.comm, system.bodies.heat
     folder = on_root(comm, lambda: find(directory))
-    if bodies is None or not on_root(
-        comm, lambda: any((folder / f"{WARMED}_punch.{kind}").exists() for kind in ("bp", "npz"))
-    ):
+    if bodies is None or not on_root(comm, _file(folder, f"{WARMED}_punch").exists):
         return None
     punch, strip = (read_temperature(folder, body, WARMED) for body in bodies)
     return punch, strip
@@ -208,24 +237,18 @@ def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") ->
     Raises:
         CaseError: they cannot be read.
     """
-    comm, function = body.body.mesh.comm, body.function(body.initial())
-    readable, whole = True, folder / f"{name}_{body.body.name}.npz"
-    try:
-        if on_root(comm, whole.is_file):
-            function.x.array[: body.owned] = gathered.read(whole, body.space)
-        else:
-            adios4dolfinx.read_function(whole.with_suffix(".bp"), function)
-    except (KeyError, OSError, RuntimeError, ValueError, zipfile.BadZipFile):  # ADIOS2 has no type of its own
-        readable = False
-    values = function.x.array[: body.owned].copy()
-    if not comm.allreduce(readable and bool(np.isfinite(values).all()), op=MPI.LAND):
+    comm, values = body.body.mesh.comm, np.full(body.owned, np.nan)
+    with suppress(EOFError, KeyError, OSError, ValueError, zipfile.BadZipFile):
+        values = nodal.read(_file(folder, f"{name}_{body.body.name}"), body.space)
+    if not comm.allreduce(bool(np.isfinite(values).all()), op=MPI.LAND):
         raise damaged(folder)
     return values
 
 
 def damaged(folder: Path) -> CaseError:
     """Return the error of a checkpoint that cannot be read."""
-    return CaseError(InputError("--resume", f"the checkpoint in {folder} is damaged; expected to start anew, without"))
+    what = f"the checkpoint in {folder} is damaged, or of an earlier version; expected to start anew, without"
+    return CaseError(InputError("--resume", what))
 
 
 def find(directory: Path) -> Path:
@@ -261,8 +284,15 @@ def check_case(folder: Path, case: Case) -> None:
     """Make sure that a checkpoint is of this case.
 
     Raises:
-        CaseError: it is of another one, whose differences are named, or damaged.
+        CaseError: it is of another one, whose differences are named, of an earlier version, or damaged.
     """
+    to_and_fro = not isinstance(case.motion, OneWay | Rotation)
+    if case.heat is not None and to_and_fro and not (folder / EXTREMES).is_file():
+        what = (
+            f"the checkpoint in {folder} is of an earlier version, which to and fro had the strip's temperatures below "
+            "the punch in place of those of its material; expected to start anew, without"
+        )
+        raise CaseError(InputError("--resume", what))
     try:
         saved = _flat(tomllib.loads((folder / CASE).read_text("utf-8")))
     except (OSError, ValueError):
@@ -285,7 +315,9 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
         for name, unworn in _depths(names, system.unworn()).items():
             if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
                 raise damaged(folder)
-    if arrays["totals"].shape != (len(SUMS),) or arrays["energy"].shape != system.pair.weights.shape:
+    if arrays["totals"].shape != (len(SUMS),) or any(
+        arrays[name].shape != system.pair.weights.shape for name in TOTALS[1:]
+    ):
         raise damaged(folder)
     return arrays
 

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
-from fenwear.bodies.assembly import times
+from fenwear.bodies.assembly import interpolate, times
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.compat import facet_nodes, interpolation_points
+from fenwear.compat import facet_nodes
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
 from fenwear.parallel import on_root
@@ -141,7 +141,7 @@ def _solve(
         coupling.destroy()
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
-    displacement.x.array[:owned] = elastic.solve(force)
+    displacement.x.array[:owned] = elastic.solve(force) + elastic.imposed.x.array[:owned]
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()
@@ -188,10 +188,10 @@ def _interpolated(expression: Any, elastic: ElasticBody, name: str, shape: tuple
     if elastic.law.kind == "axisymmetric":  # on the axis u / r has no value: taken at points inside the elements
         inner = fem.functionspace(mesh, _inside_cells(mesh.basix_cell(), degree, shape))
         within = fem.Function(inner)
-        within.interpolate(fem.Expression(expression, interpolation_points(inner)))
+        interpolate(expression, within)
         values.interpolate(within)
     else:
-        values.interpolate(fem.Expression(expression, interpolation_points(broken)))
+        interpolate(expression, values)
     smooth = fem.functionspace(mesh, basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=shape))
     sums, counts = fem.Function(smooth, name=name), fem.Function(smooth)
     size = smooth.dofmap.bs

@@ -49,10 +49,15 @@ VARIABLES = {
     "wear": (("half_cycle", "x"), "mm", "worn depth of the punch at the end of the half-cycle"),
     "max_pressure": (("half_cycle",), "MPa", "largest contact pressure"),
     "contact_width": (("half_cycle",), "mm", "width in contact"),
-    "worn_area": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
-    "optimum_distance": (("half_cycle",), "1", "largest distance to the optimal pressure over the pressure scale"),
+    "worn_area_increment": (("half_cycle",), "mm2", "cross-section worn off in the half-cycle"),
+    "optimum_distance": (
+        ("half_cycle",),
+        "1",
+        "largest distance of a node's pressure to the optimal one, over the pressure scale: mostly at an edge",
+    ),
     "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the pressure scale"),
     "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),
+    "complementarity_error": (("half_cycle",), "1", "largest error of p >= 0, gap >= 0, p gap = 0 over their scales"),
     "retries": (("half_cycle",), "1", "solves that took a second attempt, in another way or in smaller steps"),
     "weight": (("half_cycle", "x"), "mm", "length that each contact node stands for, on the mesh of the half-cycle"),
 }
@@ -64,7 +69,7 @@ INTEGERS = ("half_cycle", "direction", "retries", "coupling_iterations")
 HEAT_VARIABLES = {
     "temperature_punch": (("half_cycle", "x"), "K", "temperature of the punch's contact surface at the end"),
     "temperature_strip": (("half_cycle", "x"), "K", "temperature of the strip's contact surface at the end"),
-    "max_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces"),
+    "max_temperature": (("half_cycle",), "K", "largest temperature of the contact surfaces at the end"),
     "coupling_iterations": (("half_cycle",), "1", "iterations of heat and contact"),
     "heat_balance_error": (("half_cycle",), "1", "missing heat over the largest term of the balance"),
 }
@@ -82,7 +87,7 @@ HEAT_TERMS = {
 # the same where the strip wears
 STRIP_VARIABLES = {
     "wear_strip": (("half_cycle", "x_strip"), "mm", "worn depth of the strip at the end of the half-cycle"),
-    "worn_area_strip": (("half_cycle",), "mm2", "cross-section worn off the strip in the half-cycle"),
+    "worn_area_increment_strip": (("half_cycle",), "mm2", "cross-section worn off the strip in the half-cycle"),
     "weight_strip": (
         ("half_cycle", "x_strip"),
         "mm",
@@ -95,8 +100,9 @@ STRIP_VARIABLES = {
 PROGRAM_VARIABLES = {
     "load": (("half_cycle",), "N", "normal force on the contact, the mean of the cycle"),
     "load_factor": (("half_cycle",), "1", "all loads over those of the case"),
-    "speed": (("half_cycle",), "mm s-1", "mean sliding speed; of a turning strip in rad s-1"),
+    "speed": (("half_cycle",), "mm s-1", "mean sliding speed"),
 }
+ANGULAR_SPEED = {"speed": (("half_cycle",), "rad s-1", "mean angular speed of the strip")}
 AMBIENT = {"ambient": (("half_cycle",), "K", "temperature of the surroundings")}
 
 
@@ -105,7 +111,8 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
     case = system.case
     variables = VARIABLES if case.wear.strip is None else {**VARIABLES, **STRIP_VARIABLES}
     if case.program is not None:
-        variables = {**variables, **PROGRAM_VARIABLES, **({} if case.heat is None else AMBIENT)}
+        turning = ANGULAR_SPEED if case.turns else {}
+        variables = {**variables, **PROGRAM_VARIABLES, **turning, **({} if case.heat is None else AMBIENT)}
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
@@ -123,13 +130,13 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
     text = "position along the contact, from the centre of the geometry"
     columns = {
         "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
-        "height": Column(("x",), pair.punch.x[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
+        "height": Column(("x",), pair.punch.unworn[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
     }
     if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
         columns["x_strip"] = Column(("x_strip",), pair.strip.x[:, 0], {"units": "mm", "long_name": along})
         unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
-        columns["height_strip"] = Column(("x_strip",), pair.strip.x[:, 1], unworn)
+        columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
     return columns
 
 
@@ -263,7 +270,7 @@ class HistoryWriter:
             if missing:
                 raise KeyError(missing[0])  # of an older version
         except (OSError, KeyError, RuntimeError):
-            message = "cannot be read; remove it to go on with a new one, which begins at the checkpoint"
+            message = "cannot be read, or is of another version; remove it to go on with a new one, from the checkpoint"
             raise CaseError(InputError(str(self.path), message)) from None
         self.rows = self._twin_rows = int(np.searchsorted(stored, half_cycle, side="right"))
         if self.rows < len(stored):

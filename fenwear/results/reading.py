@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,10 @@ from fenwear.results.history import HISTORY
 
 # What netCDF-4 keeps for itself in the attributes of a file and of its variables.
 INNER = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_NCProperties", "_Netcdf4Coordinates", "_Netcdf4Dimid"}
+OLDER = (
+    "of an older fenwear, in which worn_area and worn_volume were those of a half-cycle and not from the start; "
+    "expected the results of this version: run the case anew"
+)
 NO_VARIABLE = b"This is a netCDF dimension but not a netCDF variable"
 
 
@@ -21,13 +26,22 @@ def load_history(directory: Path) -> xarray.Dataset:
     """Return all of history.nc of a run, in memory.
 
     Raises:
-        CaseError: there is none, or it cannot be read.
+        CaseError: there is none, it cannot be read, or it is of a version whose names meant something else.
     """
     path = directory / HISTORY
     try:
-        return load(path)
+        history = load(path)
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
+    if is_older(history.variables):
+        raise CaseError(InputError(str(path), OLDER))
+    return history
+
+
+def is_older(names: Iterable[Hashable]) -> bool:
+    """Return whether the names of a history are those of a version in which worn volumes were of one half-cycle."""
+    worn = [str(name) for name in names if str(name).startswith(("worn_area", "worn_volume"))]
+    return bool(worn) and not any("_increment" in name for name in worn)
 
 
 def _unreadable(path: Path, error: Exception) -> CaseError:

@@ -2,10 +2,13 @@
 
 Depths belong to the shape, all else to what has been added up, see `fenwear.cycle.totals`:
 
-    specific wear rate   k = dV / (F ds), volume over load path, of the half-cycle (current) or from the start (mean);
-    normal force         F = integral of p cos(slope) over the contact, in the middle of the half-cycle, the slope
-                         of the surface against the sliding: along a worn scar the load, too;
-    friction force       work of friction in the half-cycle over its sliding distance.
+    normal force         F, the load: what the contact carries along the approach of the bodies, mean of the half-cycle;
+    pressure integral    of p over the contact, mean of the half-cycle: more than F where the contact is curved;
+    friction force       the resultant of friction, mean of the half-cycle;
+    friction torque      of a turning strip about its axis: work of friction over the angle;
+    specific wear rate   k = dV / (F ds), volume over load and sliding distance, of the half-cycle (current) or from
+                         the start (mean), as tribometers' sheets have it;
+    ... of the law       volume over the integral of p ds over the contact: beta~ where a = b = 1, on any surface.
 
 In the plane worn area is volume over thickness.
 """
@@ -21,41 +24,73 @@ from fenwear.arrays import Array
 from fenwear.assembly import Placed
 from fenwear.cycle import Block
 from fenwear.results.scar import scar_geometry
+from fenwear.results.zone import without_noise
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5": 0.05}  # of the largest depth, where widths are read, and how their names end
 WEAR_RATE = "mm3/(N m)"
-PLACES = 9  # of a place in mm: the middle is 0, not what rounding of a mesh leaves of it
+COLUMN = 12  # characters of a column of the printed sheet
 
 SLIDING: dict[str, Variable] = {
     "cycles": (("half_cycle",), "1", "cycles done"),
     "sliding_distance": (("half_cycle",), "mm", "sliding distance from the start, mean over the load"),
-    "normal_force": (("half_cycle",), "N", "normal force of the contact in the middle of the half-cycle"),
-    "friction_force": (("half_cycle",), "N", "friction force, mean over the half-cycle"),
+    "normal_force": (("half_cycle",), "N", "load: normal force of the contact, mean over the half-cycle"),
+    "pressure_integral": (
+        ("half_cycle",),
+        "N",
+        "integral of the pressure over the contact, mean over the half-cycle; more than the load on curved contacts",
+    ),
+    "friction_force": (("half_cycle",), "N", "friction force: resultant of friction, mean over the half-cycle"),
     "friction_work": (("half_cycle",), "mJ", "work of friction from the start"),
     "dissipated_energy": (("half_cycle", "x"), "mJ/mm2", "work of friction per area from the start"),
+    "pressure_sum": (
+        ("half_cycle", "x"),
+        "MPa",
+        "pressure added up over the half-cycles from the start: over their number the difference of two is the mean",
+    ),
+}
+TURNING: dict[str, Variable] = {
+    "friction_torque": (("half_cycle",), "N mm", "torque of friction about the axis, mean over the half-cycle"),
 }
 OF_A_BODY: dict[str, Variable] = {
-    "total_area": (("half_cycle",), "mm2", "cross-section worn off the {body} from the start"),
-    "total_volume": (("half_cycle",), "mm3", "volume worn off the {body} from the start"),
-    "total_mass": (("half_cycle",), "mg", "mass worn off the {body} from the start"),
-    "wear_rate": (("half_cycle",), WEAR_RATE, "specific wear rate of the {body} in the half-cycle"),
-    "mean_wear_rate": (("half_cycle",), WEAR_RATE, "specific wear rate of the {body} from the start"),
+    "worn_area": (("half_cycle",), "mm2", "cross-section worn off the {body} from the start"),
+    "worn_volume": (("half_cycle",), "mm3", "volume worn off the {body} from the start"),
+    "worn_mass": (("half_cycle",), "mg", "mass worn off the {body} from the start"),
+    "wear_rate": (
+        ("half_cycle",),
+        WEAR_RATE,
+        "specific wear rate of the {body} in the half-cycle, over load and sliding distance",
+    ),
+    "mean_wear_rate": (
+        ("half_cycle",),
+        WEAR_RATE,
+        "specific wear rate of the {body} from the start, over load and sliding distance",
+    ),
+    "law_wear_rate": (
+        ("half_cycle",),
+        WEAR_RATE,
+        "specific wear rate of the {body} in the half-cycle, over the sliding of the pressure: that of the law",
+    ),
+    "mean_law_wear_rate": (
+        ("half_cycle",),
+        WEAR_RATE,
+        "specific wear rate of the {body} from the start, over the sliding of the pressure: that of the law",
+    ),
     "max_wear": (("half_cycle",), "mm", "largest worn depth of the {body} at the end of the half-cycle"),
 }
 
 
 def variables(placed: Placed) -> dict[str, Variable]:
     """Return the variables of the sheet: of the bodies that wear, masses where a density is known."""
-    found, plane = dict(SLIDING), _is_plane(placed)
+    found, plane = {**SLIDING, **(TURNING if turns(placed) else {})}, _is_plane(placed)
     surfaces = (placed.pair.punch, placed.pair.strip)
     for (body, end), surface, law, density in zip(
         BODIES.items(), surfaces, placed.sliding.wear, placed.bodies.densities, strict=True
     ):
         if law is None:
             continue
-        missing = {"total_area": not plane, "total_mass": density is None}
+        missing = {"worn_area": not plane, "worn_mass": density is None}
         own = {name: variable for name, variable in OF_A_BODY.items() if not missing.get(name)}
         own |= of_the_scar(axes(placed), scar_geometry(placed, surface).names)
         found |= {f"{name}{end}": (over, unit, text.format(body=body)) for name, (over, unit, text) in own.items()}
@@ -95,24 +130,29 @@ def values(block: Block) -> dict[str, Array]:
     found = {
         "cycles": block.half_cycle / system.motion.half_cycles,
         "sliding_distance": totals.of("distance"),
-        "normal_force": thickness * (block.pressure * (system.pair.weights * _level(system))).sum(axis=1),
-        "friction_force": _over(adds.of("work"), adds.of("distance")),
+        "normal_force": _over(adds.of("load_distance"), adds.of("distance")),
+        "pressure_integral": thickness * (block.pressure * system.pair.weights).sum(axis=1),
+        "friction_force": _over(adds.of("drag_distance"), adds.of("distance")),
+        **({"friction_torque": _over(adds.of("work"), _angles(block))} if turns(system) else {}),
         "friction_work": totals.of("work"),
         "dissipated_energy": totals.energy,
+        "pressure_sum": totals.pressure,
     }
     depths = ((system.pair.punch, block.wear), (system.pair.strip, block.wear_strip))
     for (body, end), law, (surface, depth) in zip(BODIES.items(), system.sliding.wear, depths, strict=True):
         if law is None:
             continue
         volume = totals.of(f"volume_{body}")
-        deepest = np.round(surface.x[depth.argmax(axis=1)], PLACES) + 0.0
+        deepest = without_noise(surface.x[depth.argmax(axis=1)], surface.extent())
         geometry = scar_geometry(system, surface)
         own = {
-            "total_area": volume / thickness,
-            "total_volume": volume,
-            "total_mass": totals.of(f"mass_{body}"),
-            "wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
-            "mean_wear_rate": 1e3 * _over(volume, totals.of("load_path")),
+            "worn_area": volume / thickness,
+            "worn_volume": volume,
+            "worn_mass": totals.of(f"mass_{body}"),
+            "wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_distance")),
+            "mean_wear_rate": 1e3 * _over(volume, totals.of("load_distance")),
+            "law_wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
+            "mean_law_wear_rate": 1e3 * _over(volume, totals.of("load_path")),
             "max_wear": depth.max(axis=1),
             **{f"max_wear_{axis}": deepest[:, k] for k, axis in enumerate(axes(system))},
             **{
@@ -125,11 +165,16 @@ def values(block: Block) -> dict[str, Array]:
     return found
 
 
-def _level(system: Placed) -> Array:
-    """Return the cosine of the slope of the contact surface against the sliding (n,); 1 where nothing slides."""
-    pair, field = system.pair, system.sliding.field
-    speed = np.linalg.norm(field.velocity(pair.opposite), axis=1)
-    return _over(field.rate(pair.opposite, pair.normal), speed, 1.0)
+def turns(placed: Placed) -> bool:
+    """Return whether the strip turns, so that friction has a torque."""
+    return any(placed.sliding.field.turn)
+
+
+def _angles(block: Block) -> Array:
+    """Return the angle of each half-cycle (k,), rad."""
+    motion = block.system.motion
+    each = np.array([phase.distance for phase in motion.phases]).reshape(motion.half_cycles, -1).sum(axis=1)
+    return np.asarray(each[(block.half_cycle - 1) % motion.half_cycles])
 
 
 def _over(above: Array, below: Array, otherwise: float = np.nan) -> Array:
@@ -150,16 +195,26 @@ LINES = {
     "cycles": Line("cycles", ""),
     "time_s": Line("time", "s"),
     "sliding_distance_mm": Line("sliding distance", "m", 1e-3),
-    "normal_force_N": Line("normal force", "N"),
+    "normal_force_N": Line("load (normal force)", "N"),
+    "pressure_integral_N": Line("integral of the pressure", "N"),
     "friction_force_N": Line("friction force", "N"),
+    "friction_torque_N_mm": Line("friction torque", "N m", 1e-3),
     "friction_coefficient": Line("friction coefficient, mean", ""),
+    "friction_over_load": Line("work of friction over load and distance", ""),
     "friction_work_mJ": Line("work of friction", "J", 1e-3),
     "largest_energy_mJ_per_mm2": Line("dissipated energy per area, largest", "J/mm²", 1e-3),
+    **{
+        f"{name}_{unit}": Line(f"largest temperature {when}", shown)
+        for unit, shown in (("K", "K"), ("degC", "°C"))
+        for name, when in (("max_temperature", "at the end"), ("largest_temperature", "over the run"))
+    },
     "worn_area_mm2": Line("worn area", "mm²"),
     "worn_volume_mm3": Line("worn volume", "mm³"),
     "worn_mass_mg": Line("worn mass", "mg"),
     "mean_wear_rate_mm3_per_N_m": Line("specific wear rate, mean", "mm³/(N m)"),
     "wear_rate_mm3_per_N_m": Line("specific wear rate, last", "mm³/(N m)"),
+    "mean_law_wear_rate_mm3_per_N_m": Line("... of the law, mean", "mm³/(N m)"),
+    "law_wear_rate_mm3_per_N_m": Line("... of the law, last", "mm³/(N m)"),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
     **{f"at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
     **{
@@ -168,12 +223,24 @@ LINES = {
         for share in SHARES.values()
     },
 }
+OF_CONTACT = {
+    "max_pressure_MPa": Line("largest pressure", "MPa"),
+    **{f"max_pressure_at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
+    "pressure_beside_max_MPa": Line("mean of the nodes beside it", "MPa"),
+    "contact_width_mm": Line("width in contact", "mm"),
+    "contact_area_mm2": Line("area in contact", "mm²"),
+    "nodes_across_contact": Line("nodes across the contact", ""),
+    "nodes_along_sliding": Line("nodes across it, along the sliding", ""),
+    "nodes_across_sliding": Line("... across the sliding", ""),
+}
 OF_SUMMARY = {
-    "worn_area_mm2": "total_area",
-    "worn_volume_mm3": "total_volume",
-    "worn_mass_mg": "total_mass",
+    "worn_area_mm2": "worn_area",
+    "worn_volume_mm3": "worn_volume",
+    "worn_mass_mg": "worn_mass",
     "mean_wear_rate_mm3_per_N_m": "mean_wear_rate",
     "wear_rate_mm3_per_N_m": "wear_rate",
+    "mean_law_wear_rate_mm3_per_N_m": "mean_law_wear_rate",
+    "law_wear_rate_mm3_per_N_m": "law_wear_rate",
     "largest_depth_mm": "max_wear",
     **{f"at_{axis}_mm": f"max_wear_{axis}" for axis in "rxyz"},
     **{
@@ -187,7 +254,7 @@ OF_SUMMARY = {
 def sheet(last: Block) -> dict[str, Any]:
     """Return the sheet at the end of a run, for summary.json: of the sliding, and of each body that wears."""
     known, row = variables(last.system), {name: value[-1] for name, value in values(last).items()}
-    path = float(last.totals.of("load_path")[-1]) or np.nan
+    path, carried = (float(last.totals.of(name)[-1]) or np.nan for name in ("load_path", "load_distance"))
     found: dict[str, Any] = {
         "sliding": {
             "half_cycles": int(last.half_cycle[-1]),
@@ -195,8 +262,11 @@ def sheet(last: Block) -> dict[str, Any]:
             "time_s": float(last.time[-1]),
             "sliding_distance_mm": float(row["sliding_distance"]),
             "normal_force_N": float(row["normal_force"]),
+            "pressure_integral_N": float(row["pressure_integral"]),
             "friction_force_N": float(row["friction_force"]),
+            **({"friction_torque_N_mm": float(row["friction_torque"])} if turns(last.system) else {}),
             "friction_coefficient": float(row["friction_work"]) / path,
+            "friction_over_load": float(row["friction_work"]) / carried,
             "friction_work_mJ": float(row["friction_work"]),
             "largest_energy_mJ_per_mm2": float(row["dissipated_energy"].max()),
         }
@@ -217,7 +287,7 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
     bodies = [summary[body] for body in BODIES if body in summary]
     rows = []
     for key, line in LINES.items():
-        found = [summary.get("sliding", {})] if key in summary.get("sliding", {}) else bodies
+        found = next(([one] for one in (summary.get("sliding", {}), summary) if key in one), bodies)
         if any(key in one for one in found):
             rows.append((line.label, line.unit, [shown(one.get(key), line) for one in found]))
     return rows
@@ -232,14 +302,21 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
     """Return the sheet of a summary as lines for people."""
     rows = sheet_rows(summary)
     bodies = [body for body in BODIES if body in summary]
-    labels = [f"{label} ({unit})" if unit else label for label, unit, _ in rows]
+    ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "max_pressure_MPa" in one]
+    contact = [
+        (line.label, line.unit, [shown(summary[way].get(key), line) for way in ways])
+        for key, line in OF_CONTACT.items()
+        if any(key in summary[way] for way in ways)
+    ]
+    labels = [f"{label} ({unit})" if unit else label for label, unit, _ in (*rows, *contact)]
     wide = max(map(len, labels), default=0)
     lines = []
-    for label, (_, _, row) in zip(labels, rows, strict=True):
-        lines.append(f"{label:{wide}}" + "".join(f"  {_number(value):>12}" for value in row))
-    first = next((k for k, label in enumerate(labels) if label.startswith("worn ")), len(lines))
-    head = " " * wide + "".join(f"  {body:>12}" for body in bodies)
-    return "\n".join([*lines[:first], head, *lines[first:]])
+    for label, (_, _, row) in zip(labels, (*rows, *contact), strict=True):
+        lines.append(f"{label:{wide}}" + "".join(f"  {_number(value):>{COLUMN}}" for value in row))
+    first = next((k for k, label in enumerate(labels) if label.startswith("worn ")), len(rows))
+    heads = [" " * wide + "".join(f"  {name:>{COLUMN}}" for name in names) for names in (bodies, ways)]
+    told = [*lines[:first], heads[0], *lines[first : len(rows)]]
+    return "\n".join([*told, heads[1], *lines[len(rows) :]] if contact else told)
 
 
 def _number(value: float | None) -> str:

@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Placed, Tribosystem
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
 from fenwear.results import sheet
 from fenwear.results.degrees import degrees_of
 from fenwear.results.scar import conforming
+from fenwear.results.zone import ContactNet, contact_net, without_noise
 from fenwear.versions import versions
+
+HOTTEST = "largest_temperature"  # over a run; at its end it is max_temperature
 
 
 def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run: dict[str, Any]) -> dict[str, Any]:
@@ -21,7 +24,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
 
     Args:
         last: The last block.
-        extremes: Largest errors over all half-cycles.
+        extremes: What was largest over all half-cycles: errors, and the temperature in K; and numbers of the run.
         run: How the run went: stop, times, warnings.
     """
     plane = system.case.model.kind == "plane"
@@ -31,9 +34,9 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **run,
         **sheet.sheet(last),
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
-        **({} if last.heat is None else _heat_summary(system, last)),
+        **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
         "periodicity": float(last.periodicity[-1]),
-        **extremes,
+        **{name: value for name, value in extremes.items() if name != HOTTEST},
         "contact_nodes": len(system.pair.x),
         "degrees_of_freedom": system.bodies.unknowns,
         "ranks": system.comm.size,
@@ -41,15 +44,21 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
     }
 
 
+def net_of(placed: Placed) -> ContactNet:
+    """Return the nodes of a contact and the facets between them."""
+    return contact_net(placed.pair, placed.sliding.field, sheet.axes(placed))
+
+
 def _places(system: Tribosystem) -> NDArray[np.float64]:
     """Return three places along a contact that is a line, mm."""
     x = system.pair.x
     places = (x[-1] + x[0]) / 2 + (x[-1] - x[0]) * np.array([-0.25, 0.0, 0.25])
-    return np.round(places, sheet.PLACES) + 0.0  # the middle is 0, not what rounding of a mesh leaves of it
+    return without_noise(places, float(np.ptp(x)))
 
 
 def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     pair, places, phases = system.pair, _places(system), system.motion.half_cycles
+    net = net_of(system)
     return {
         "mean_pressure_MPa": system.rigid.mean_pressure,
         "x_mm": places.tolist(),
@@ -59,6 +68,7 @@ def _plane_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
                 "half_cycle": int(last.half_cycle[-phases:][i]),
                 "max_pressure_MPa": float(last.max_pressure[-phases:][i]),
                 "pressure_MPa": pair.interpolate(last.pressure[-phases:][i], places).tolist(),
+                **net.numbers(last.pressure[-phases:][i]),
                 "contact_width_mm": float(last.contact_width[-phases:][i]),
             }
             for i, d in enumerate(last.direction[-phases:])
@@ -72,7 +82,7 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     The mean pressure is that over what is in contact; over the nominal contact only where the surfaces lie on each
     other before they wear.
     """
-    pair, phases = system.pair, system.motion.half_cycles
+    pair, phases, net = system.pair, system.motion.half_cycles, net_of(system)
     mean = {"mean_pressure_MPa": system.rigid.mean_pressure} if conforming(pair) else {}
     cycle = slice(-phases, None)
     rows = zip(
@@ -85,6 +95,7 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
                 "half_cycle": int(number),
                 "max_pressure_MPa": float(pressure.max()),
                 "mean_pressure_MPa": float(pair.weights @ pressure / max(area, 1e-300)),
+                **net.numbers(np.asarray(pressure)),
                 "contact_area_mm2": float(area),
             }
             for d, number, pressure, area in rows
@@ -92,7 +103,7 @@ def _surface_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
     }
 
 
-def _heat_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
+def _heat_summary(system: Tribosystem, last: Block, hottest: float) -> dict[str, Any]:
     assert last.heat is not None
     heat, along, degrees = last.heat, {}, degrees_of(system.case)
     if system.case.model.kind == "plane":
@@ -101,8 +112,19 @@ def _heat_summary(system: Tribosystem, last: Block) -> dict[str, Any]:
             f"temperature_punch_{degrees.unit}": degrees.of(interpolate(heat.temperature_punch[-1], places)).tolist(),
             f"temperature_strip_{degrees.unit}": degrees.of(interpolate(heat.temperature_strip[-1], places)).tolist(),
         }
+    fineness = None if system.exchange is None else system.exchange.fineness
+    told: dict[str, Any] = {}
+    if fineness is not None:
+        numbers = {
+            "heat_steps": fineness.steps,
+            "heat_change_by_halving_steps": fineness.change,
+            "heat_difference_from_whole_mesh": fineness.difference,
+        }
+        told = {name: value for name, value in numbers.items() if value is not None}
     return {
+        **told,
         f"max_temperature_{degrees.unit}": float(heat.max_temperature[-1]) - degrees.zero,
+        f"{HOTTEST}_{degrees.unit}": hottest - degrees.zero,
         **along,
         "heat_mJ": dict(zip(TERMS, heat.terms[-1].tolist(), strict=True)),
     }

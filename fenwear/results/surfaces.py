@@ -38,8 +38,8 @@ class Column(NamedTuple):
 # name in a plane model: name and meaning in a solid
 RENAMED = {
     "contact_width": ("contact_area", "mm2", "area in contact"),
-    "worn_area": ("worn_volume", "mm3", "volume worn off the punch in the half-cycle"),
-    "worn_area_strip": ("worn_volume_strip", "mm3", "volume worn off the strip in the half-cycle"),
+    "worn_area_increment": ("worn_volume_increment", "mm3", "volume worn off the punch in the half-cycle"),
+    "worn_area_increment_strip": ("worn_volume_increment_strip", "mm3", "volume worn off the strip in the half-cycle"),
     "weight": ("weight", "mm2", "area that each contact node stands for, on the mesh of the half-cycle"),
     "weight_strip": ("weight_strip", "mm2", "area that each node stands for, on the mesh of the half-cycle"),
     "direction": (
@@ -102,7 +102,9 @@ def _columns(chart: SlidingChart, surface: ContactSurface, end: str) -> dict[str
     node, facet, corner = f"node{end}", f"facet{end}", f"corner{end}"
     names = coordinate_names(end, surface.dim)
     columns = {
-        name: Column((node,), surface.x[:, k], {"units": "mm", "long_name": f"{name[0]} of the {surface.body}'s nodes"})
+        name: Column(
+            (node,), surface.unworn[:, k], {"units": "mm", "long_name": f"{name[0]} of the {surface.body}'s nodes"}
+        )
         for k, name in enumerate(names)
     }
     if surface.dim == 3:

@@ -122,6 +122,7 @@ class Motion:
     positions: int
     half_cycles: int
     _strokes: tuple[_Stroke, ...]
+    _starts: tuple[float, ...]  # offset of the strip at the start of each stroke
 
     @property
     def directions(self) -> tuple[int, ...]:
@@ -192,6 +193,17 @@ class Motion:
             rows.append(speeds.reshape(self.positions, steps))
         return np.concatenate(rows)
 
+    def offsets(self, steps: int) -> Array:
+        """Return where the strip is at the ends of equal steps of each phase (phases, steps + 1), mm or rad."""
+        rows = []
+        directions = self.stroke_directions
+        for stroke, start, direction in zip(self._strokes, self._starts, directions, strict=True):
+            edges = _edges(stroke, self.positions * steps)
+            slid = np.array([_power(stroke, 0.0, edge, 1.0) for edge in edges])
+            places = np.round(start + direction * slid, 12)  # the same on the way there and back
+            rows += [places[k * steps : (k + 1) * steps + 1] for k in range(self.positions)]
+        return np.array(rows)
+
 
 def make_motion(description: Motions, *, strip_wears: bool = False) -> Motion:
     """Return the motion that the case describes.
@@ -242,7 +254,8 @@ def _motion(strokes: tuple[tuple[int, float, _Stroke], ...], positions: int) -> 
             offset = round(offset, 12)  # the same on the way there and back
             phases.append(Phase(direction, offset, high - low, distance, (begin + (low + high) / 2) / period))
         begin += stroke.duration
-    return Motion(tuple(phases), positions, len(strokes), tuple(stroke for _, _, stroke in strokes))
+    starts = tuple(start for _, start, _ in strokes)
+    return Motion(tuple(phases), positions, len(strokes), tuple(stroke for _, _, stroke in strokes), starts)
 
 
 def _to_and_fro(description: Reciprocating | Oscillation) -> _Stroke:

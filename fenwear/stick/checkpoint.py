@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import zipfile
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -20,8 +21,8 @@ from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
 from fenwear.results.checkpoint import (
     ARRAYS,
-    CASE,
     NEW,
+    begin,
     check_case,
     damaged,
     find,
@@ -37,7 +38,7 @@ from fenwear.stick.jump import Cycle
 ROOT = "cycle"
 
 
-def save(directory: Path, case: Case, rig: Rig, cycle: Cycle) -> None:
+def save(directory: Path, case: Case, rig: Rig, cycle: Cycle, extremes: Mapping[str, float]) -> None:
     """Replace the checkpoint of a run; collective. A kill at any moment leaves the old or the new one.
 
     Temperatures are written as functions on the meshes: bases are not the same on any number of ranks.
@@ -47,7 +48,7 @@ def save(directory: Path, case: Case, rig: Rig, cycle: Cycle) -> None:
     """
     comm = meshed(rig.interface).bodies.comm
     try:
-        on_root(comm, lambda: _begin(directory / NEW, case, cycle))
+        on_root(comm, lambda: _begin(directory / NEW, case, cycle, extremes))
         if rig.heat is not None:
             for name, values in (("end", cycle.end.temperature), ("warm", cycle.warm)):
                 if values is not None:
@@ -60,14 +61,12 @@ def save(directory: Path, case: Case, rig: Rig, cycle: Cycle) -> None:
     on_root(comm, lambda: swap(directory))
 
 
-def _begin(new: Path, case: Case, cycle: Cycle) -> None:
+def _begin(new: Path, case: Case, cycle: Cycle, extremes: Mapping[str, float]) -> None:
     arrays = dict[str, Any]()
     _pack(cycle, ROOT, arrays)
     check_room(new.parent, sum(values.nbytes + 512 for values in arrays.values()))
     with writing(new):
-        shutil.rmtree(new, ignore_errors=True)
-        new.mkdir()
-        (new / CASE).write_text(case.to_toml(), "utf-8")
+        begin(new, case, extremes)
         with (new / ARRAYS).open("wb") as file:
             np.savez(file, **arrays)
             file.flush()

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from fenwear.arrays import Array
 from fenwear.assembly import Bodies, body_lines
 from fenwear.case import Case
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
@@ -14,8 +15,10 @@ from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import fine_enough
 from fenwear.stick.interface import meshed
+from fenwear.stick.results import net_of
 from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
+from fenwear.watch.few import few_text
 from fenwear.watch.size import size_warnings
 
 
@@ -44,7 +47,8 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
     regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
     if stuck == closed:
         regime = "full stick"
-    warnings = (*sizes, fineness.text(), unique_text(records.unique.astype(bool)))
+    few = few_text(case, net_of(rig), records.pressure[0], "at the start")
+    warnings = (*sizes, fineness.text(), unique_text(records.unique.astype(bool)), few)
     return (
         f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
@@ -77,11 +81,14 @@ def final_of(case: Case, *, fresh: bool = False, bodies: Bodies | None = None) -
     names = ("stick_area_mm2", "worn_volume_mm3") if solid else ("stick_width_mm", "worn_area_mm2")
     places = {a: pair.punch.x[:, k].tolist() for k, a in enumerate("xyz")} if solid else {"x": pair.x.tolist()}
     numbers = {
-        names[0]: float(weights @ found.stick),
+        names[0]: found.size,
+        names[0].replace("_mm", "_within_mm"): found.within,
         "scar_from_mm": float(scar.min()) if len(scar) else None,
         "scar_to_mm": float(scar.max()) if len(scar) else None,
         "largest_depth_mm": float(found.depth.max()),
+        "largest_depth_between_mm": found.deepest,
         names[1]: float(weights @ found.depth),
+        names[1].replace("_mm", "_between_mm"): found.volume,
         "max_pressure_MPa": float(found.pressure.max()),
         **places,
         "pressure": found.pressure.tolist(),
@@ -101,14 +108,27 @@ def final_text(numbers: dict[str, Any]) -> str:
     if numbers["scar_from_mm"] is not None:
         axis = "along the sliding" if solid else "x ="
         scar = f"scar from {axis} {numbers['scar_from_mm']:.4g} to {numbers['scar_to_mm']:.4g} mm"
-    stick = f"of {numbers['stick_area_mm2']:.4g} mm²" if solid else f"{numbers['stick_width_mm']:.4g} mm wide"
-    worn = f"{numbers['worn_volume_mm3']:.4g} mm³" if solid else f"{numbers['worn_area_mm2']:.4g} mm²"
+    size, unit = ("stick_area", "mm²") if solid else ("stick_width", "mm")
+    plain = unit.replace("²", "2")
+    stick = f"{numbers[f'{size}_{plain}']:.4g} ± {numbers[f'{size}_within_{plain}']:.1g} {unit}"
+    stick = f"of {stick}" if solid else f"{stick} wide"
+    what, unit = ("worn_volume", "mm3") if solid else ("worn_area", "mm2")
+    depth = _between(1e3 * numbers["largest_depth_mm"], 1e3 * np.array(numbers["largest_depth_between_mm"]))
+    worn = _between(numbers[f"{what}_{unit}"], np.array(numbers[f"{what}_between_{unit}"]))
     return (
         f"  the stick zone, {stick}, carries all of the load in the end\n"
-        f"  {scar}, {1e3 * numbers['largest_depth_mm']:.4g} µm deep in both bodies together, {worn}\n"
+        f"  {scar}, {depth} µm deep in both bodies together, {worn} {'mm³' if solid else 'mm²'}:\n"
+        "  as far as the nodes tell where the stick zone ends\n"
         f"  largest pressure {numbers['max_pressure_MPa']:.4g} MPa, at the edges of the stick zone: as high as nodes "
         "are near to them" + _warm_text(numbers)
     )
+
+
+def _between(value: float, ends: Array) -> str:
+    """Return a number with no more digits than the interval lets it have, and the interval."""
+    open_by = float(np.ptp(ends)) / max(abs(value), 1e-300)
+    digits = 1 + int(np.clip(np.ceil(-np.log10(max(open_by, 1e-3))), 1, 3))
+    return f"{value:.{digits}g} ({ends[0]:.{digits}g} to {ends[1]:.{digits}g})"
 
 
 def _warm_text(numbers: dict[str, Any]) -> str:

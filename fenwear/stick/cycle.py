@@ -83,6 +83,16 @@ class Records:
         """Which nodes carry pressure and have not slipped (k, n)."""
         return (self.pressure > 0) & (self.slid == 0)
 
+    @property
+    def stuck(self) -> Mask:
+        """Which nodes stick in all steps (n,)."""
+        return np.asarray(self.sticking.all(axis=0))
+
+    @property
+    def touched(self) -> Mask:
+        """Which nodes carry pressure in any step (n,)."""
+        return np.asarray((self.pressure > 0).any(axis=0))
+
     def energy(self, weights: Array) -> float:
         """Return what friction has dissipated, N in the plane and N mm in a solid."""
         return float(self.dissipated.sum(axis=0) @ weights)
@@ -281,14 +291,17 @@ class Rig:
         return self.led(partial(self._half_cycle, at))
 
     def _half_cycle(self, at: RigState) -> tuple[RigState, Records]:
-        steps, parts = self.program.steps, []
+        steps, parts, begin = self.program.steps, [], at
         number = steps[at.next_step].half_cycle
         while steps[at.next_step].half_cycle == number:
             at, record = self.step(at, steps[at.next_step])
             parts.append(record)
             if at.next_step == 0:
                 break
-        return at, Records.joined(parts)
+        records = Records.joined(parts)
+        if self.heat is not None and begin.temperature is not None and at.temperature is not None:
+            self.heat.check_bounds(begin.temperature, at.temperature, records.heat)
+        return at, records
 
     def cycle(self, at: RigState) -> tuple[RigState, list[Records]]:
         """Return the state a cycle later and the records of its half-cycles; the shape stays; collective."""

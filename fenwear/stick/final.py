@@ -8,21 +8,30 @@ the stick zone only,
 
     p >= 0, gap >= 0, p gap = 0 in the stick zone;    p = 0, depth = max(0, -gap) outside of it.
 
+A percent of the zone's width is ten of the depth, so that a zone of whole nodes would not do. In the plane its edges
+are located within their elements (`edge`). A zone of nodes has an edge, too, which is that of a flat punch by the
+surface beside it: the shape of the located zone lies between those of the two zones of nodes whose edges are on either
+side, in equilibrium as they are. What is left of the interval of each edge is told.
+
 Where nothing slips under pressure friction makes no heat. So in the end both bodies are as warm as held temperatures
 and surroundings make them, and the shape is that of bodies of these temperatures.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
+import scipy.optimize
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.edge import Edge, beside, stick_edges, zone_width
 from fenwear.stick.heat import Course
 
 FAR = 1e3  # times the largest gap: never closes
@@ -34,12 +43,16 @@ class FinalShape:
     """The end of partial-slip wear.
 
     Attributes:
-        stick: The zone that carries the load (n,).
+        stick: The nodes within the zone that carries the load (n,).
         pressure: At the end of a cycle (n,), MPa.
         depth: Worn off both bodies together (n,), mm.
         gap: Beside the scar (n,), mm.
         worn: The depth shared between the bodies by their wear rates.
         pressures: In each time step of a cycle (k, n), MPa.
+        size: Of the stick zone, mm; in a solid mm².
+        deepest, volume: Largest depth, mm, and worn area, mm², in a solid volume, mm³, with the stick zone as large and
+            as small as it may be; None where it was given as nodes.
+        within: Half the interval that is left of the size.
         temperature: Of the contact surfaces of punch and strip (2, n), K; None without heat.
     """
 
@@ -49,6 +62,10 @@ class FinalShape:
     gap: Array
     worn: Worn
     pressures: Array
+    size: float
+    deepest: tuple[float, float] | None = None
+    volume: tuple[float, float] | None = None
+    within: float = 0.0
     temperature: Array | None = None
 
 
@@ -61,20 +78,35 @@ def stick_zone(rig: Rig) -> Mask:
     Raises:
         ConvergenceError: a time step did not converge.
     """
+    return rig.led(lambda: _second_cycle(rig).stuck)
 
-    def found() -> Mask:
-        settled, _ = rig.cycle(rig.beginning())
-        return np.asarray(Records.joined(rig.cycle(settled)[1]).sticking.all(axis=0))
+
+def stick_zone_edges(rig: Rig) -> list[Edge]:
+    """Return the ends of the stick zones of a plane contact in the second cycle without wear; collective.
+
+    Raises:
+        ConvergenceError: a time step did not converge.
+    """
+
+    def found() -> list[Edge]:
+        records = _second_cycle(rig)
+        return stick_edges(rig.interface.middle.pair.x, records.stuck, records.slid.sum(axis=0), records.touched)
 
     return rig.led(found)
 
 
-def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
+def _second_cycle(rig: Rig) -> Records:
+    settled, _ = rig.cycle(rig.beginning())
+    return Records.joined(rig.cycle(settled)[1])
+
+
+def final_shape(rig: Rig, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
     """Return the shape to which partial slip wears; collective. With heat it and its temperatures go together.
 
     Args:
         rig: The bodies and what is done to them.
-        stick: The zone that never slips (n,); by default that of the second cycle, see `stick_zone`.
+        stick: The zone that never slips, as nodes (n,) or, in the plane, by its two ends; by default that of the second
+            cycle, see `stick_zone`.
 
     Raises:
         ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
@@ -83,7 +115,7 @@ def final_shape(rig: Rig, stick: Mask | None = None) -> FinalShape:
     return rig.led(partial(_with_heat, rig, stick))
 
 
-def _with_heat(rig: Rig, stick: Mask | None) -> FinalShape:
+def _with_heat(rig: Rig, stick: Mask | Sequence[Edge] | None) -> FinalShape:
     heat = rig.heat
     if heat is None:
         return _final_shape(rig, stick)
@@ -100,9 +132,137 @@ def _with_heat(rig: Rig, stick: Mask | None) -> FinalShape:
     raise ConvergenceError(f"contact and temperatures of the end did not come together in {MOST_TIMES} times")
 
 
-def _final_shape(rig: Rig, stick: Mask | None) -> FinalShape:
+def _final_shape(rig: Rig, stick: Mask | Sequence[Edge] | None) -> FinalShape:
     """Return the shape of bodies whose temperatures stay."""
-    zone = stick_zone(rig) if stick is None else stick
+    if isinstance(stick, np.ndarray):
+        return _of_nodes(rig, stick)
+    if stick is None and rig.interface.middle.pair.punch.dim == 3:
+        return _of_surface(rig, stick_zone(rig))
+    edges = stick_zone_edges(rig) if stick is None else stick
+    found = _of_edges(rig, edges) if len(edges) == 2 else None
+    if found is not None:
+        return found
+    zone = np.zeros(len(rig.weights), dtype=bool)
+    for left, right in zip(edges[::2], edges[1::2], strict=True):
+        zone[left.node : right.node + 1] = True
+    return _of_surface(rig, zone)
+
+
+def _of_nodes(rig: Rig, zone: Mask) -> FinalShape:
+    """Return the shape with a zone of whole nodes."""
+    return _shape(rig, zone, _carried(rig, zone), float(rig.weights @ zone))
+
+
+def _of_surface(rig: Rig, zone: Mask) -> FinalShape:
+    """Return the shape with a zone of whole nodes, and what it is with those beside its edge and without its own."""
+    found, surface = _of_nodes(rig, zone), rig.interface.middle.pair.punch
+    wider, rim = beside(surface, zone), beside(surface, ~zone)
+    inner = zone & ~rim
+    other = [_of_nodes(rig, one) if one.any() else found for one in (zone | wider, inner)]
+    deepest, volume = _ranges(rig, [one.depth for one in other])
+    return replace(found, deepest=deepest, volume=volume, within=float(rig.weights @ wider) / 2)
+
+
+def _of_edges(rig: Rig, edges: Sequence[Edge]) -> FinalShape | None:
+    """Return the shape with a zone between two located ends; None where what is beside it does not tell them."""
+    x = rig.interface.middle.pair.x
+
+    @lru_cache
+    def between(left: int, right: int) -> tuple[Array, Array]:
+        zone = np.zeros(len(x), dtype=bool)
+        zone[left : right + 1] = True
+        return _carried(rig, zone)
+
+    nodes = [edge.node for edge in edges]
+    pairs, ends = list[tuple[int, int]](), list[tuple[float, float]]()
+    for k, edge in enumerate(edges):
+
+        def end(node: int, k: int = k, edge: Edge = edge) -> float | None:
+            own = [*nodes[:k], node, *nodes[k + 1 :]]
+            if own[0] >= own[1] or not 0 <= node < len(x):
+                return None
+            return _end_of_nodes(rig, own[0], own[1], edge.side)
+
+        here = end(edge.node)
+        if here is None:
+            return None
+        other = edge.node + (edge.side if edge.side * (edge.x - here) > 0 else -edge.side)
+        there = end(other)
+        if there is None or there == here:
+            return None
+        pairs.append((edge.node, other))
+        ends.append((here, there))
+
+    def blended(shift: float) -> tuple[Array, Array]:
+        """Return pressures and gaps with both ends moved out by a share of what is left of their intervals."""
+        shares = [
+            (edge.x + edge.side * shift * edge.within - here) / (there - here)
+            for edge, (here, there) in zip(edges, ends, strict=True)
+        ]
+        pressures, gap = (np.zeros_like(part) for part in between(nodes[0], nodes[1]))
+        for which in itertools.product((0, 1), repeat=2):
+            weight = float(np.prod([share if w else 1 - share for w, share in zip(which, shares, strict=True)]))
+            parts = between(pairs[0][which[0]], pairs[1][which[1]])
+            pressures, gap = pressures + weight * parts[0], gap + weight * parts[1]
+        return pressures, gap
+
+    width, within = zone_width(edges)
+    zone = np.asarray((x > edges[0].x) & (x < edges[1].x))
+    found = _shape(rig, zone, blended(0.0), width)
+    deepest, volume = _ranges(rig, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)])
+    return replace(found, deepest=deepest, volume=volume, within=within)
+
+
+def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
+    """Return where the contact of a zone of nodes ends, mm; None where too few nodes are beside it.
+
+    Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
+    edge c follow from the second and third node. The first one carries what the discrete edge makes of it.
+    """
+    position = rig.interface.middle
+    x, n, zone = position.pair.x, len(rig.weights), np.arange(first, last + 1)
+    places = (last if side > 0 else first) + side * np.array([2, 3])
+    if places.min() < 0 or places.max() >= n:
+        return None
+    r, k = position.modes.shape[1], len(zone)
+    scale = float(np.median(position.compliance.diagonal()[:n]))
+    system, load = np.zeros((k + r, k + r)), np.zeros(k + r)
+    system[:k, :k] = position.compliance[np.ix_(zone, zone)] / scale
+    system[:k, k:], system[k:, :k] = position.modes[zone], position.balance[:, zone]
+    load[k:] = -rig.interface.loaded(None).resultant
+    if not load.any():
+        return None
+    found = np.linalg.solve(system, load)
+    beside = position.compliance[np.ix_(places, zone)] / scale @ found[:k] + position.modes[places] @ found[k:]
+    near, far = -beside
+    middle = (x[first] + x[last]) / 2
+    distance, away = np.abs(x[places] - middle)
+    if not 0 < near < far:
+        return None
+
+    def missing(inverse: float) -> float:
+        return float(distance * np.cosh(far * inverse) - away * np.cosh(near * inverse))
+
+    most = 1 / far
+    while missing(most) < 0:
+        most *= 2
+    edge = distance / np.cosh(near * scipy.optimize.brentq(missing, 0, most))
+    return float(middle + side * edge)
+
+
+def _ranges(rig: Rig, depths: Sequence[Array]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the largest depths and the worn volumes of two shapes, the smaller first."""
+    deepest = sorted(float(depth.max()) for depth in depths)
+    volume = sorted(float(rig.weights @ depth) for depth in depths)
+    return (deepest[0], deepest[1]), (volume[0], volume[1])
+
+
+def _carried(rig: Rig, zone: Mask) -> tuple[Array, Array]:
+    """Return pressures (k, n) and least gap (n,) of a cycle with contact in a zone only; negative where they overlap.
+
+    Raises:
+        ConvergenceError: the zone is empty; a time step did not converge.
+    """
     if not zone.any():
         raise ConvergenceError(
             "no final shape exists: every node slips in a cycle, so that wear goes on for ever; expected a smaller "
@@ -111,12 +271,17 @@ def _final_shape(rig: Rig, stick: Mask | None) -> FinalShape:
     unworn = rig.unworn()
     gap = rig.opening(rig.interface.middle, unworn)
     far = FAR * (np.abs(gap).max() + float(np.abs(rig.interface.middle.compliance.diagonal()).max()))
-    at = rig.beginning(Worn(np.where(zone, 0.0, far), unworn.strip))
-    records = Records.joined(rig.cycle(at)[1])
-    found = records.gap.min(axis=0) - np.where(zone, 0.0, far)
-    depth = np.where(zone, 0.0, np.maximum(-found, 0.0))
+    opened = np.where(zone, 0.0, far)
+    records = Records.joined(rig.cycle(rig.beginning(Worn(opened, unworn.strip)))[1])
+    return records.pressure, np.asarray(records.gap.min(axis=0) - opened)
+
+
+def _shape(rig: Rig, zone: Mask, carried: tuple[Array, Array], size: float) -> FinalShape:
+    """Return the shape of a zone, from the pressures and the least gap of a cycle."""
+    pressures, gap = carried
+    depth = np.maximum(-gap, 0.0)
     rates = [0.0 if law is None else float(law.rate.mean()) for law in (rig.wear.punch, rig.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
     strip = rig.interface.middle.pair.deposit @ ((1 - share) * depth)
     worn = Worn(share * depth, strip)
-    return FinalShape(zone, records.pressure[-1], depth, np.maximum(found, 0.0), worn, records.pressure)
+    return FinalShape(zone, pressures[-1], depth, np.maximum(gap, 0.0), worn, pressures, size)

@@ -23,6 +23,7 @@ from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import ReducedBasis
+from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.sliding.motion import make_motion
 from fenwear.stick.interface import Loaded, StickInterface
@@ -64,11 +65,18 @@ class StickHeat:
         exchange: With a phase for each time step; takes heat in place of pressures.
         expansions: Of the punch and of the strip.
         interface: The bodies in contact.
+        stays: Whether the heated place stays under the punch; else it is the strip's material that carries it.
     """
 
     def __init__(
-        self, exchange: HeatExchange, expansions: tuple[Expansion, Expansion], interface: StickInterface
+        self,
+        exchange: HeatExchange,
+        expansions: tuple[Expansion, Expansion],
+        interface: StickInterface,
+        *,
+        stays: bool,
     ) -> None:
+        self._stays = stays
         self.exchange, self.expansions, self._interface = exchange, expansions, interface
         self._split = len(exchange.bases[0])
         self._seen: dict[float, csr_array] = {}
@@ -89,12 +97,22 @@ class StickHeat:
             temperature: Before (dim,).
             heat: Of friction (n,), mW/mm².
             conductance: Of the nodes (n,).
+        """
+        after, terms = self.exchange.conduct(self.exchange.at(temperature), number, heat, conductance)
+        return HeatedStep(after.values, terms, np.array(self.exchange.contact_temperatures(after, number)))
+
+    def check_bounds(self, before: Array, after: Array, terms: Array) -> None:
+        """Hold what a half-cycle has stored against what can have entered: a step that slips little tells nothing.
+
+        Args:
+            before, after: Temperatures (dim,).
+            terms: Of the balances of its time steps (k, 6), mJ.
 
         Raises:
             HeatError: the bodies are hotter or colder than friction and their boundaries can make them.
         """
-        after, terms = self.exchange.half_cycle(self.exchange.at(temperature), number, heat, conductance)
-        return HeatedStep(after.values, terms, np.array(self.exchange.contact_temperatures(after)))
+        friction, debris = terms.sum(axis=0)[:2]
+        self.exchange.check_bounds(self.exchange.at(before), self.exchange.at(after), float(friction - debris))
 
     def expanded(self, loaded: Loaded, temperature: Array, offset: float) -> Loaded:
         """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset."""
@@ -102,7 +120,7 @@ class StickHeat:
             expansion(part)
             for expansion, part in zip(self.expansions, np.split(temperature, [self._split]), strict=True)
         )
-        if self._interface.moves and offset:  # the field stays under the punch, the material moves through it
+        if self._stays and self._interface.moves and offset:
             if offset not in self._seen:
                 surface = self._interface.middle.pair.strip
                 self._seen[offset] = read_at(surface, self._interface.field.placement(offset).points(surface.trace))
@@ -126,7 +144,7 @@ class StickHeat:
             heat: Array = course.heat[k]
             conductance: Array = course.conductance[k]
             through, _ = exchange.change(number, conductance, changes=through)
-            source = exchange.half_cycle(exchange.at(source), number, heat, conductance)[0].values
+            source = exchange.conduct(exchange.at(source), number, heat, conductance)[0].values
         return CycleMap(through, source)
 
 
@@ -193,22 +211,29 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
     if case.heat is None or bodies.heat is None:
         return None
     middle = interface.middle.pair
-    nothing = tuple(np.zeros((1, body.owned)) for body in bodies.heat)
+    motion = make_motion(case.motion.model_copy(update={"positions": steps}))
+    passage = None
+    if case.stick.force is None and far_enough(case, middle.punch):
+        passage = Passage(middle, interface.sliding.field, motion)
+    n = len(middle.weights)
+    rows = n, n if passage is None else len(passage.nodes)
+    nothing = tuple(np.zeros((count, body.owned)) for count, body in zip(rows, bodies.heat, strict=True))
     exchange = prepare_exchange(
         case.heat,
         bodies.heat,
         middle,
         (nothing[0], nothing[1]),
         interface.sliding.field,
-        make_motion(case.motion.model_copy(update={"positions": steps})),
+        motion,
         np.ones(len(middle.weights)),
         case.model.thickness,
         reduced=True,
+        passage=passage,
         keep=interface.keep,
         fresh=interface.fresh,
-        at_rest=case.stick.force is not None or not far_enough(case, interface.middle.pair.punch),
     )
-    return StickHeat(heated_directly(exchange), expansions(interface, exchange, bodies, case.heat.initial), interface)
+    expanded = expansions(interface, exchange, bodies, case.heat.initial)
+    return StickHeat(heated_directly(exchange), expanded, interface, stays=passage is None)
 
 
 def read_at(surface: ContactSurface, points: Array) -> csr_array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.heat.exchange import TERMS
+from fenwear.results.degrees import degrees_in
 from fenwear.results.history import HEAT_TERMS
+from fenwear.results.summary import HOTTEST
 from fenwear.stick.heat import balance_error
 from fenwear.stick.jump import Cycle
 
@@ -33,18 +36,28 @@ def heat_values(cycle: Cycle, order: NDArray[np.int64]) -> dict[str, Any]:
         "temperature_punch": records.temperature[order, 0],
         "temperature_strip": records.temperature[order, 1],
         "max_temperature": float(records.temperature.max()),
-        "heat_balance_error": max(balance_error(part.heat) for part in cycle.half_cycles),
+        "heat_balance_error": _balance_error(cycle),
         **{f"heat_{name}": float(total) for name, total in zip(TERMS, totals, strict=True)},
     }
 
 
-def heat_summary(history: xarray.Dataset) -> dict[str, Any]:
-    """Return the key numbers of the heat at the end of a run; none without heat."""
+def heat_extremes(cycle: Cycle) -> dict[str, float]:
+    """Return what of a cycle's heat is largest over a run: the temperature, in K, and the balance's error."""
+    if not cycle.records.heat.size:
+        return {}
+    return {"temperature": float(cycle.records.temperature.max()), "heat_balance_error": _balance_error(cycle)}
+
+
+def _balance_error(cycle: Cycle) -> float:
+    return max(balance_error(part.heat) for part in cycle.half_cycles)
+
+
+def heat_summary(history: xarray.Dataset, extremes: Mapping[str, float]) -> dict[str, Any]:
+    """Return the largest temperatures at the end of a run and over it; none without heat."""
     if "max_temperature" not in history:
         return {}
-    unit = history.max_temperature.attrs["units"]
+    degrees = degrees_in(history.max_temperature.attrs["units"])
     return {
-        f"max_temperature_{unit}": float(history.max_temperature[-1]),
-        f"largest_temperature_{unit}": float(history.max_temperature.max()),
-        "largest_heat_balance_error": float(history.heat_balance_error.max()),
+        f"max_temperature_{degrees.unit}": float(history.max_temperature[-1]),
+        f"{HOTTEST}_{degrees.unit}": extremes[HOTTEST] - degrees.zero,
     }

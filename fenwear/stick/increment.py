@@ -11,7 +11,7 @@ from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.stick.equations import Found, Guess, Step
 from fenwear.stick.full import FullStep
-from fenwear.stick.interface import OppositeBodies, Position
+from fenwear.stick.interface import OppositeBodies, Position, along_tangents
 from fenwear.stick.state import Imposed, StickState
 
 MOST = 60  # Newton steps
@@ -84,13 +84,14 @@ def _check_force(
         replace(start, displacement=before.displacement, force=None),
         replace(end, displacement=before.displacement + np.copysign(far, force), force=None),
     )
+    position = along_tangents(position)
     try:
         most = abs(_advance(interface, position, before, held, pushed, friction, HALVINGS).force)
     except ConvergenceError:
         return
     if abs(force) >= most * (1 - 1e-9):
         raise ConvergenceError(
-            f"gross sliding starts: the tangential force {force:.6g} reaches mu P = {most:.6g}, and nothing else holds "
+            f"gross sliding starts: the tangential force {force:.6g} reaches mu P = {most:.4g}, and nothing else holds "
             "the bodies; expected less force, or an imposed displacement"
         )
 

@@ -13,7 +13,7 @@ Arrays of all components have d n entries, one component after the other: p of a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -60,7 +60,7 @@ class Position:
         reading: Takes what the strip was condensed onto to the contact nodes (n, q).
         compliance: C (d n, d n), mm/MPa.
         modes: H (d n, r).
-        drive: V (d n,), tangential, for a unit of the motion.
+        drive: V (d n,), for a unit of the motion; along the tangents alone where the strip goes far.
     """
 
     rigid: RigidEquilibrium
@@ -87,8 +87,14 @@ class Position:
 
     @cached_property
     def pull(self) -> Array:
-        """What each traction adds to the tangential force, positive where the strip is pulled to +x (d n,)."""
+        """What each traction adds to the force along the motion, positive where the strip is pulled to +x (d n,)."""
         return self.drive * self.weights
+
+    @cached_property
+    def elastic_length(self) -> float:
+        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
+        n = len(self.pair.weights)
+        return float(np.abs(self.compliance[:n, :n].sum(axis=1)).mean())
 
     def in_frame(self, vectors: Array) -> Array:
         """Return the components (d n,) of vectors (n, d)."""
@@ -151,8 +157,9 @@ class StickInterface(OppositeBodies):
         bodies: Both, under the mean of their loads.
         sliding: What the strip does, friction and wear.
         case: Where it was made from one: gives the loads of each time.
-        moves: Whether the strip's surface passes under the punch; otherwise the surfaces stay opposite each other,
-            as for slip that is small against the contact.
+        moves: Whether the strip's surface passes under the punch, which slides along it; otherwise the surfaces stay
+            opposite each other, as for slip that is small against the contact, and have a common frame.
+        far: Whether the strip goes so far that its own place says what gap there is, not what it is moved by.
         keep: Whether the condensed bodies are kept on disk, and taken from there where they are.
         fresh: Condense them whatever is kept.
         full: Whether each time step is solved on all displacements, nothing condensed.
@@ -168,17 +175,18 @@ class StickInterface(OppositeBodies):
         case: Case | None = None,
         *,
         moves: bool = False,
+        far: bool = False,
         keep: bool = False,
         fresh: bool = False,
         full: bool = False,
     ) -> None:
-        self.bodies, self.sliding, self.case, self.moves = bodies, sliding, case, moves
+        self.bodies, self.sliding, self.case, self.moves, self.far = bodies, sliding, case, moves, moves or far
         self.team = Team.of(bodies.comm)
         self.team.serve(self)
         self.keep, self.fresh, self.full = keep, fresh, full
         self.field = sliding.field
         self.dim = bodies.punch.dim
-        middle = pair(bodies.punch.surface, bodies.strip.surface)
+        middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
         if bodies.followed is None:
             check_distance(middle)
         onto = _identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
@@ -241,7 +249,7 @@ class StickInterface(OppositeBodies):
 
     def whole(self, position: Position) -> WholeBodies:
         """Return both bodies with nothing condensed in a position of these; collective, or for rank 0 that leads."""
-        offset = next(place for place, known in self._positions.items() if known is position)
+        offset = next(place for place, known in self._positions.items() if known.pair is position.pair)
         if offset not in self._whole:
             self.team.each(self, "prepare_whole", offset)
         return self._whole[offset]
@@ -271,7 +279,8 @@ class StickInterface(OppositeBodies):
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
         reading = pair.transfer if self.moves else _identity(len(pair.weights))
-        return position_of(rigid, self.punch, self.strip, reading, self.field)
+        found = position_of(rigid, self.punch, self.strip, reading, self.field)
+        return along_tangents(found) if self.far else found
 
 
 def meshed(bodies: OppositeBodies) -> StickInterface:
@@ -302,8 +311,14 @@ def position_of(
     turned = np.einsum("iac,icjb,jeb->aiej", frame, response, frame, optimize=True).reshape(d * n, d * n)
     modes = np.einsum("iac,icm->aim", frame, rigid.motion).reshape(d * n, -1)
     drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(pair.punch.x), d))
-    drive[0] = 0.0  # along e_n the place of the strip says it
     return Position(rigid, frame, reading, turned * np.tile(pair.weights, d), modes, drive.ravel())
+
+
+def along_tangents(position: Position) -> Position:
+    """Return the same for a strip that goes far: what it is moved by along e_n its place has in the gap."""
+    drive = position.drive.copy()
+    drive[: len(position.pair.weights)] = 0.0
+    return replace(position, drive=drive)
 
 
 def contact_frame(pair: ContactPair) -> Array:

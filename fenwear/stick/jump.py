@@ -52,6 +52,7 @@ class Cycle:
         end: State at its end; after a march's cycle its wear is taken off. What comes next follows from it.
         length: Cycles of the next jump, as wished.
         warm: Temperatures at the start of its records (dim,); None without heat.
+        spent: Work of friction in all cycles before it, N in the plane and N mm in a solid.
     """
 
     number: int
@@ -63,6 +64,7 @@ class Cycle:
     end: RigState
     length: int = 1
     warm: Array | None = None
+    spent: float = 0.0
 
     @property
     def records(self) -> Records:
@@ -82,21 +84,22 @@ def march(rig: Rig, cycles: int, start: Cycle | None = None) -> Iterator[Cycle]:
         ConvergenceError: a time step did not converge.
     """
     at = rig.beginning() if start is None else start.end
+    spent = 0.0 if start is None else start.spent + start.records.energy(rig.weights)
     for number in range(0 if start is None else start.number + 1, cycles):
-        cycle = rig.led(partial(_marched, rig, at, number))
+        cycle = rig.led(partial(_marched, rig, at, number, spent))
         yield cycle
-        at = cycle.end
+        at, spent = cycle.end, spent + cycle.records.energy(rig.weights)
 
 
-def _marched(rig: Rig, at: RigState, number: int) -> Cycle:
-    """Return the cycle of a number; `at` is the state at its start."""
+def _marched(rig: Rig, at: RigState, number: int, spent: float) -> Cycle:
+    """Return the cycle of a number; `at` is the state at its start, friction's work so far is `spent`."""
     parts, begin = [], at.worn
     for _ in range(rig.program.half_cycles):
         first = at.next_step
         at, records = rig.half_cycle(at)
         at = replace(at, worn=at.worn + rig.worn_in(records, first))
         parts.append(records)
-    return Cycle(number, begin, parts, at.worn - begin, 0.0, 0, at)
+    return Cycle(number, begin, parts, at.worn - begin, 0.0, 0, at, spent=spent)
 
 
 def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) -> Iterator[Cycle]:
@@ -208,7 +211,8 @@ def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     area = np.concatenate([pair.weights, pair.strip.weights])
     scale = area @ (end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing) / max(scale, 1e-300))
-    return replace(then, error=max(error, then.error))
+    work = sum(cycle.records.energy(rig.weights) for cycle in (now, then)) / 2  # by the trapezoidal rule
+    return replace(then, error=max(error, then.error), spent=now.spent + cycles * work)
 
 
 def _derivative(rig: Rig, now: Cycle) -> Array:

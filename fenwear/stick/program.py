@@ -131,11 +131,4 @@ def far_enough(case: Case, surface: ContactSurface) -> bool:
     far = _largest(motion)
     if isinstance(case.motion, Oscillation):
         far *= float(np.linalg.norm(surface.x[:, :2] - np.array(case.motion.centre)[:2], axis=1).max())
-    return far > SPACINGS * spacing(surface)
-
-
-def spacing(surface: ContactSurface) -> float:
-    """Return how far contact nodes are apart, mm: the median."""
-    if surface.dim == 3:
-        return float(np.sqrt(np.median(surface.weights)))
-    return float(np.median(np.diff(np.unique(surface.x[:, 0].round(12)))))
+    return far > SPACINGS * surface.spacing()

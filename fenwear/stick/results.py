@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +11,16 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.contact.complementarity import complementarity_error
+from fenwear.interface import ContactPair
 from fenwear.results.degrees import KELVIN, degrees_of
+from fenwear.results.summary import HOTTEST
 from fenwear.results.surfaces import DIMENSIONS, Variable, columns_of_pair, on_mesh
+from fenwear.results.zone import ContactNet, contact_net
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
-from fenwear.stick.heat_results import HEAT_VARIABLES, heat_summary, heat_values
+from fenwear.stick.edge import beside, stick_edges, zone_width
+from fenwear.stick.heat_results import HEAT_VARIABLES, heat_extremes, heat_summary, heat_values
 from fenwear.stick.jump import Cycle
 from fenwear.stick.strain import along_sliding, directions
 
@@ -30,12 +35,15 @@ VARIABLES: dict[str, Variable] = {
     "surface_stress": (("cycle", "step", "x"), "MPa", "stress along x in the strip's surface opposite each node"),
     "wear": (("cycle", "x"), "mm", "worn depth of the punch before the cycle"),
     "wear_strip": (("cycle", "x_strip"), "mm", "worn depth of the strip before the cycle"),
-    "worn_area": (("cycle",), "mm2", "cross-section worn off the punch in the cycle"),
-    "worn_area_strip": (("cycle",), "mm2", "cross-section worn off the strip in the cycle"),
+    "worn_area_increment": (("cycle",), "mm2", "cross-section worn off the punch in the cycle"),
+    "worn_area_increment_strip": (("cycle",), "mm2", "cross-section worn off the strip in the cycle"),
     "dissipated_energy": (("cycle",), "mJ", "work of friction in the cycle"),
+    "accumulated_energy": (("cycle",), "mJ", "work of friction in all cycles before"),
     "energy_ratio": (("cycle",), "1", "work of friction over four times largest force times largest displacement"),
     "energy_balance_error": (("cycle",), "1", "missing energy of a half-cycle over its largest term, the larger one"),
+    "complementarity_error": (("cycle",), "1", "largest error of p >= 0, gap >= 0, p gap = 0 over their scales"),
     "stick_width": (("cycle",), "mm", "width that sticks all through the cycle"),
+    "stick_width_within": (("cycle",), "mm", "half the interval in which the width that sticks is known to lie"),
     "contact_width": (("cycle",), "mm", "largest width in contact"),
     "jump_error": (("cycle",), "1", "estimated error of the depths of the jump to the cycle, over what it wore"),
 }
@@ -45,9 +53,10 @@ IN_SOLIDS = {
     "traction": ("traction", "MPa", "tangential traction on the punch, along the sliding"),
     "slip": ("slip", "mm", "slip of the punch against the strip in the time step, along the sliding"),
     "surface_stress": ("surface_stress", "MPa", "stress along the sliding in the strip's surface opposite each node"),
-    "worn_area": ("worn_volume", "mm3", "volume worn off the punch in the cycle"),
-    "worn_area_strip": ("worn_volume_strip", "mm3", "volume worn off the strip in the cycle"),
+    "worn_area_increment": ("worn_volume_increment", "mm3", "volume worn off the punch in the cycle"),
+    "worn_area_increment_strip": ("worn_volume_increment_strip", "mm3", "volume worn off the strip in the cycle"),
     "stick_width": ("stick_area", "mm2", "area that sticks all through the cycle"),
+    "stick_width_within": ("stick_area_within", "mm2", "half the interval in which the area that sticks may lie"),
     "contact_width": ("contact_area", "mm2", "largest area in contact"),
 }
 ACROSS: dict[str, Variable] = {
@@ -85,6 +94,7 @@ def row_of(rig: Rig, case: Case, cycle: Cycle) -> Row:
     pair = rig.interface.middle.pair
     turn = along_sliding(rig.interface.middle)
     traction, slip = (np.einsum("nam,knm->akn", turn, v[order]) for v in (records.traction, records.slip))
+    stuck, within = stuck_size(pair, records)
     values: dict[str, Any] = {
         "displacement": records.displacement[order],
         "tangential_force": force[order],
@@ -95,19 +105,54 @@ def row_of(rig: Rig, case: Case, cycle: Cycle) -> Row:
         "surface_stress": surface_stress(case, records)[order],
         "wear": cycle.worn.punch,
         "wear_strip": cycle.worn.strip,
-        "worn_area": float(weights @ cycle.rate.punch),
-        "worn_area_strip": float(pair.strip.weights @ cycle.rate.strip),
+        "worn_area_increment": float(weights @ cycle.rate.punch),
+        "worn_area_increment_strip": float(pair.strip.weights @ cycle.rate.strip),
         "dissipated_energy": energy,
+        "accumulated_energy": thick * cycle.spent,
         "energy_ratio": energy / max(4 * most * reach, 1e-300),
-        "energy_balance_error": max(part.balance_error(weights) for part in cycle.half_cycles),
-        "stick_width": float(weights @ records.sticking.all(axis=0)),
+        **errors_of(rig, cycle),
+        "stick_width": stuck,
+        "stick_width_within": within,
         "contact_width": float(((records.pressure > 0) @ weights).max()),
-        "jump_error": cycle.error,
         **heat_values(cycle, order),
     }
     if len(traction) > 1:
         values |= {"traction_across": traction[1], "slip_across": slip[1]}
     return Row(cycle.number, values)
+
+
+def errors_of(rig: Rig, cycle: Cycle) -> dict[str, float]:
+    """Return what of a cycle is held against its bounds, by the names of `VARIABLES`."""
+    records = cycle.records
+    broken = complementarity_error(records.pressure, records.gap, rig.interface.middle.elastic_length)
+    return {
+        "complementarity_error": float(broken.max()),
+        "energy_balance_error": max(part.balance_error(rig.weights) for part in cycle.half_cycles),
+        "jump_error": cycle.error,
+    }
+
+
+def extremes_with(extremes: Mapping[str, float], rig: Rig, cycle: Cycle) -> dict[str, float]:
+    """Return what was largest in the cycles so far and in one more, by name; of temperatures in K."""
+    new = {**errors_of(rig, cycle), **heat_extremes(cycle)}
+    return {f"largest_{name}": max(extremes.get(f"largest_{name}", -np.inf), value) for name, value in new.items()}
+
+
+def net_of(rig: Rig) -> ContactNet:
+    """Return the nodes of the contact and the facets between them."""
+    pair = rig.interface.middle.pair
+    return contact_net(pair, rig.interface.field, ("x", "y", "z") if pair.punch.dim == 3 else ("x",))
+
+
+def stuck_size(pair: ContactPair, records: Records) -> tuple[float, float]:
+    """Return the width, in a solid the area, that sticks all through a cycle, and half the interval left of it.
+
+    In a solid it is the area of the nodes, to half of what those beside it stand for.
+    """
+    if pair.punch.dim == 3:
+        rim = beside(pair.punch, records.stuck) & records.touched
+        return float(pair.weights @ records.stuck), float(pair.weights @ rim) / 2
+    return zone_width(stick_edges(pair.x, records.stuck, records.slid.sum(axis=0), records.touched))
 
 
 def surface_stress(case: Case, records: Records) -> Array:
@@ -185,36 +230,56 @@ def _nodes(rig: Rig) -> dict[str, Any]:
         "x": ("x", pair.x, {"units": "mm", "long_name": CONTACT_NODE}),
         "x_strip": ("x_strip", pair.strip.x[:, 0], {"units": "mm", "long_name": "position along the strip"}),
         "weight": ("x", rig.weights, {"units": "mm", "long_name": "length that each contact node stands for"}),
+        **{
+            f"normal_{axis}": ("x", pair.normal[:, k], {"units": "1", "long_name": f"contact's normal, along {axis}"})
+            for k, axis in enumerate("xz")
+        },
     }
 
 
-def summary_of(data: xarray.Dataset, worn: Worn) -> dict[str, Any]:
-    """Return the key numbers of the end of a run, each with its unit in its name."""
+def summary_of(rig: Rig, data: xarray.Dataset, worn: Worn, extremes: Mapping[str, float]) -> dict[str, Any]:
+    """Return the key numbers of the end of a run, each with its unit in its name.
+
+    Args:
+        rig: The bodies.
+        data: The kept cycles.
+        worn: The depths at its end.
+        extremes: What was largest in all cycles, see `extremes_with`.
+    """
     last = data.isel(cycle=-1)
     solid = data.attrs["model"] == "solid"
     traction = np.hypot(last.traction, last.traction_across) if solid else np.abs(last.traction)
     zone = traction.where(last.stick == 1)
+    hardest = last.pressure.values[last.pressure.values.max(axis=1).argmax()]
     sizes = (
-        {"contact_area_mm2": float(last.contact_area), "stick_area_mm2": float(last.stick_area)}
+        {
+            "contact_area_mm2": float(last.contact_area),
+            "stick_area_mm2": float(last.stick_area),
+            "stick_area_within_mm2": float(last.stick_area_within),
+        }
         if solid
-        else {"contact_width_mm": float(last.contact_width), "stick_width_mm": float(last.stick_width)}
+        else {
+            "contact_width_mm": float(last.contact_width),
+            "stick_width_mm": float(last.stick_width),
+            "stick_width_within_mm": float(last.stick_width_within),
+        }
     )
     return {
         "title": data.attrs["title"],
         "cycles": int(last.cycle),
         "largest_force_N": float(np.abs(last.tangential_force).max()),
-        "max_pressure_MPa": float(last.pressure.max()),
+        "max_pressure_MPa": float(hardest.max()),
+        **net_of(rig).numbers(hardest),
         "largest_traction_MPa": float(traction.max()),
         "largest_stick_traction_MPa": float(zone.max()) if zone.notnull().any() else 0.0,
         "largest_surface_stress_MPa": float(last.surface_stress.max()),
         "dissipated_energy_mJ": float(last.dissipated_energy),
-        "accumulated_energy_mJ": float(np.trapezoid(data.dissipated_energy, data.cycle)),
+        "accumulated_energy_mJ": float(last.accumulated_energy),
         "energy_ratio": float(last.energy_ratio),
         **sizes,
         "wear_max_mm": float(worn.punch.max()),
         "wear_strip_max_mm": float(worn.strip.max()),
         "worn_volume_punch_mm3" if solid else "worn_area_punch_mm2": float(data.weight.values @ worn.punch),
-        "largest_energy_balance_error": float(data.energy_balance_error.max()),
-        "largest_jump_error": float(data.jump_error.max()),
-        **heat_summary(data),
+        **heat_summary(data, extremes),
+        **{name: value for name, value in extremes.items() if name != HOTTEST},
     }

@@ -12,11 +12,13 @@ import xarray
 
 from fenwear.arrays import Mask
 from fenwear.case import Case, doubts
+from fenwear.contact.complementarity import broken_text, complementarity_error
 from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError
 from fenwear.lookout import Lookout
 from fenwear.parallel import on_root
 from fenwear.progress import How, Log, Progress
 from fenwear.report.stick import write_stick_report
+from fenwear.results import checkpoint as stored
 from fenwear.results.history import HISTORY, make_directory, write_case, write_summary
 from fenwear.signals import Signals
 from fenwear.stick import checkpoint
@@ -24,10 +26,11 @@ from fenwear.stick.cycle import Rig
 from fenwear.stick.fineness import Fineness, fine_enough
 from fenwear.stick.interface import meshed
 from fenwear.stick.jump import Cycle, jump, march
-from fenwear.stick.results import dataset, row_of, summary_of
+from fenwear.stick.results import dataset, extremes_with, net_of, row_of, summary_of
 from fenwear.stick.setup import reaches_border
 from fenwear.stick.writer import CycleWriter
 from fenwear.versions import versions
+from fenwear.watch.few import few_text
 from fenwear.watch.size import size_warnings
 
 
@@ -81,14 +84,21 @@ class _Run:
     ) -> None:
         self.case, self.directory, self.log = case, directory, log
         self.comm = comm = meshed(rig.interface).bodies.comm
-        self.cycles = max(case.run.half_cycles // rig.program.half_cycles, 1)
+        self.cycles, rest = divmod(case.run.half_cycles, rig.program.half_cycles)
+        if rest:
+            message = f"expected a multiple of the {rig.program.half_cycles} half-cycles of a cycle with stick"
+            raise CaseError(InputError("run.half_cycles", message))
         self.jumps = case.run.integration == "jump"
         self.unique: list[bool] = []  # of the time steps of this run
+        self.extremes: dict[str, float] = {}  # of all cycles so far
+        self.few: str | None = None  # what is to be said of how few nodes lie across the first contact of this run
         self.rig, self.resume = rig.watched(self._watch), resume
         self.last = checkpoint.load(directory, case, rig) if resume else None
-        if self.last is not None and self.done >= self.cycles:
-            message = f"the run has done {self.done} cycles already; expected more half-cycles to go on to"
-            raise CaseError(InputError("run.half_cycles", message))
+        if self.last is not None:
+            self.extremes = stored.extremes(directory, comm)
+            if self.done >= self.cycles:
+                message = f"the run has done {self.done} cycles already; expected more half-cycles to go on to"
+                raise CaseError(InputError("run.half_cycles", message))
         if not resume:
             on_root(comm, lambda: make_directory(directory))
         on_root(comm, lambda: write_case(directory, case))
@@ -105,8 +115,8 @@ class _Run:
 
     @property
     def done(self) -> int:
-        """Cycles whose wear is in the state to go on from."""
-        return 0 if self.last is None else self.last.number + (not self.jumps)
+        """Cycles whose wear is in the last one's shape."""
+        return 0 if self.last is None else self.last.number
 
     def all_cycles(self, how: Mapping[str, Any]) -> dict[str, Any]:
         """Compute all cycles and return the summary; collective."""
@@ -123,10 +133,11 @@ class _Run:
             none = f"no cycle was done: {failure}; {self.directory} can be removed"
             raise type(failure or ConvergenceError())(none) from failure
         self._save()
-        several = [text for text in (unique_text(np.array(self.unique, dtype=bool)),) if text]
+        several = [text for text in (unique_text(np.array(self.unique, dtype=bool)), self.few) if text]
         interface = meshed(self.rig.interface)
         sizes = size_warnings(self.case, interface.bodies, interface.middle.rigid)
-        warnings = [*sizes, *doubts(self.case), *_warnings(self.rig, self.last, fineness), *several]
+        warnings = [*sizes, *interface.bodies.remarks, *doubts(self.case), *several]
+        warnings += _warnings(self.rig, self.last, fineness)
         for warning in warnings:
             self.log(f"warning: {warning}")
         found = {**how, "cycles_seconds": time.perf_counter() - begin, "warnings": warnings}
@@ -142,11 +153,14 @@ class _Run:
     def _cycles(self) -> Iterator[Cycle]:
         if self.jumps:
             return jump(self.rig, self.cycles, self.case.run.jump_tolerance, self.last)
-        return march(self.rig, self.cycles, self.last)
+        return march(self.rig, self.cycles + 1, self.last)  # the last begins with what all of them have worn
 
     def _take(self, cycle: Cycle) -> None:
         """Keep a cycle; collective, so that every rank knows of an error."""
         self.last = cycle
+        self.extremes = extremes_with(self.extremes, self.rig, cycle)
+        if self.few is None:
+            self.few = few_text(self.case, net_of(self.rig), cycle.records.pressure[0], "at the start")
         self.unique.extend(bool(unique) for unique in cycle.records.unique)
         keep = self.jumps or cycle.number % self.case.output.every == 0
 
@@ -169,7 +183,7 @@ class _Run:
         """Write history and checkpoint, in this order: the history reaches as far or farther."""
         if self.last is not None:
             on_root(self.comm, lambda: None if self.writer is None else self.writer.flush())
-            checkpoint.save(self.directory, self.case, self.rig, self.last)
+            checkpoint.save(self.directory, self.case, self.rig, self.last, self.extremes)
 
     def _finish(self, how: dict[str, Any], *, report: bool) -> dict[str, Any]:
         """Write what a run ends with, and return the summary; for rank 0."""
@@ -183,7 +197,7 @@ class _Run:
             "versions": versions(),
         }
         with self.writer.close() as data:
-            summary = {**summary_of(data, self.last.worn), **summary}
+            summary = {**summary_of(self.rig, data, self.last.worn, self.extremes), **summary}
         write_summary(self.directory, summary)
         if report:
             write_stick_report(self.directory)
@@ -215,6 +229,8 @@ def _warnings(rig: Rig, last: Cycle, fineness: Fineness | None) -> list[str]:
     """Return what the user should know of the run."""
     found = [fineness.text()] if fineness is not None and not fineness.enough else []
     records = last.records
+    error = complementarity_error(records.pressure, records.gap, rig.interface.middle.elastic_length).max()
+    found += [text for text in (broken_text(float(error), "in the last cycle"),) if text]
     slipping = (records.pressure > 0).any(axis=1) & ~records.sticking.any(axis=1)
     if slipping.any():
         share = float(np.mean(slipping))

@@ -45,7 +45,8 @@ def make_rig(
     bodies, sliding = bodies or build_bodies(case, comm), make_sliding(case)
     moves = _moves(case, bodies.punch.surface)
     full = case.contact.solver == "full"
-    interface = StickInterface(bodies, sliding, case, moves=moves, keep=True, fresh=fresh, full=full)
+    far = case.stick.force is None and far_enough(case, bodies.punch.surface)
+    interface = StickInterface(bodies, sliding, case, moves=moves, far=far, keep=True, fresh=fresh, full=full)
     middle = interface.middle
     wear = local_wear(sliding.wear, sliding.friction, middle.pair, middle.rigid.mean_pressure)
     mu = case.contact.friction

@@ -15,7 +15,7 @@ import xarray
 from fenwear.errors import CaseError, InputError
 from fenwear.results.disk import check_room, claim, writing
 from fenwear.results.history import HISTORY, next_write
-from fenwear.results.reading import load
+from fenwear.results.reading import is_older, load
 
 CYCLE = "cycle"
 
@@ -46,8 +46,10 @@ class CycleWriter:
         try:
             with h5netcdf.File(self.path, "r") as file:
                 stored = np.asarray(file.variables[CYCLE][:])
+                if is_older(file.variables):
+                    raise KeyError(CYCLE)
         except (OSError, KeyError, RuntimeError):
-            message = "cannot be read; remove it to go on with a new one, which begins at the checkpoint"
+            message = "cannot be read, or is of another version; remove it to go on with a new one, from the checkpoint"
             raise CaseError(InputError(str(self.path), message)) from None
         rows = int(np.searchsorted(stored, number, side="right"))
         if rows and stored[rows - 1] % every:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Preparation, Tribosystem, assemble, set_up_by, with_case
 from fenwear.case import Case
-from fenwear.cycle import Block, follow, jump, march, steady
+from fenwear.cycle import Block, at_step, follow, jump, march, steady
 from fenwear.cycle.state import RunState, joined
 from fenwear.errors import ConvergenceError
-from fenwear.law import check_slides
+from fenwear.law import check_no_stick, check_slides
 from fenwear.sweeps.plan import Of, preparation_for
 
 Values = Mapping[str, NDArray[np.float64]]
@@ -94,6 +94,8 @@ class Workshop:
         Raises:
             FenwearError: as the assembly of the case and its solution.
         """
+        if of != "optimum":
+            check_no_stick(case)
         system = self._assembled(case, preparation_for(case, of))
         if of != "optimum":
             check_slides(system)
@@ -121,7 +123,7 @@ def _steady(system: Tribosystem) -> Values:
         "direction": np.array(state.directions, dtype=float),
         "pressure": state.pressure,
         "largest_pressure": state.pressure.max(axis=1),
-        "mean_pressure": np.array(system.rigid.mean_pressure),
+        "mean_pressure": np.array(state.system.rigid.mean_pressure),
         "contact_size": state.contact_width,
         "shape": state.shape,
         "wear_per_cycle": state.wear_per_cycle,
@@ -134,6 +136,7 @@ def _steady(system: Tribosystem) -> Values:
 
 
 def _optimum(system: Tribosystem) -> Values:
+    system = at_step(system)
     directions = system.motion.stroke_directions
     found = [system.optimum(d) for d in directions]
     return {
@@ -155,23 +158,21 @@ def _run(system: Tribosystem) -> Values:
     motion, contacts = last.system.motion, joined(last.end.contacts)
     middle = slice(motion.positions // 2, None, motion.positions)
     pressure = last.pressure[-motion.half_cycles :] if contacts is None else contacts.pressure[middle]
-    pair, kind, thickness = last.system.pair, system.case.model.kind, system.case.model.thickness
-    depth = thickness if kind == "plane" else 1.0
     found = {
         "direction": np.array(motion.stroke_directions[: len(pressure)], dtype=float),
         "pressure": pressure,
         "largest_pressure": pressure.max(axis=1),
         "mean_pressure": np.array(system.rigid.mean_pressure),
-        "contact_size": (pressure > 0) @ pair.weights,
+        "contact_size": (pressure > 0) @ last.system.pair.weights,
         "wear": last.wear[-1],
         "largest_wear": last.wear[-1].max(),
-        "worn_volume": depth * (pair.weights @ last.wear[-1]),
+        "worn_volume": last.totals.of("volume_punch")[-1],
         "half_cycles": np.array(float(last.half_cycle[-1])),
         "periodicity": last.periodicity[-1],
     }
     if system.strip_wears:
         found["largest_wear_strip"] = last.wear_strip[-1].max()
-        found["worn_volume_strip"] = depth * (pair.strip.weights @ last.wear_strip[-1])
+        found["worn_volume_strip"] = last.totals.of("volume_strip")[-1]
     if last.heat is not None:
         surfaces = [last.heat.temperature_punch, last.heat.temperature_strip]
         found |= _temperatures(*(_by_half_cycle(rows, last.half_cycle, motion.half_cycles) for rows in surfaces))

@@ -1,18 +1,13 @@
-"""Conduction in one body: manufactured solutions, periodic flux, plug flow, Jaeger's source."""
+"""Conduction in one body: manufactured solutions, periodic flux, plug flow."""
 
 from __future__ import annotations
 
 import math
 from functools import cache, partial
-from itertools import pairwise
 
 import numpy as np
-from scipy.integrate import quad
-from scipy.special import k0e
 
-from fenwear import load_case
 from fenwear.arrays import Array
-from fenwear.assembly import place_case
 from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.verify.bodies import bodies_of_blocks, clamped
 from fenwear.verify.manufactured import (
@@ -279,65 +274,3 @@ def open_strip() -> Result:
                     Line(f"Danckwerts, v L / a = {peclet:g}", x, exact / exact.max(), reference=True),
                 ]
     return Result(rows, [Plot("Open strip: rise along it", "x / L", "rise over its largest", lines)])
-
-
-def jaeger(x: float, half_width: float, speed: float, diffusivity: float) -> float:
-    """Return the surface rise k theta / q of a band source on a half-plane that moves to +x, by quadrature.
-
-    (1/pi) times the integral over the source of e^u K0(|u|), u = v (x - x') / (2 a).
-    """
-    scale = speed / (2 * diffusivity)
-
-    def kernel(u: float) -> float:
-        return float(k0e(abs(u)) * (1.0 if u > 0 else math.exp(2 * u)))
-
-    low, high = scale * (x - half_width), scale * (x + half_width)
-    ends = [low, *(p for p in (-1.0, 0.0, 1.0) if low < p < high), high]
-    return float(sum(quad(kernel, a, b, limit=200)[0] for a, b in pairwise(ends)) / (math.pi * scale))
-
-
-@verification(
-    "jaeger",
-    "Jaeger: a moving band source of heat",
-    "J. C. Jaeger, Moving sources of heat and the temperature at sliding contacts, 1942; "
-    "Carslaw and Jaeger, 1959, section 10.7",
-)
-def moving_source() -> Result:
-    """The profile of his integral; for Pe = v l / 2 a > 10 also his largest rise, 2 q/k sqrt(2 l a / (pi v)).
-
-    The strip of Example 1, 2 m deep and 20 m long, with cold ends and bottom.
-    """
-    settings = ["heat.convection=0", "geometry.parameters.growth=0.3"]
-    settings += ["geometry.parameters.strip_height=2000", "geometry.parameters.strip_length=20000"]
-    placed = place_case(load_case("example1-heat", settings))
-    assert placed.bodies.heat is not None
-    body, half_width, conductivity = placed.bodies.heat[1], 30.0, 55.0
-    diffusivity = conductivity / (7.8e-9 * 4.6e8)
-    x = placed.pair.x
-    inner = np.abs(x) < 29.9
-    rows: list[Row] = []
-    lines: list[Line] = []
-    for peclet in (1.0, 10.0, 200.0):
-        speed = 2 * diffusivity * peclet / half_width
-        published = 2 * math.sqrt(2 * half_width * diffusivity / (math.pi * speed))
-        for d in (1, -1):
-            step = body.step(d * speed, math.inf)
-            rise = body.contact(step.respond(body.load(np.ones(len(x)))[:, None])[:, 0])
-            rise *= conductivity
-            exact = np.array([jaeger(d * at, half_width, speed, diffusivity) for at in x])
-            case = f"Pe = {peclet:g}, {'rightward' if d > 0 else 'leftward'}"
-            rows.append(profile(f"{case}: rise k theta / q (mm)", exact[inner], rise[inner], 5e-3, scale=exact.max()))
-            if peclet > 10:
-                rows.append(number(f"{case}: largest rise, Jaeger's formula (mm)", published, rise.max(), 1e-2))
-            if d > 0:
-                lines += [
-                    Line(f"fenwear, Pe = {peclet:g}", x, rise / published),
-                    Line(f"Jaeger, Pe = {peclet:g}", x, exact / published, reference=True),
-                ]
-    plot = Plot(
-        "Moving band source: rise over Jaeger's largest, rightward",
-        "x (mm)",
-        "theta / (2 q/k sqrt(2 l a / pi v))",
-        lines,
-    )
-    return Result(rows, [plot])

@@ -123,6 +123,7 @@ def bimetal() -> Result:
             "pin_height_1": lower,
             "strip_length": 2 * length,
             "strip_height": height,
+            "overlap": length / 4,
         }
         values = {**size, "elements_along_contact": 32, "edge_grading": 1, "growth": 0.2}
         parameters = ", ".join(f"{name}={value!r}" for name, value in values.items())

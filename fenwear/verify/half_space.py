@@ -27,17 +27,17 @@ def _sizes(radius: float, across: int) -> dict[str, float]:
         "outer_radius": radius,
         "margin_outside": FAR * radius,
         "margin_elements": count,
-        "spread": _spread(FAR * radius, size, count),
+        "spread": growth_of(FAR * radius, size, count),
         "across": across,
         "punch_height": radius,
         "punch_layers": 1,
         "strip_height": FAR * radius,
         "strip_layers": count,
-        "growth": _spread(FAR * radius, size, count),
+        "growth": growth_of(FAR * radius, size, count),
     }
 
 
-def _spread(length: float, first: float, count: int) -> float:
+def growth_of(length: float, first: float, count: int) -> float:
     """Return the ratio of neighbours in a line of `count` elements, of which the first has this length."""
     low, high = 1.0 + 1e-9, 10.0
     for _ in range(100):
@@ -142,7 +142,7 @@ def square_case(elements: int, **tables: Any) -> Case:
 
 def _square_sizes(elements: int) -> dict[str, float]:
     layers = round(1.5 * elements)
-    spread = _spread(10, 0.5 / elements, layers)
+    spread = growth_of(10, 0.5 / elements, layers)
     return {
         "quarter": 1,
         "margin_x": 10,

@@ -152,12 +152,13 @@ def worn_disc() -> list[Row]:
         exact = 375 / np.pi / np.hypot(x[:, 0], x[:, 1])
         errors.append(float(np.abs(optimum.pressure / exact - 1).max()))
         torque = block.pressure[-1] @ (both.pair.weights * np.hypot(x[:, 0], x[:, 1]))
+        worn = block.worn_area_increment_strip[-1]
         what = f"pad and disc, {across} elements across"
         rows += [
             profile(f"{what}: steady pressure (MPa)", exact, state.pressure[0], 0.02, scale=exact),
             profile(f"{what}: optimum (MPa)", state.pressure[0], optimum.pressure, 1e-9),
             number(f"{what}: approach (mm/s)", 1.790493e-5, optimum.velocity["lambda_F"], 2e-3),
-            number(f"{what}: volume of the disc (mm³)", rates[1] * 10 * torque, block.worn_area_strip[-1], 1e-12),
+            number(f"{what}: volume of the disc (mm³)", rates[1] * 10 * torque, worn, 1e-12),
         ]
     return [*rows, order("pad and disc: order of the pressure's largest error", 1, errors, 0.7)]
 

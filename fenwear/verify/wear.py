@@ -12,6 +12,9 @@ from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import growth_rate, jump, march, stability_number, steady
+from fenwear.optimum import WearRates
+from fenwear.optimum import optimum as minimal_dissipation
+from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.verify.bodies import builtin, relief_rates, rigid_punch
 from fenwear.verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -40,7 +43,7 @@ def wear_volume() -> Result:
             "jumps": list(jump(system, 20_000, tolerance=3e-3)),
         }
         for name, run in blocks.items():
-            area = np.concatenate([block.worn_area for block in run])
+            area = np.concatenate([block.worn_area_increment for block in run])
             rows.append(
                 profile(f"{contact}, {name}: per half-cycle (mm²)", np.full_like(area, exact), area, 1e-9, scale=exact)
             )
@@ -62,7 +65,7 @@ def _areas_of_both() -> list[Row]:
         ("jumps", list(jump(system, 20_000, tolerance=3e-2))),
     ):
         depths = {"punch": run[-1].wear[-1], "strip": run[-1].wear_strip[-1]}
-        areas = {"punch": [b.worn_area for b in run], "strip": [b.worn_area_strip for b in run]}
+        areas = {"punch": [b.worn_area_increment for b in run], "strip": [b.worn_area_increment_strip for b in run]}
         for body, one in exact.items():
             area = np.concatenate(areas[body])
             what = f"both wear, {name}, {body}"
@@ -214,7 +217,8 @@ def one_way_sliding() -> Result:
             exponent = f"wear.punch.pressure_exponent={b}"
             system = builtin("example1", "geometry.degree=2", one_way(direction), coefficient, exponent)
             block = next(march(system, 1500, implicit=True, block=1500))
-            optimum = system.optimum(system.motion.directions[0])
+            rates = WearRates((np.full(len(system.pair.x), 3 * 1e-4 * MEAN ** (1 - b)),), (PressureLaw(b),))
+            optimum = minimal_dissipation(system.rigid, system.friction_ratio(system.motion.directions[0]), rates)
             x, case = system.pair.x, f"b = {b}, {direction}"
             rows.append(profile(f"{case}: pressure (MPa)", optimum.pressure, block.pressure[-1], 1e-6, scale=MEAN))
             rigid = optimum.velocity["lambda_F"] - optimum.velocity["lambda_M"] * (x - HALF_WIDTH)

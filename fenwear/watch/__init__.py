@@ -3,23 +3,33 @@
 ends      contact clipped at the end of a plane's or ring's meshed surface
 rim       contact clipped at the rim of a solid's
 chamfer   chamfers beside the contact surface that wear would bring into contact
+few       contact on a few nodes
 stroke    strokes that the bodies take up elastically
 thickness bodies that are worn through
+fineness  steps, bases and elements of the heat that are too coarse
+layer     elements thicker than the layer that heats up below a fast contact
 size      bodies whose mesh is hardly in mm
 states    a run's blocks, the first contact and the steady state: clipped, too hot, harder pressed than hard
 """
 
+from fenwear.watch.fineness import fineness_text, fineness_warnings
+from fenwear.watch.layer import HeatedLayer, heated_layer, layer_warnings
 from fenwear.watch.size import size_warnings
 from fenwear.watch.states import Watch, hot, initial_warnings, pressed, steady_warnings
 from fenwear.watch.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_warnings
 
 __all__ = [
     "TAKEN_UP",
+    "HeatedLayer",
     "Watch",
     "elastic_share",
     "elastic_way",
+    "fineness_text",
+    "fineness_warnings",
+    "heated_layer",
     "hot",
     "initial_warnings",
+    "layer_warnings",
     "pressed",
     "size_warnings",
     "steady_warnings",

@@ -100,6 +100,14 @@ class ContactEnds:
         wide = float(self.x[right] - self.x[left])
         return min(max(wide, WIDER * self.width), self.reach)
 
+    def hertzian(self, load: float) -> float:
+        """Return about how wide the contact of unworn cylinders is, mm, under a load as `width_needed` has it.
+
+        That of the parabola through the ends of the contact surface: facets may be longer than the contact is wide.
+        """
+        level, open_by = self.closed_by_load * load / self.around, np.interp(self.ends, self.x, self.gap).mean()
+        return self.width * float(np.sqrt(min(level / max(open_by, 1e-300), 1.0)))
+
     @property
     def reach(self) -> float:
         """How wide a contact surface could be: from edge to edge, mm."""

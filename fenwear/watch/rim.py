@@ -82,9 +82,19 @@ class ContactRim:
         if self.curvatures is None:
             return None
         radius = 1 / np.sqrt(self.curvatures[0] * self.curvatures[1])
-        closed = (0.75 * max(load, 0.0) * radius / self.modulus) ** (2 / 3) / (2 * radius)
-        level = max(closed, np.sqrt(max(worn_volume, 0.0) / (np.pi * radius)))
+        level = max(self._closed(radius, load), np.sqrt(max(worn_volume, 0.0) / (np.pi * radius)))
         return float(max(2 * np.sqrt(2 * level / self.curvatures[1]), WIDER * self.width))
+
+    def hertzian(self, load: float) -> float | None:
+        """Return about how wide the contact of the unworn bodies is where it is narrowest, mm; None as above."""
+        if self.curvatures is None:
+            return None
+        radius = 1 / np.sqrt(self.curvatures[0] * self.curvatures[1])
+        return float(2 * np.sqrt(2 * self._closed(radius, load) / self.curvatures[0]))
+
+    def _closed(self, radius: float, load: float) -> float:
+        """Return the level that a load closes, mm."""
+        return float((0.75 * max(load, 0.0) * radius / self.modulus) ** (2 / 3) / (2 * radius))
 
 
 def contact_rim(system: Tribosystem) -> ContactRim | None:

@@ -9,9 +9,13 @@ from fenwear.assembly import Tribosystem
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
+from fenwear.contact.complementarity import broken_text, complementarity_error
 from fenwear.cycle import Block, Steady
+from fenwear.results.summary import net_of
 from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import ContactEnds, contact_ends, opened
+from fenwear.watch.few import few_text
+from fenwear.watch.layer import layer_warnings
 from fenwear.watch.rim import ContactRim, contact_rim
 from fenwear.watch.size import size_warnings
 from fenwear.watch.stroke import stroke_warnings
@@ -32,6 +36,7 @@ class Watch:
         self.system, self.limits, self.chamfer = system, contact_limits(system), contact_chamfer(system)
         self._texts: dict[str, str] = {}
         self._first_clipped = 0
+        self._first = True  # block
         self._thick: dict[str, Array] = {}
 
     def see(self, block: Block) -> list[str]:
@@ -46,6 +51,12 @@ class Watch:
             ("strip", self.system.bodies.strip, block.wear_strip),
         ):
             found[f"worn through, {name}"] = self._worn_through(block, name, elastic, depths)
+        if self._first:
+            found["few"] = few_across(self.system, self.limits, block.pressure[0], "at the start")
+            self._first = False
+        worst = int(np.argmax(block.complementarity_error))
+        when = f"in half-cycle {int(block.half_cycle[worst]):,}"
+        found["broken"] = broken_text(float(block.complementarity_error[worst]), when)
         if block.heat is not None:
             hottest = int(np.argmax(block.heat.max_temperature))
             when = f"in half-cycle {int(block.half_cycle[hottest]):,}"
@@ -104,6 +115,12 @@ def contact_limits(system: Tribosystem) -> ContactEnds | ContactRim | None:
     return contact_rim(system) if system.pair.punch.dim == 3 else contact_ends(system)
 
 
+def few_across(system: Tribosystem, limits: ContactEnds | ContactRim | None, pressure: Array, when: str) -> str:
+    """Say that the contact of pressures (n,) has few nodes across it, see `few_text`; "" where it has enough."""
+    width = None if limits is None else limits.hertzian(float(system.pair.weights @ pressure))
+    return few_text(system.case, net_of(system), pressure, when, width)
+
+
 def clipped_text(limits: ContactEnds | ContactRim, where: str, needed: float | None, case: Case) -> str:
     """Say that the contact is clipped, and how wide the surface should be."""
     how = "; set geometry.parameters.contact_width" if "contact_width" in case.geometry.parameters else ""
@@ -153,6 +170,9 @@ def initial_warnings(system: Tribosystem) -> list[str]:
     contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
     pressure, weights, limits = contact.pressure[0], system.pair.weights, contact_limits(system)
     texts = [pressed(system.case, float(mean_pressures(pressure[None], weights)[0]))]
+    error = complementarity_error(pressure, contact.gap[0], system.interface.elastic_length)
+    texts.append(broken_text(float(error), "at the start"))
+    texts.append(few_across(system, limits, pressure, "at the start"))
     where = "" if limits is None else limits.where(pressure > 0)
     if limits is not None and where:
         needed = limits.width_needed(0.0, float(weights @ pressure))
@@ -164,8 +184,11 @@ def initial_warnings(system: Tribosystem) -> list[str]:
 def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
     """Return what is to be said of a cyclic steady state; collective."""
     weights, limits = system.pair.weights, contact_limits(system)
-    texts = size_warnings(system.case, system.bodies, system.rigid)
+    texts = [*size_warnings(system.case, system.bodies, system.rigid), *layer_warnings(system)]
     texts.append(pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max())))
+    texts.append(broken_text(state.complementarity_error, "in the cyclic steady state"))
+    few = (few_across(system, limits, pressure, "in the cyclic steady state") for pressure in state.phase_pressure)
+    texts.append(next((text for text in few if text), ""))
     if state.heat is not None:
         texts.append(hot(float(max(state.heat.punch.max(), state.heat.strip.max())), "in the cyclic steady state"))
     where = "" if limits is None else limits.where((state.phase_pressure > 0).any(axis=0) | (state.wear_per_cycle > 0))

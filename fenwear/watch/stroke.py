@@ -1,4 +1,7 @@
-"""What gross sliding leaves out of a stroke: the way that the bodies follow friction elastically before they slide."""
+"""What gross sliding leaves out of a stroke: the way that the bodies follow friction elastically before they slide.
+
+And distances that a program has measured at a radius where nothing touches.
+"""
 
 from __future__ import annotations
 
@@ -39,17 +42,32 @@ def elastic_share(system: Tribosystem) -> float | None:
     return way / max(amplitude, 1e-300)
 
 
-def stroke_warnings(system: Tribosystem) -> list[str]:
-    """Return what is to be said of a stroke to and fro that the bodies take up elastically."""
-    share = elastic_share(system)
-    if share is None or share <= TAKEN_UP:
+def _radius_warnings(system: Tribosystem) -> list[str]:
+    """Return what is to be said of distances that are measured where nothing touches."""
+    program = (system.made_from or system.case).program
+    if program is None or program.radius is None:
         return []
+    radii, weights = system.slid[0], system.pair.weights
+    if radii.min() <= program.radius <= radii.max():
+        return []
+    return [
+        f"program.radius: distances are those at {program.radius:g} mm from the axis, but the contact lies between "
+        f"{radii.min():.4g} and {radii.max():.4g} mm, in the mean at {weights @ radii / weights.sum():.4g} mm"
+    ]
+
+
+def stroke_warnings(system: Tribosystem) -> list[str]:
+    """Return what is to be said of a stroke that bodies take up elastically, or that is measured beside the contact."""
+    told, share = _radius_warnings(system), elastic_share(system)
+    if share is None or share <= TAKEN_UP:
+        return told
     way, amplitude = elastic_and_amplitude(system)
     against = system.case.against_stick
     remedy = f"stick and slip cannot be followed here: {against[0]}" if against else ""
     return [
+        *told,
         f"before they slide as a whole the bodies follow friction elastically, by an estimate {1e3 * way:.3g} µm each "
         f"way, {100 * share:.3g} % of the amplitude of {1e3 * amplitude:.3g} µm; gross sliding leaves that "
         f"out, and its slip and wear are too large by it; "
-        + (remedy or 'set contact.law = "coulomb" to follow stick and slip')
+        + (remedy or 'set contact.law = "coulomb" to follow stick and slip'),
     ]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, steady
 from fenwear.bodies.mesh import BodyMesh, build_meshes, meshes_folder, write_msh
@@ -72,6 +73,38 @@ def test_every_ready_geometry(file: Path) -> None:
     for body in ("punch", "strip"):
         assert groups[f"{body}_contact"] == dim - 1
         assert dim in [groups[name] for name in groups if name.startswith(body)]
+
+
+LAYERED = [file for file in sorted(meshes_folder().glob("*.geo")) if "diffusion_" in file.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("file", LAYERED, ids=lambda file: file.stem)
+def test_elements_are_as_high_as_the_layer_that_heats_up(file: Path) -> None:
+    """Those of the strip alone, and the bodies are the same; one that is thick enough changes nothing."""
+    text = file.read_text("utf-8")
+    name = re.search(r"diffusion_\w+", text)[0]  # type: ignore[index]
+    dim = 3 if "Physical Volume" in text else 2
+    found = [
+        build_meshes(Geometry(file=file.name), None, MPI.COMM_SELF, "solid" if dim == 3 else "strain", known={name: d})
+        for d in (0.0, 1e9, 1e-3)
+    ]
+    (punch, strip), unchanged, fine = found
+    assert [len(m.mesh.geometry.x) for m in unchanged] == [len(m.mesh.geometry.x) for m in (punch, strip)]
+    assert len(fine[0].mesh.geometry.x) == len(punch.mesh.geometry.x)
+    assert integral(fine[1]) == pytest.approx(integral(strip), rel=0.01)
+    length = np.ptp(punch.mesh.geometry.x[:, 0]) if name == "diffusion_length" else np.pi
+    assert top_heights(fine[1]).max() <= np.sqrt(1e-3 * length)
+
+
+def top_heights(body: BodyMesh) -> NDArray[np.float64]:
+    """Return volume over area of the elements at the contact, mm."""
+    import ufl
+    from dolfinx import fem
+
+    v = ufl.TestFunction(fem.functionspace(body.mesh, ("DG", 0)))
+    ds = ufl.Measure("ds", domain=body.mesh, subdomain_data=body.facet_tags)(body.curves[f"{body.name}_contact"])
+    volumes, areas = (fem.assemble_vector(fem.form(v * over)).array for over in (ufl.dx(body.mesh), ds))
+    return np.asarray(volumes[areas > 0] / areas[areas > 0])
 
 
 def integral(body: BodyMesh, region: str | None = None, curve: str | None = None) -> float:

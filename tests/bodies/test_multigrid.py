@@ -11,7 +11,7 @@ from fenwear.assembly.tribosystem import condense_bodies
 from fenwear.bodies import multigrid
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=4", "geometry.parameters.growth=2")
-COARSE = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=4")
+COARSE = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=4", "geometry.parameters.core=0")
 CASES = {"example1": SMALL, "ball-on-flat": COARSE}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 
 import dolfinx.fem as fem
@@ -12,6 +13,7 @@ from mpi4py import MPI
 
 from fenwear import Tribosystem, assemble, make_case
 from fenwear.bodies.mesh import BodyMesh
+from fenwear.case.templates import fill_in, find_template
 from fenwear.errors import MeshQualityError
 from fenwear.sliding.wear import Worn
 
@@ -56,6 +58,26 @@ def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..
     assert 0 < difference < 1e-5 * scale
     worn = Worn(np.full_like(system.pair.x, depth), system.unworn().strip)
     np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-13)
+
+
+@pytest.mark.mpi
+def test_circles_are_offset_along_their_own_normals() -> None:
+    """Every node of bore and shaft, to 50 degrees from the mean normal, moves by its own depth along the radius."""
+    data = tomllib.loads(fill_in(find_template("bushing")))
+    data["geometry"]["parameters"]["elements_along_contact"] = 16
+    case = make_case(data)
+    system = assemble(case)
+    gap = 0.5 * 0.04  # the bore's centre lies so far below the shaft's, mm
+    circles = ((system.pair.punch, 10 + gap, -gap, 1), (system.pair.strip, 10.0, 0.0, -1))
+    for surface, radius, z, way in circles:
+        angle = np.arctan2(surface.x[:, 0], surface.x[:, 1] - z)
+        depth = 0.02 + 0.01 * np.cos(3 * angle) if surface.body == "punch" else np.full(len(angle), 0.03)
+        none = system.unworn()
+        worn = Worn(depth, none.strip) if surface.body == "punch" else Worn(none.punch, depth)
+        moved = assemble(case, system.comm, worn)
+        x, z_moved = getattr(moved.pair, surface.body).x.T
+        np.testing.assert_allclose(np.hypot(x, z_moved - z), radius + way * depth, atol=2e-5 * depth.max())
+        np.testing.assert_allclose(getattr(moved.bodies.moved, surface.body), depth, rtol=1e-9)
 
 
 @pytest.mark.mpi

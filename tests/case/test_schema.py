@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, load_case, make_case
-from fenwear.case import builtin_cases
+from fenwear.case import builtin_cases, changed_case
 
 
 @pytest.mark.parametrize("name", builtin_cases())
@@ -61,6 +61,47 @@ def test_base_and_overrides(tmp_path: Path) -> None:
     assert case.motion.amplitude == 2  # type: ignore[union-attr]
     assert case.punch.loads[0].force == (0, -5000)
     assert case.materials == load_case("example1").materials
+
+
+def test_keys_of_a_base_are_taken_away(tmp_path: Path) -> None:
+    """A case without them is the case that never had them; what is taken away twice, or is none, is refused by name."""
+    base = tmp_path / "base.toml"
+    base.write_text("""
+base = "brake-pad"
+unset = ["heat.track"]
+[heat]
+inflow = "300 K"
+[wear.strip]
+coefficient = "1e-9 1/MPa"
+""")
+    own = tmp_path / "own.toml"
+    track = 'track = {heat_capacity = "120 J/K", loss = "0.6 W/K"}\n'
+    own.write_text(f'base = "base.toml"\nunset = ["heat.inflow", "wear.strip", "punch.loads.0"]\n[heat]\n{track}')
+    with pytest.raises(CaseError, match=r"punch\.loads"):
+        load_case(own)  # its only load is gone
+    own.write_text(f'base = "base.toml"\nunset = ["heat.inflow", "wear.strip"]\n[heat]\n{track}')
+    case = load_case(own)
+    assert case.heat is not None
+    assert (case.heat.inflow, case.wear.strip) == (None, None)
+    assert case.heat.track is not None
+    by_settings = ["unset=['heat.inflow', 'wear.strip']", "heat.track.heat_capacity=120 J/K", "heat.track.loss=0.6 W/K"]
+    assert load_case(base, by_settings).resolved() == case.resolved()
+    assert changed_case(load_case(base), *by_settings).resolved() == case.resolved()
+    later = load_case("example1", ["wear.punch.coefficient=1e-8", "unset=wear.punch", "wear.punch.beta=1e-8 1/MPa"])
+    assert later.wear.punch is not None
+    assert later.wear.punch.coefficient is None
+    for wrong, message in (
+        ("heat.inflo", "heat.inflo: no such key; did you mean heat.inflow or"),
+        ("heat.debris", "unset: 'heat.debris' is not given in the case"),
+        ("punch.loads.7", "punch.loads.7: no such key"),
+        ("[1]", "unset: expected a list of keys"),
+    ):
+        with pytest.raises(CaseError) as raised:
+            load_case(base, [f"unset={wrong}"])
+        assert message in str(raised.value)
+    own.write_text('unset = ["heat"]\n')
+    with pytest.raises(CaseError, match="unset: expected with a base"):
+        load_case(own)
 
 
 def test_a_motion_replaces_the_bases_motion() -> None:

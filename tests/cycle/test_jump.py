@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, jump, march
+from fenwear import Case, Tribosystem, assemble, jump, load_case, march
 from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block
@@ -107,12 +107,39 @@ def test_growing_contact(edited: Callable[..., Case]) -> None:
 
 
 @pytest.mark.mpi
+def test_mean_pressures_at_a_growing_edge() -> None:
+    """Means over turns of all nodes, those that come into contact among them, near the march's as the tolerance falls.
+
+    At an instant the outermost nodes are off by 0.05 to 0.5 of the largest pressure, whatever the tolerance.
+    """
+    sizes = ("geometry.parameters.elements_along_contact=40", "geometry.parameters.contact_width=2 mm")
+    system, ends = assemble(load_case("block-on-ring", sizes)), [50, 100, 200, 400]
+    rate = 2e-9 * 500.0  # of a turn
+
+    def means(blocks: Iterable[Block]) -> Array:
+        found = {0: np.zeros(len(system.pair.weights))}
+        for block in blocks:
+            found |= dict(zip(block.half_cycle.tolist(), block.totals.pressure, strict=True))
+            radii = np.linalg.norm(system.pair.opposite, axis=1) / 20.0
+            np.testing.assert_allclose(rate * radii * block.totals.pressure, block.wear, rtol=1e-9, atol=1e-12)
+        return np.array([(found[b] - found[a]) / (b - a) for a, b in zip([0, *ends[:-1]], ends, strict=True)])
+
+    expected = means(march(system, ends[-1], implicit=True))
+    errors = []
+    for tolerance in (0.03, 3e-3, 3e-4):
+        apart = np.abs(means(jump(system, ends[-1], tolerance=tolerance, stops=frozenset(ends))) - expected)
+        errors.append((apart.max(axis=1) / expected.max(axis=1)).max())
+    assert errors[0] < 2e-3
+    assert errors[1] < 0.6 * errors[0]
+    assert errors[2] < 0.6 * errors[1]
+
+
 def test_worn_area_of_a_jump_is_exact(assembled: Callable[..., Tribosystem]) -> None:
     """Verification 8 holds over any jump: N cycles wear 2 N beta~ F0 2 u0 / t."""
     system = assembled("example1", *OPENING)
     area = 1.25e-8 * np.pi * 1e4 * 3 / 10
     for block in jump(system, 20_000, tolerance=3e-3):
-        np.testing.assert_allclose(block.worn_area, area, rtol=1e-10)
+        np.testing.assert_allclose(block.worn_area_increment, area, rtol=1e-10)
         np.testing.assert_allclose(block.wear @ system.pair.weights, area * block.half_cycle, rtol=1e-9)
         assert block.equilibrium_error.max() < 1e-8
     assert block.half_cycle[-1] == 20_000

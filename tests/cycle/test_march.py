@@ -143,7 +143,7 @@ def test_blocks_are_one_sequence(assembled: Callable[..., Tribosystem]) -> None:
     whole = run(system, 10)
     parts = list(march(system, 10, block=3))
     assert [len(p) for p in parts] == [3, 3, 3, 1]
-    for name in ("half_cycle", "direction", "pressure", "gap", "wear", "worn_area", "periodicity"):
+    for name in ("half_cycle", "direction", "pressure", "gap", "wear", "worn_area_increment", "periodicity"):
         np.testing.assert_array_equal(np.concatenate([getattr(p, name) for p in parts]), getattr(whole, name))
 
 

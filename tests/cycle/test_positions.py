@@ -25,8 +25,8 @@ def test_worn_areas_of_both_bodies(assembled: Callable[..., Tribosystem], implic
     """Verification 8 for both bodies, whatever the pressure and the offsets."""
     for block in march(assembled("example1", *BOTH), 40, implicit=implicit):
         system = block.system
-        np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
-        np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
+        np.testing.assert_allclose(block.worn_area_increment, AREAS[0], rtol=1e-11)
+        np.testing.assert_allclose(block.worn_area_increment_strip, AREAS[1], rtol=1e-11)
         strip = block.wear_strip @ system.pair.strip.weights
         np.testing.assert_allclose(strip, AREAS[1] * block.half_cycle, rtol=1e-11)
         assert block.equilibrium_error.max() < 1e-12
@@ -145,8 +145,8 @@ def test_load_over_the_cycle(assembled: Callable[..., Tribosystem]) -> None:
     system = assembled("example1", *COARSE, table)
     assert system.rigid.mean_pressure == pytest.approx(MEAN, rel=1e-6)
     *_, block = march(system, 10)
-    np.testing.assert_allclose(block.worn_area[::2], 1.5 * AREAS[0], rtol=1e-9)
-    np.testing.assert_allclose(block.worn_area[1::2], 0.5 * AREAS[0], rtol=1e-9)
+    np.testing.assert_allclose(block.worn_area_increment[::2], 1.5 * AREAS[0], rtol=1e-9)
+    np.testing.assert_allclose(block.worn_area_increment[1::2], 0.5 * AREAS[0], rtol=1e-9)
     assert block.equilibrium_error.max() < 1e-12
 
 
@@ -191,8 +191,8 @@ def test_temperature_dependent_wear(assembled: Callable[..., Tribosystem]) -> No
     law = "wear.punch={coefficient={expression='3.926990816987242e-8 * (1 + 0.1 * T)'}}"
     system = assembled("example1-heat", *COARSE, law)
     *_, block = march(system, 20)
-    assert block.worn_area[0] == pytest.approx(AREAS[0], rel=1e-12)
-    assert (np.diff(block.worn_area) > 0).all()
+    assert block.worn_area_increment[0] == pytest.approx(AREAS[0], rel=1e-12)
+    assert (np.diff(block.worn_area_increment) > 0).all()
 
 
 def test_growth_rate_with_the_strip_worn(assembled: Callable[..., Tribosystem]) -> None:
@@ -214,8 +214,8 @@ def test_heat_under_a_strip_that_moves(assembled: Callable[..., Tribosystem]) ->
     one = assembled("example1-heat", *COARSE, *hot)
     several = assembled("example1-heat", *BOTH, *hot)
     (single,), (block,) = (list(march(system, 40)) for system in (one, several))
-    np.testing.assert_allclose(block.worn_area, AREAS[0], rtol=1e-11)
-    np.testing.assert_allclose(block.worn_area_strip, AREAS[1], rtol=1e-11)
+    np.testing.assert_allclose(block.worn_area_increment, AREAS[0], rtol=1e-11)
+    np.testing.assert_allclose(block.worn_area_increment_strip, AREAS[1], rtol=1e-11)
     assert block.heat is not None
     assert single.heat is not None
     assert block.heat.balance_error.max() < 1e-8

@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case
+from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case, steady
 from fenwear.case.program import read_program, stages_of
-from fenwear.cycle import Block, Span, follow_program
+from fenwear.cycle import Block, Span, at_step, follow_program
 from fenwear.errors import CaseError
+from fenwear.watch import stroke_warnings
 
 Edited = Callable[..., Case]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "geometry.follow_wear=never")
@@ -57,6 +58,25 @@ def test_load_steps_wear_what_load_and_distance_say(edited: Edited) -> None:
         force = of(blocks, "pressure") @ system.pair.weights * system.bodies.punch.thickness
         np.testing.assert_allclose(force, of(blocks, "load"), rtol=1e-9)
     assert set(np.round(of(blocks, "half_cycle")[of(blocks, "load") == 5e3])) <= set(range(1, 42))
+
+
+def test_distance_where_the_strip_turns() -> None:
+    """A turn slides 2 pi R at the radius given, which is warned of beside the contact, from 20 to 30 mm."""
+    turning = ("motion={kind='rotation', angular_speed=4, duration=1.5707963267948966}", "program.radius=25")
+    case = load_case("ring-on-ring", [*turning, "program.steps=[{distance='3 m'}, {time=4}]", "run.half_cycles=22"])
+    first, second = stages_of(case)
+    assert (first.end, second.end) == (round(3000 / (2 * np.pi * 25)), 19 + round(4 / (np.pi / 2)))
+    with pytest.raises(CaseError, match=r"program\.radius: missing"):
+        load_case("ring-on-ring", [turning[0], "program.steps=[{distance='3 m'}]"])
+    with pytest.raises(CaseError, match=r"program\.radius: does not go with motion\.kind = 'reciprocating'"):
+        load_case("example1", ["program.radius=3", "program.steps=[{cycles=3}]", "run.half_cycles=6"])
+    small = ("geometry.parameters.across=2", "geometry.degree=2", "run.half_cycles=6")
+    case = load_case("ring-on-ring", [*turning, *small, "program.radius=31", "program.steps=[{cycles=6}]"])
+    (told,) = stroke_warnings(assemble(case))
+    assert told.startswith(
+        "program.radius: distances are those at 31 mm from the axis, but the contact lies between 20"
+    )
+    assert told.endswith(" and 30 mm, in the mean at 25.33 mm")  # 2/3 (30³ - 20³) / (30² - 20²)
 
 
 def test_jumps_meet_the_march_in_a_ramp(edited: Edited) -> None:
@@ -155,7 +175,7 @@ def test_a_run_goes_on_within_a_ramp(edited: Edited, tmp_path: Path) -> None:
         run_case(case, name, tmp_path / name, lambda message: None, resume=resume, progress="none")
     one, other = (read_history(tmp_path / name) for name in ("whole", "part"))
     assert other.sizes == one.sizes
-    for name in ("wear", "pressure", "load", "time", "sliding_distance", "total_volume", "friction_work"):
+    for name in ("wear", "pressure", "load", "time", "sliding_distance", "worn_volume", "friction_work"):
         np.testing.assert_allclose(other[name], one[name], rtol=1e-10, err_msg=name)
 
 
@@ -236,3 +256,59 @@ def test_what_is_wrong_with_a_table(tmp_path: Path, text: str, expected: str) ->
         read_program(written(tmp_path, text))
     assert expected in str(refused.value)
     assert "program.csv" in str(refused.value)
+
+
+def test_steady_state_of_a_step(edited: Edited) -> None:
+    """The state of a program is that of what acts at the end of its last step, or of the one asked for, as a case of
+    its own has it."""
+    steps = [
+        {"cycles": 20, "load": "5 kN"},
+        {"cycles": 20, "load": ["5 kN", "20 kN"], "amplitude": ["1.5 mm", "3 mm"]},
+        {"cycles": 10, "load_factor": 3},
+    ]
+    system = assemble(edited("example1", steps_of(steps), *SMALL))
+    for step, force, amplitude in ((0, 5e3, 1.5), (1, 20e3, 3.0), (None, 30e3, 3.0)):
+        loads = [{"on": "punch_load", "force": [0.0, -force]}]
+        alone = edited(
+            "example1",
+            lambda tables, loads=loads: tables["punch"].update(loads=loads),
+            *SMALL,
+            f"motion.amplitude={amplitude}",
+        )
+        exact, chosen = steady(assemble(alone)), at_step(system, step)
+        found = steady(system) if step is None else steady(chosen)
+        np.testing.assert_allclose(found.pressure, exact.pressure, atol=1e-9 * exact.pressure.max())
+        np.testing.assert_allclose(found.wear_per_cycle, exact.wear_per_cycle, rtol=1e-9)
+        assert found.system.normal_force == pytest.approx(force, rel=1e-12)
+        assert chosen.optimum(1).velocity == pytest.approx(exact.system.optimum(1).velocity, rel=1e-9)
+    with pytest.raises(CaseError, match=r"program.steps: the program has 3 steps, and none of number 4"):
+        at_step(system, 3)
+
+
+def test_a_step_that_ends_at_rest_has_no_steady_state(fenwear: Any, tmp_path: Path) -> None:
+    """What `steady` and `optimum` print names the step and its load; a stop is refused by its key."""
+    (tmp_path / "stop.toml").write_text("""
+base = "monotonic-lz20"
+[geometry]
+degree = 2
+[[program.steps]]
+cycles = 2
+load = "20 kN"
+[[program.steps]]
+time = "2 s"
+speed = ["100 mm/s", "0 mm/s"]
+""")
+    small = ("--set", "geometry.parameters.elements_along_contact=8")
+    for command in ("steady", "optimum"):
+        done = fenwear(command, "stop.toml", *small, cwd=tmp_path)
+        assert done.returncode == 2, done.stdout
+        assert "program.steps.1.speed: nothing slides at the end of step 2" in done.stderr
+    done = fenwear("optimum", "stop.toml", *small, "--step", "1", cwd=tmp_path)
+    assert (
+        "of step 1 of 2 of the program (program.steps.0), as it ends, held for ever: normal force 20,000 N"
+        in done.stdout
+    )
+    assert "p = 50.0000 MPa" in done.stdout  # 33.333 MPa (1 + c), c = 0.5
+    done = fenwear("optimum", "monotonic-lz20", "--step", "1", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "program: missing" in done.stderr

@@ -77,8 +77,8 @@ def test_half_cycles_in_parts(
     assert retried.retries.sum() == half_cycles
     parts = 5 * system.motion.positions
     assert retried.remedies == {SMALLER_STEPS.format(parts): half_cycles}
-    np.testing.assert_allclose(retried.worn_area, usual.worn_area, rtol=1e-12)
-    np.testing.assert_allclose(retried.worn_area_strip, usual.worn_area_strip, rtol=1e-12)
+    np.testing.assert_allclose(retried.worn_area_increment, usual.worn_area_increment, rtol=1e-12)
+    np.testing.assert_allclose(retried.worn_area_increment_strip, usual.worn_area_increment_strip, rtol=1e-12)
     assert retried.equilibrium_error.max() < 1e-12
     np.testing.assert_allclose(retried.pressure, usual.pressure, rtol=0, atol=0.02 * usual.pressure.max())
     if retried.heat is None or usual.heat is None:
@@ -97,7 +97,7 @@ def test_heat_too_strong_for_a_half_cycle(assembled: Assemble) -> None:
     block = run(system, 20)
     assert 0 < np.count_nonzero(block.retries) < 20
     assert any(name.startswith("solved in") for name in block.remedies)
-    np.testing.assert_allclose(block.worn_area, 1.25e-8 * np.pi * 1e4 * 40 / 10, rtol=1e-12)
+    np.testing.assert_allclose(block.worn_area_increment, 1.25e-8 * np.pi * 1e4 * 40 / 10, rtol=1e-12)
     assert block.heat is not None
     assert block.heat.balance_error.max() < 1e-10
     assert block.equilibrium_error.max() < 1e-10
@@ -160,4 +160,4 @@ def test_jumps_that_fail(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, s
     last = blocks[-1]
     assert last.half_cycle[-1] == 400
     np.testing.assert_allclose(last.pressure[-2:], usual.pressure[-2:], rtol=0, atol=0.01 * usual.pressure.max())
-    np.testing.assert_allclose(last.worn_area, usual.worn_area[-1], rtol=1e-12)
+    np.testing.assert_allclose(last.worn_area_increment, usual.worn_area_increment[-1], rtol=1e-12)

@@ -99,17 +99,16 @@ def test_slow_split_gives_advice(assembled: Assemble, monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("partition", [0.2, 0.5])
 def test_order_in_time_steps(assembled: Assemble, partition: float) -> None:
-    """1, 5 and 20 steps in a half-cycle: of first order toward 80."""
+    """1, 5 and 20 steps in a half-cycle: of second order toward 80 in the punch, in whose frame its material rests."""
+    settings = ("heat.operator=full", f"heat.partition={partition}")
     ends = [
-        temperatures(run(assembled("example1-heat", *COARSE, f"heat.steps={n}", f"heat.partition={partition}"), 40))[
-            -2:
-        ]
+        temperatures(run(assembled("example1-heat", *COARSE, *settings, f"heat.steps={n}"), 40))[-2:, 0]
         for n in (5, 10, 20, 80, 1)
     ]
     errors = np.array([np.abs(end - ends[3]).max() for end in ends])
-    np.testing.assert_allclose(errors[:2] / errors[1:3], [2.15, 2.35], atol=0.3)  # (1/n - 1/80) of first order
-    assert 1.5 * errors[0] < errors[4] < 8 * errors[0]
-    assert errors[0] < 0.02 * np.abs(ends[3]).max()
+    assert (errors[:2] > 3.5 * errors[1:3]).all()
+    assert errors[4] > 5 * errors[0]
+    assert errors[0] < 0.01 * np.abs(ends[3]).max()
 
 
 @pytest.mark.parametrize("half_cycles", [400, 2000])

@@ -280,7 +280,7 @@ def compute(case: Case) -> None:
                 raise NoResultError("not finite")
         if block.heat is not None and not np.isfinite(block.heat.max_temperature).all():
             raise NoResultError("temperatures not finite")
-        if min(block.pressure.min(), block.worn_area.min(), block.worn_area_strip.min()) < 0:
+        if min(block.pressure.min(), block.worn_area_increment.min(), block.worn_area_increment_strip.min()) < 0:
             raise NoResultError("negative pressure or wear")
         if block.equilibrium_error.max() > 1e-6:
             raise NoResultError(f"not in equilibrium: {block.equilibrium_error.max():g}")

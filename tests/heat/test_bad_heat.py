@@ -32,6 +32,8 @@ ISOLATED = ("heat.convection=0", "strip.temperatures=[]")
         (["heat.conductance=0", "heat.conductance_per_pressure=[1]"], "heat.conductance_per_pressure", "2"),
         (["heat.conducting=never"], "heat.conducting", "'closed' or 'nominal'"),
         (["heat.steps=0"], "heat.steps", "1"),
+        (["heat.step_tolerance=0"], "heat.step_tolerance", "greater than 0"),
+        (["heat.inflow=300"], "heat.inflow", "to and fro the same material stays, and none enters"),
         (["heat.relaxation=0"], "heat.relaxation", "greater than 0"),
         (["heat.split_tolerance=1"], "heat.split_tolerance", "less than 1"),
         (["heat.operator=magic"], "heat.operator", "'reduced' or 'full'"),

@@ -101,10 +101,11 @@ def test_open_nodes(blocks: Make, conducting: str) -> None:
 @pytest.mark.parametrize("operator", ["full", "reduced"])
 @pytest.mark.parametrize("inflow", [None, -4.0])
 def test_one_step_shares_the_heat(blocks: Make, operator: str, inflow: float | None) -> None:
-    """A step by hand for lumped blocks: so good conductors that each has one temperature.
+    """Steps by hand for lumped blocks: so good conductors that each has one temperature.
 
-    C_i (t_i - T) / dt = q_i with q1 + q2 = Q, kappa Q - q1 = h (t1 - t2); every step warms both anew. The
-    strip's material enters at the inflow's temperature, by default the ambient 2 K, and leaves with its own.
+    In each of two stages, g dt with g = 1 - 1/sqrt(2), C_i (t_i - T) / (g dt) = q_i with q1 + q2 = Q and
+    kappa Q - q1 = h (t1 - t2); every step warms both anew. The strip's material enters at the inflow's temperature, by
+    default the ambient 2 K, and leaves with its own.
     """
     heat = {"conductance": 0.7, "partition": 0.3, "steps": 2, "operator": operator, "initial": 15.0, "ambient": 2.0}
     case = stack({**heat, "inflow": inflow}, (False, False))
@@ -115,13 +116,16 @@ def test_one_step_shares_the_heat(blocks: Make, operator: str, inflow: float | N
     pressure = np.full(len(system.pair.x), PRESSURE)
     state, terms = exchange.half_cycle(exchange.initial(), 0, pressure, exchange.conductance(pressure))
     t = np.array([15.0, 15.0])
-    capacity, between = np.diag(HEIGHTS) / dt, 0.7 * np.array([[1, -1], [-1, 1]])
+    stage = 1 - 1 / np.sqrt(2)
+    capacity, between = np.diag(HEIGHTS) / (stage * dt), 0.7 * np.array([[1, -1], [-1, 1]])
     through, carried = SPEED * HEIGHTS[1], 0.0  # heat capacity a second
     brought = through * (2.0 if inflow is None else inflow)
     for _ in range(2):
         sources = heat * np.array([0.3, 0.7]) + [0.0, brought]
-        t = np.linalg.solve(capacity + between + np.diag([0.0, through]), capacity @ t + sources)
-        carried += dt * (through * t[1] - brought)
+        for counts in ((1 - stage) / stage, 1.0):
+            end = np.linalg.solve(capacity + between + np.diag([0.0, through]), capacity @ t + sources)
+            carried += counts * stage * dt * (through * end[1] - brought)
+            t = t + counts * (end - t)
     for surface, exact in zip(exchange.contact_temperatures(state), t, strict=True):
         np.testing.assert_allclose(surface, exact, rtol=1e-5)
     assert terms[TERMS.index("friction")] == pytest.approx(heat * 1.0, rel=1e-12)  # of 1 s, 1 mm x 1 mm

@@ -182,10 +182,7 @@ def test_a_bad_factor_is_found() -> None:
 
 
 def test_new_material_is_a_heat_sink(assembled: Callable[..., Tribosystem]) -> None:
-    """A strip that is cooled by what comes in only has a steady state: that of its velocity, as the mesh gets finer.
-
-    The upwinding depends on the time step, so that on one mesh the two are not equal.
-    """
+    """A strip that is cooled by what comes in only has a steady state: that of its velocity, by any step."""
     errors = []
     for elements in (4, 16):
         system = assembled(
@@ -206,5 +203,4 @@ def test_new_material_is_a_heat_sink(assembled: Callable[..., Tribosystem]) -> N
         assert found.heat is not None
         assert np.abs(found.heat.punch[0] - punch).max() < 1e-4 * np.abs(punch).max()
         errors.append(np.abs(found.heat.strip[0] - strip).max() / np.abs(strip).max())
-    assert errors[0] < 5e-3
-    assert errors[1] < errors[0] / 3
+    assert max(errors) < 1e-5

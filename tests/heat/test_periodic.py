@@ -40,7 +40,7 @@ def follow(heat: CycleHeat, state: HeatState, pressure: Array, conductances: Arr
     gaps = []
     for phase in range(len(pressure)):
         state, _ = heat.exchange.half_cycle(state, phase, pressure[phase], conductances[phase])
-        gaps.append(heat.exchange.gap(state))
+        gaps.append(heat.exchange.gap(state, phase))
     return state, gaps
 
 

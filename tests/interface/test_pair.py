@@ -37,7 +37,9 @@ def test_wear_never_makes_a_surface_grow(unmatched: Tribosystem) -> None:
 @pytest.mark.parametrize("name", ["ball-on-flat", "ring-on-ring"])
 def test_rounding_moves_nothing(name: str) -> None:
     """Where facets are cut is decided by rounding; what is integrated over the cuts must not be, bent facets or not."""
-    bodies = place_case(load_case(name, ["geometry.parameters.across=4"] * (name == "ball-on-flat"))).bodies
+    bodies = place_case(
+        load_case(name, [f"geometry.parameters.{k}" for k in ("core=0", "across=4") if name == "ball-on-flat"])
+    ).bodies
     punch, strip = bodies.punch.surface, bodies.strip.surface
     rings = bodies.punch.law.kind == "axisymmetric"
     noise = 1e-15 * np.random.default_rng(1).standard_normal(punch.trace.shape)

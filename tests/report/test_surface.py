@@ -30,7 +30,7 @@ EVIL = '<script>alert("1")</script> & <img src=x onerror=alert(1)>'
 SETTINGS = {
     "pin-on-disc": ("geometry.degree=1", "geometry.order=1", "run.half_cycles=30", "geometry.parameters.around=2"),
     "ball-on-flat": ("geometry.degree=1", "geometry.order=1", "run.half_cycles=4", "motion.positions=2",
-                     "geometry.parameters.across=6"),
+                     "geometry.parameters.across=6", "geometry.parameters.core=0"),
     "ring-on-ring": ("geometry.degree=2", "run.half_cycles=30", "geometry.parameters.across=4"),
 }  # fmt: skip
 

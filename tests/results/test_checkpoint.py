@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,7 @@ def test_another_number_of_ranks(fenwear: Run, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
     fenwear("run", "example1-heat", "-o", str(tmp_path / "one"), *options("run.half_cycles=50"))
     one, two = history(tmp_path / "one"), history(tmp_path / "two")
-    for name in ("max_pressure", "max_temperature", "worn_area"):
+    for name in ("max_pressure", "max_temperature", "worn_area_increment"):
         np.testing.assert_allclose(two[name], one[name], rtol=1e-9)
 
 
@@ -112,6 +112,10 @@ def test_refusals(fenwear: Run, tmp_path: Path) -> None:
         done = fenwear("run", "example1-heat", "-o", folder, *options(*settings), "--resume")
         assert done.returncode == 2
         assert expected in done.stderr
+    (tmp_path / "run" / "checkpoint" / "extremes.json").unlink()  # as earlier ones have none
+    done = fenwear("run", "example1-heat", "-o", folder, *options("run.half_cycles=8"), "--resume")
+    assert done.returncode == 2
+    assert "an earlier version, which to and fro had the strip's temperatures below the punch" in done.stderr
     assert (tmp_path / "run" / "history.nc").read_bytes() == before
     done = fenwear("run", "example1-heat", "-o", str(tmp_path / "none"), *options(), "--resume")
     assert done.returncode == 2
@@ -124,9 +128,9 @@ def test_jumps_are_saved_long_before_a_block_of_them_is_full(tmp_path: Path, mon
     saved: list[int] = []
     save = checkpoint.save
 
-    def noted(directory: Path, system: Tribosystem, state: RunState) -> None:
+    def noted(directory: Path, system: Tribosystem, state: RunState, extremes: Mapping[str, float]) -> None:
         saved.append(state.half_cycle)
-        save(directory, system, state)
+        save(directory, system, state, extremes)
 
     monkeypatch.setattr("fenwear.run.BLOCK_SECONDS", 0.0)
     monkeypatch.setattr("fenwear.lookout.LOOK", 0.0)

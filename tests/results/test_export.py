@@ -112,7 +112,7 @@ def test_worn_surfaces_part(folders: Callable[[str], Path], tmp_path: Path) -> N
         assert (sign * worn).max() > 0
         assert (sign * worn).min() >= 0
         area = history[f"weight{end}"].sel(half_cycle=last).values @ (sign * worn)
-        assert area == pytest.approx(float(history[f"total_area{end}"][-1]), rel=1e-3)
+        assert area == pytest.approx(float(history[f"worn_area{end}"][-1]), rel=1e-3)
 
 
 def test_loops_of_partial_slip(folders: Callable[[str], Path], tmp_path: Path) -> None:

@@ -6,15 +6,17 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import xarray
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
 from fenwear.report.course import mean_pressure, nominal_width
-from fenwear.results.history import free_directory, make_directory
+from fenwear.results.history import HistoryWriter, free_directory, make_directory
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
+from fenwear.stick.writer import CycleWriter
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")
 NO_REPORT = "output.report=false"
@@ -40,13 +42,33 @@ def test_history_is_what_was_computed(assembled: Callable[..., Tribosystem], tmp
     assert history.pressure.dims == ("half_cycle", "x")
     assert history.half_cycle[-1] == summary["half_cycles"] == 30
     np.testing.assert_allclose((history.pressure * history.weight).sum("x"), 1000, rtol=1e-8)
-    np.testing.assert_allclose(history.worn_area, 4e-7 * 1e4 * 3 / 10, rtol=1e-10)
+    np.testing.assert_allclose(history.worn_area_increment, 4e-7 * 1e4 * 3 / 10, rtol=1e-10)
     if integration != "jump":
         system = assembled("example1", *SMALL)
         (block,) = march(system, 30, implicit=integration == "implicit")
         np.testing.assert_array_equal(history.pressure, block.pressure)
         np.testing.assert_array_equal(history.wear, block.wear)
         np.testing.assert_array_equal(history.half_cycle, np.arange(1, 31))
+
+
+def test_a_worn_volume_means_the_same_everywhere(assembled: Callable[..., Tribosystem], tmp_path: Path) -> None:
+    """From the start in history and summary, by one name; a history that has another one there is refused."""
+    history, summary = save(tmp_path / "run", "run.half_cycles=6")
+    volume = history.worn_volume
+    np.testing.assert_allclose(volume, 10 * history.worn_area_increment.cumsum(), rtol=1e-12)
+    assert isinstance(summary["punch"], dict)
+    for name in ("worn_volume_mm3", "worn_area_mm2"):
+        assert summary["punch"][name] == float(history[name.rpartition("_")[0]][-1])
+
+    path, system = tmp_path / "run" / "history.nc", assembled("example1", *SMALL)
+    with h5py.File(path, "r+") as file:
+        file.move("worn_area", "total_area")
+        file.move("worn_area_increment", "worn_area")
+    with pytest.raises(CaseError, match=r"history\.nc: of an older fenwear, in which worn_area and worn_volume were"):
+        load_history(tmp_path / "run")
+    for resume in (lambda: HistoryWriter(path.parent, system, 4), lambda: CycleWriter(path.parent, 4, 1)):
+        with pytest.raises(CaseError, match=r"history\.nc: cannot be read, or is of another version; remove it"):
+            resume()
 
 
 @pytest.mark.parametrize(

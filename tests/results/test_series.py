@@ -48,9 +48,12 @@ def test_all_times_in_one_file(tmp_path: Path, name: str) -> None:
         np.testing.assert_allclose(grid.points[:count, 0], data.punch_x, rtol=1e-6, atol=1e-6)
         np.testing.assert_allclose(grid["stress (MPa)"][:count, 5], data.punch_stress_xz, rtol=1e-12)
         np.testing.assert_allclose(grid["von Mises stress (MPa)"][count:], data.strip_von_mises, rtol=1e-12)
-        on_punch, on_strip = grid["contact pressure (MPa)"][:count], grid["contact pressure (MPa)"][count:]
+        on_punch = grid["contact pressure (MPa)"][:count]
         np.testing.assert_allclose(np.sort(on_punch)[-3:], np.sort(data.punch_contact_pressure)[-3:], rtol=1e-12)
-        assert on_strip.max() == pytest.approx(on_punch.max(), rel=0.05)
+        # Away from the edges, whose nodes on the strip share their force with what lies outside.
+        x, p = np.abs(grid.points[:, 0]), grid["contact pressure (MPa)"]
+        inner = x < 0.7 * x[p > 0].max()
+        assert (p * inner)[count:].max() == pytest.approx((p * inner)[:count].max(), rel=0.05)
         assert grid["worn depth (mm)"][:count].max() == pytest.approx(float(data.punch_contact_depth.max()), rel=1e-12)
         assert ("temperature (K)" in grid.array_names) == (name == "example1-heat")
         areas = grid.compute_cell_sizes()["Area"]

@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import Tribosystem, jump, load_case, march
+from fenwear import Tribosystem, assemble, jump, load_case, march
+from fenwear.case.templates import write_case_of
 from fenwear.cycle import Block, follow
+from fenwear.interface.placement import in_model
 from fenwear.results.reading import load_history
 from fenwear.results.sheet import sheet, sheet_text, values, variables
+from fenwear.results.zone import without_noise
 from fenwear.run import run_case
 
 Assemble = Callable[..., Tribosystem]
@@ -50,13 +53,13 @@ def test_volume_is_k_f_s(assembled: Assemble, every: str) -> None:
     assert found["normal_force"] == pytest.approx(FORCE, rel=1e-10)
     assert found["friction_force"] == pytest.approx(MU * FORCE, rel=1e-10)
     assert found["friction_work"] == pytest.approx(MU * FORCE * s, rel=1e-10)
-    assert found["total_volume"] == pytest.approx(K * FORCE * s, rel=1e-10)
-    assert found["total_area"] == pytest.approx(K * FORCE * s / 10, rel=1e-10)
-    assert found["total_mass"] == pytest.approx(0.846 * K * FORCE * s, rel=1e-10)  # 846 kg/m³ = 0.846 mg/mm³
+    assert found["worn_volume"] == pytest.approx(K * FORCE * s, rel=1e-10)
+    assert found["worn_area"] == pytest.approx(K * FORCE * s / 10, rel=1e-10)
+    assert found["worn_mass"] == pytest.approx(0.846 * K * FORCE * s, rel=1e-10)  # 846 kg/m³ = 0.846 mg/mm³
     for name in ("wear_rate", "mean_wear_rate"):
         assert found[name] == pytest.approx(1e3 * K, rel=1e-10)  # mm³/(N mm) in mm³/(N m)
     weights, block = system.pair.weights, found["block"]
-    assert weights @ block.wear[-1] == pytest.approx(found["total_area"], rel=1e-10)
+    assert weights @ block.wear[-1] == pytest.approx(found["worn_area"], rel=1e-10)
     assert 10 * weights @ found["dissipated_energy"] == pytest.approx(found["friction_work"], rel=1e-10)
     # beta~ p ds is worn where mu p ds is dissipated.
     np.testing.assert_allclose(found["dissipated_energy"], MU / K * block.wear[-1], rtol=1e-9)
@@ -76,7 +79,7 @@ def test_half_cycles_of_changing_load_and_square_law(assembled: Assemble) -> Non
     volume = 1e-9 * STROKE * (pressure**2 @ weights)
     path = STROKE * (pressure @ weights)
     assert np.ptp(path) > 0.1 * path.mean()
-    assert found["total_volume"] == pytest.approx(volume.sum(), rel=1e-12)
+    assert found["worn_volume"] == pytest.approx(volume.sum(), rel=1e-12)
     assert found["mean_wear_rate"] == pytest.approx(1e3 * volume.sum() / path.sum(), rel=1e-12)
     assert found["wear_rate"] == pytest.approx(1e3 * volume[-1] / path[-1], rel=1e-12)
     assert found["friction_work"] == pytest.approx(MU * path.sum(), rel=1e-12)
@@ -107,13 +110,13 @@ def test_both_bodies_after_their_meshes_have_followed(assembled: Assemble, how: 
     found, block = last(blocks), blocks[-1]
     path = float(block.totals.of("load_path")[-1])
     for end, k in (("", 2e-5), ("_strip", 3e-5)):
-        assert found[f"total_volume{end}"] == pytest.approx(k * path, rel=1e-12)
+        assert found[f"worn_volume{end}"] == pytest.approx(k * path, rel=1e-12)
         assert found[f"mean_wear_rate{end}"] == pytest.approx(1e3 * k, rel=1e-12)
     assert path == pytest.approx(18.5 * 0.05 * count, rel=1e-9)  # the load, as it has no friction
     assert found["normal_force"] == pytest.approx(18.5, rel=1e-9)
     assert found["sliding_distance"] == pytest.approx(0.05 * count, rel=1e-12)
     by_depth = block.system.pair.strip.weights @ block.wear_strip[-1]
-    assert by_depth == pytest.approx(found["total_area_strip"], rel=0.02)
+    assert by_depth == pytest.approx(found["worn_area_strip"], rel=0.02)
     if how == "march":
         pressures = np.concatenate([b.adds.of("load_path") for b in blocks])
         assert path == pytest.approx(pressures.sum(), rel=1e-12)
@@ -131,6 +134,43 @@ def test_what_is_jumped_over_is_counted(assembled: Assemble) -> None:
     assert errors[1] < min(0.01, errors[0])
 
 
+def test_forces_of_a_curved_contact_are_those_of_a_rig(tmp_path: Path) -> None:
+    """A bushing on its shaft: the load is what is applied; the torque that of friction; volume k times the law's path.
+
+    The integral of the pressure over the arc is more than the load, 4 / pi times at most; and so is the specific wear
+    rate of a rig more than that of the law.
+    """
+    path = tmp_path / "bushing.toml"
+    write_case_of("bushing", path)
+    system = assemble(load_case(path, ["geometry.parameters.elements_along_contact=20", "geometry.degree=2"]))
+    (block,) = march(system, 3)
+    found, pair, thickness = values(block), system.pair, system.bodies.punch.thickness
+    mu, law = system.case.contact.friction, system.case.wear.punch
+    assert law is not None
+    force = thickness * block.pressure[:, :, None] * pair.weights[:, None] * pair.normal
+    # Tractions of friction are along the normals turned by 90 degrees, to the side that the shaft goes.
+    turned = mu * np.stack([pair.normal[:, 1], -pair.normal[:, 0]], axis=1)
+    turned *= np.sign(in_model(system.sliding.field.velocity(pair.opposite), 2)[:, :1] * turned[:, :1]).max()
+    drag = thickness * np.einsum("kn,n,nd->kd", block.pressure, pair.weights, turned)
+    load = 800.0
+    np.testing.assert_allclose(force.sum(axis=1)[:, 1] + drag[:, 1], load, rtol=1e-9)
+    np.testing.assert_allclose(found["normal_force"], load, rtol=1e-9)
+    np.testing.assert_allclose(found["friction_force"], np.linalg.norm(drag, axis=1), rtol=1e-9)
+    integral = thickness * block.pressure @ pair.weights
+    np.testing.assert_allclose(found["pressure_integral"], integral, rtol=1e-12)
+    assert (load * 1.005 < integral).all()
+    assert (integral < load * 4 / np.pi).all()
+    radius = system.case.geometry.parameters["radius"]
+    np.testing.assert_allclose(found["friction_torque"], mu * integral * radius, rtol=1e-3)  # the facets are chords
+    np.testing.assert_allclose(found["law_wear_rate"], 1e3 * law.coefficient, rtol=1e-9)
+    by_rig = 1e3 * np.diff(found["worn_volume"], prepend=0.0) / load / np.diff(found["sliding_distance"], prepend=0.0)
+    np.testing.assert_allclose(found["wear_rate"], by_rig, rtol=1e-9)
+    np.testing.assert_allclose(found["wear_rate"], 1e3 * law.coefficient * integral / load, rtol=1e-6)
+    sliding = sheet(block)["sliding"]
+    assert sliding["friction_coefficient"] == pytest.approx(mu, rel=1e-9)
+    assert sliding["friction_over_load"] == pytest.approx(mu * integral.mean() / load, rel=1e-6)
+
+
 def test_turning_strip(assembled: Assemble) -> None:
     """A disc under a pin: the arc at the load's mean radius is slid, and k F s worn, to rounding."""
     system = assembled("pin-on-disc", "geometry.degree=1", "geometry.order=1")
@@ -145,12 +185,15 @@ def test_turning_strip(assembled: Assemble) -> None:
     law, mu = case.wear.punch, case.contact.friction
     assert law is not None
     assert isinstance(law.coefficient, float)
-    assert found["total_volume"][-1] == pytest.approx(law.coefficient * path, rel=1e-12)
+    assert found["worn_volume"][-1] == pytest.approx(law.coefficient * path, rel=1e-12)
     by_hand = law.coefficient * found["normal_force"][-1] * found["sliding_distance"][-1]
-    assert found["total_volume"][-1] == pytest.approx(by_hand, rel=1e-12)
-    np.testing.assert_allclose(found["friction_force"], mu * found["normal_force"], rtol=1e-12)
+    assert found["worn_volume"][-1] == pytest.approx(by_hand, rel=1e-12)
+    # The pin is as wide as the directions of sliding differ over it: friction has a resultant of less than mu F.
+    arms = pair.punch.x[:, :2] / radius[:, None]
+    np.testing.assert_allclose(found["friction_force"], mu * np.linalg.norm(force @ arms, axis=1), rtol=1e-9)
+    np.testing.assert_allclose(found["friction_torque"], mu * force @ radius, rtol=1e-9)
     assert found["friction_work"][-1] == pytest.approx(mu * path, rel=1e-12)
-    assert "total_area" not in variables(system)
+    assert "worn_area" not in variables(system)
     assert {"scar_width", "scar_length_5", "max_wear_y"} <= set(variables(system))
 
 
@@ -179,14 +222,14 @@ def test_half_cycles_that_are_not_kept_and_a_restart(tmp_path: Path) -> None:
     few, _ = run(tmp_path / "few", "run.half_cycles=60", "output.every=7")
     run(tmp_path / "parts", "run.half_cycles=24")
     parts, summary = run(tmp_path / "parts", "run.half_cycles=60", resume=True)
-    names = [name for name in all_kept.data_vars if str(name).startswith(("total", "friction", "dissip", "mean_wear"))]
+    names = [name for name in all_kept.data_vars if str(name).startswith(("worn", "friction", "dissip", "mean_wear"))]
     assert len(names) > 5
     for name in names:
         kept = all_kept[name].sel(half_cycle=few.half_cycle)
         np.testing.assert_array_equal(few[name], kept)
         np.testing.assert_allclose(parts[name], all_kept[name], rtol=1e-13)
-    assert summary["punch"]["worn_volume_mm3"] == float(parts.total_volume[-1])
-    assert np.trapezoid(np.gradient(all_kept.total_volume)) > 0
+    assert summary["punch"]["worn_volume_mm3"] == float(parts.worn_volume[-1])
+    assert np.trapezoid(np.gradient(all_kept.worn_volume)) > 0
     assert json.loads((tmp_path / "parts" / "summary.json").read_text())["sliding"] == summary["sliding"]
 
 
@@ -211,3 +254,10 @@ def test_a_ring_slides_its_own_circumference(assembled: Assemble) -> None:
         angle = sum(phase.distance for phase in system.motion.phases) * 2 / len(system.motion.phases)
         radius = float(np.linalg.norm(system.pair.strip.x, axis=1).min())
         assert values(block)["sliding_distance"][-1] == pytest.approx(angle * radius, rel=1e-5)
+
+
+def test_rounding_of_a_mesh_is_no_place() -> None:
+    """The middle is 0; a place that a node may have stays as it is, of a contact of any size."""
+    for size in (1e-3, 1.0, 1e3):
+        places = size * np.array([[4e-9, -20.0, 1e-3], [-4e-9, 1.23456789, 0.0]])
+        np.testing.assert_array_equal(without_noise(places, 40 * size), places * (np.abs(places) > 1e-6 * size))

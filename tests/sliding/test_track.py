@@ -84,8 +84,8 @@ def test_volume_of_a_turning_disc(assembled: Callable[..., Tribosystem]) -> None
     *_, block = march(system, 3, implicit=True)
     x, xs = system.pair.punch.x, system.pair.strip.x
     torque = block.pressure @ (system.pair.weights * np.hypot(x[:, 0], x[:, 1]))
-    np.testing.assert_allclose(block.worn_area_strip, 2e-8 * 2 * np.pi * torque, rtol=1e-12)
-    np.testing.assert_allclose(block.worn_area, 1e-8 * 2 * np.pi * torque, rtol=1e-12)
+    np.testing.assert_allclose(block.worn_area_increment_strip, 2e-8 * 2 * np.pi * torque, rtol=1e-12)
+    np.testing.assert_allclose(block.worn_area_increment, 1e-8 * 2 * np.pi * torque, rtol=1e-12)
     r, depth = np.hypot(xs[:, 0], xs[:, 1]), block.wear_strip[-1]
     below, above = np.abs(xs[:, 1]) < 0.3, np.abs(r - 15) < 2
     middle = np.interp(r[above], *np.array(sorted(zip(r[below], depth[below], strict=True))).T)

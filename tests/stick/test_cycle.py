@@ -29,6 +29,10 @@ def first_cycle(of: Rig) -> Records:
     return Records.joined(of.cycle(of.beginning())[1])
 
 
+def second_cycle(of: Rig) -> Records:
+    return Records.joined(of.cycle(of.cycle(of.beginning())[0])[1])
+
+
 @pytest.mark.parametrize("settings", [(), ("stick.force='60 N'",), ("stick.bulk_stress='200 MPa'",)])
 def test_energy_of_every_half_cycle(settings: tuple[str, ...]) -> None:
     """What the rig puts in is stored or dissipated, to rounding; friction never gives energy back."""
@@ -59,11 +63,11 @@ def test_loop_area_is_the_work_of_friction() -> None:
 
 def test_force_and_displacement_drive_the_same_loop() -> None:
     """The forces of a run by displacement, imposed, move the strip as it was moved."""
-    moved = first_cycle(rig())
+    moved = second_cycle(rig())
     largest = float(np.abs(moved.force).max())
-    pulled = first_cycle(rig(f"stick.force='{largest!r} N'"))
+    pulled = second_cycle(rig(f"stick.force='{largest!r} N'"))
     ends = slice(len(moved) // 2 - 1, None, len(moved) // 2)
-    assert pulled.force[ends] == pytest.approx(moved.force[ends], rel=1e-6)
+    assert pulled.force[ends] == pytest.approx([largest, -largest], rel=1e-9)
     assert pulled.displacement[ends] == pytest.approx(moved.displacement[ends], rel=2e-3)
 
 

@@ -39,9 +39,11 @@ def test_history_holds_loops_zones_energy_and_stress(ran: tuple[dict, Path]) -> 
         assert all("units" in history[name].attrs for name in history.data_vars)
         assert list(history.cycle.values)[:1] == [0]
         assert int(history.cycle[-1]) == 2000 == summary["cycles"]
-        force = (history.traction * history.weight).sum("x")
+        along = history.normal_z * history.traction + history.normal_x * history.pressure
+        force = (along * history.weight).sum("x")
         assert np.abs(force - history.tangential_force).max() < 1e-9 * np.abs(force).max()
-        load = (history.pressure * history.weight).sum("x")
+        down = history.normal_z * history.pressure - history.normal_x * history.traction
+        load = (down * history.weight).sum("x")
         assert np.abs(load - 120).max() < 1e-8
         assert (np.abs(history.traction) <= 0.9 * history.pressure * (1 + 1e-12)).all()
         stuck = history.slip.where(history.stick == 1).fillna(0)
@@ -88,6 +90,34 @@ def run(folder: Path, settings: list[str], *, resume: bool = False) -> xarray.Da
     case = load_case("fretting-partial-slip", [*SMALL, "output.report=false", *settings])
     run_case(case, "fretting", folder, lambda _: None, progress="none", resume=resume)
     return load_history(folder)
+
+
+@pytest.mark.parametrize("integration", ["explicit", "jump"])
+def test_every_half_cycle_wears(tmp_path: Path, integration: str) -> None:
+    """n half-cycles wear n / 2 cycles off, and friction works in as many: volume = k times the integral of p |slip|.
+
+    So little is worn that every cycle is as the first; the rows that are kept do not matter.
+    """
+    laws = [f"wear.{body}.coefficient='1e-13 1/MPa'" for body in ("punch", "strip")]
+    how = [*SMALL, "output.report=false", "output.every=3", f"run.integration='{integration}'", *laws]
+    case = load_case("fretting-partial-slip", [*how, "run.half_cycles=8"])
+    summary, folder = run_case(case, "fretting", tmp_path / "out", lambda _: None, progress="none")
+    history = load_history(folder)
+    slid = np.abs(history.slip).where(history.pressure > 0, 0)
+    rubbed = float(((history.pressure * slid).sum("step") * history.weight).sum("x").isel(cycle=-1))
+    assert summary["cycles"] == 4
+    assert summary["worn_area_punch_mm2"] == pytest.approx(4e-13 * rubbed, rel=2e-3)  # the first settles
+    assert summary["accumulated_energy_mJ"] == pytest.approx(4 * 0.9 * rubbed, rel=2e-3)
+    if integration == "explicit":
+        work = 0.9 * summary["worn_area_punch_mm2"] / 1e-13
+        assert summary["accumulated_energy_mJ"] == pytest.approx(work, rel=1e-9)
+
+
+def test_half_a_cycle_is_refused(tmp_path: Path) -> None:
+    """Cycles are followed as a whole."""
+    case = load_case("fretting-partial-slip", [*SMALL, "run.half_cycles=5"])
+    with pytest.raises(CaseError, match=r"run\.half_cycles: expected a multiple of the 2 half-cycles of a cycle"):
+        run_case(case, "fretting", tmp_path / "out", lambda _: None, progress="none")
 
 
 def interrupted_after(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:

@@ -70,7 +70,7 @@ def test_history_of_a_solid(ran: tuple[dict, Path]) -> None:
         assert float(history.energy_balance_error.max()) < 1e-8
         assert (history.stick_area < history.contact_area).all()
         volume = float((history.wear * history.weight).sum("node")[-1])
-        assert volume == pytest.approx(float(history.worn_volume[0]) * 20, rel=0.2)
+        assert volume == pytest.approx(float(history.worn_volume_increment[0]) * 20, rel=0.2)
     saved = json.loads((folder / "summary.json").read_text("utf-8"))
     assert saved["stop"] == "all cycles done"
     assert saved["worn_volume_punch_mm3"] == pytest.approx(volume, rel=0.1)

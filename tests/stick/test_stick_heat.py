@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import lru_cache
 from pathlib import Path
 
@@ -61,20 +62,28 @@ def test_expansion_moves_the_surfaces_in_every_direction() -> None:
 
 
 def test_long_strokes_are_as_warm_as_in_gross_sliding() -> None:
-    """What is missing is the elastic share of the stroke, which falls as the stroke grows."""
-    missing = []
+    """What is missing of the warmth is less than what is missing of friction's work, which falls as the stroke grows.
+
+    Bodies take up the same part of any stroke, by which heat comes later, too: at nodes temperatures are shifted.
+    """
+    missing: list[list[float]] = []
     for amplitude in (25, 100):
         settings = [*SMALL, f"motion.amplitude='{amplitude} um'", "motion.positions=1", "run.half_cycles=4",
-                    "run.integration='explicit'", "heat.steps=10", "wear.strip.coefficient=0"]  # fmt: skip
+                    "geometry.parameters.overlap=0.1", "run.integration='explicit'", "heat.steps=10",
+                    "wear.strip.coefficient=0"]  # fmt: skip
         known = assemble(load_case("fretting-partial-slip", ["wear={punch={coefficient=1e-30}}", *settings[:-1],
                                                              "contact.law='gross-sliding'", "stick={}"]))  # fmt: skip
         end = list(march_sliding(known, 4))[-1].heat
         assert end is not None
         cycle = list(march(make_rig(load_case("fretting-partial-slip", settings)), 2))[-1]
-        punch = cycle.records.temperature[-1, 0]
-        missing.append(np.abs(punch - end.temperature_punch[-1]).max() / end.temperature_punch[-1].max())
-    assert missing[0] < 0.1
-    assert missing[1] < 0.4 * missing[0]
+        work = known.bodies.punch.thickness * cycle.half_cycles[-1].energy(known.pair.weights)
+        warmth = cycle.records.temperature[-1, 0].mean() / end.temperature_punch[-1].mean()
+        missing.append([1 - work / end.terms[-1, 0], 1 - warmth])
+    (work_of_short, short), (work_of_long, long) = missing
+    assert 0 < short < work_of_short < 0.2
+    assert 0 < long < work_of_long
+    assert work_of_long < 0.3 * work_of_short
+    assert long < 0.4 * short
 
 
 @pytest.mark.slow
@@ -107,6 +116,10 @@ def test_a_resumed_run_goes_on_as_warm(tmp_path: Path) -> None:
     for variable in ("temperature_punch", "pressure", "wear", "heat_friction"):
         difference, expected = np.abs(resumed[variable] - whole[variable]), np.abs(whole[variable])
         assert float(difference.max()) < 1e-9 * float(expected.max())
+    parts, at_once = (json.loads((tmp_path / name / "summary.json").read_text("utf-8")) for name in ("parts", "whole"))
+    largest = [name for name in at_once if name.startswith("largest_")]
+    assert "largest_temperature_K" in largest
+    assert [parts[name] for name in largest] == pytest.approx([at_once[name] for name in largest], rel=1e-6, abs=1e-10)
 
 
 def test_the_end_is_without_heat_of_friction() -> None:
@@ -120,7 +133,7 @@ def test_the_end_is_without_heat_of_friction() -> None:
     end, _ = final_of(load_case("fretting-partial-slip", [*SMALL, held]))
     assert end.temperature is not None
     assert 40 < end.temperature.min() < end.temperature.max() < 50
-    zone = end.stick
+    zone = (end.pressures > 0).any(axis=0)
     assert end.temperature[0, zone] == pytest.approx(end.temperature[1, zone], abs=1e-9), "where it touches"
     assert (end.temperature[0, ~zone] < end.temperature[1, ~zone]).all(), "beside it the colder punch stands apart"
 

@@ -65,6 +65,9 @@ def test_runs_and_optima(assembled: Callable[..., Tribosystem]) -> None:
     np.testing.assert_allclose(found["pressure"][1, 0], last.pressure[-1], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found["pressure"][1, 1], last.pressure[-2], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(found["worn_volume"], np.array([1e-7, 2e-7]) * 1e4 * 2 * 1.5 * 11, rtol=1e-9)
+    track = {"wear.strip.coefficient": [1e-8], "motion.track": ["20 m"], "run.half_cycles": [4]}
+    spread = package.sweep("monotonic-lz20", track, of="run").squeeze()  # steps of 20 mm
+    np.testing.assert_allclose(spread["worn_volume_strip"], 1e-8 * 1e4 * 20 * 4, rtol=1e-9)
     best = package.sweep("monotonic-lz20", {"motion.direction": ["rightward", "leftward"]}, of="optimum")
     np.testing.assert_allclose(best["lambda_F"].values.ravel(), [0.05 / 3, 0.05], rtol=1e-9)
     assert best["lambda_F"].attrs["units"] == "mm/s"
@@ -87,6 +90,20 @@ def test_failed_variants_are_told_and_not_fatal(tmp_path: Path) -> None:
     assert "balances the loads" in str(found["trouble"][1].item())
     assert failures(found)[0].startswith("failed: contact.friction = 1.9: punch.loads: no pressure")
     assert "2 variants, 1 of them failed" in text(found)
+
+
+def test_a_case_with_stick_is_refused_before_any_variant(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steady states and runs slide as a whole; where one variant does so, the others fail alone."""
+
+    def computed(_self: object, _case: package.Case, _of: str) -> dict[str, Any]:
+        return {"mean_pressure": np.array(1.0)}
+
+    monkeypatch.setattr(engines.Workshop, "values", computed)
+    for of in ("run", "steady"):
+        with pytest.raises(package.CaseError, match=r"contact\.law: stick and partial slip are not followed here"):
+            package.sweep("fretting-partial-slip", {"contact.friction": [0.5, 0.6]}, of=of)
+    laws = {"contact.law": ["coulomb", "gross-sliding"]}
+    assert package.sweep("fretting-partial-slip", laws, of="run")["mean_pressure"].shape == (2,)
 
 
 def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:

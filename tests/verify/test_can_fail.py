@@ -177,13 +177,17 @@ def thermal_modulus_without_poisson(patch: Patch) -> None:
 def material_the_other_way(patch: Patch) -> None:
     """The strip's material moves against the sliding direction."""
     right = HeatBody.step
-    patch.setattr(HeatBody, "step", lambda self, velocity, *rest: right(self, -velocity, *rest))
+    patch.setattr(HeatBody, "step", lambda self, velocity, *rest, **how: right(self, -velocity, *rest, **how))
 
 
 def longer_step(patch: Patch) -> None:
     """Time steps one per cent too long."""
     right = HeatBody.step
-    patch.setattr(HeatBody, "step", lambda self, velocity, time, *rest: right(self, velocity, 1.01 * time, *rest))
+    patch.setattr(
+        HeatBody,
+        "step",
+        lambda self, velocity, time, *rest, **named: right(self, velocity, 1.01 * time, *rest, **named),
+    )
 
 
 def forgotten_heat(patch: Patch) -> None:

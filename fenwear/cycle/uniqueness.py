@@ -1,0 +1,90 @@
+"""Whether the contact of a half-cycle with heat has one answer.
+
+The friction heat of a pressure p opens the gap by Theta p by the end of its half-cycle, and where nodes stay
+closed, with the loads balanced, an opened gap takes the pressure X away: what a pressure heats gives back G p =
+-X Theta p of it. Both compliances together, S + Theta, are singular where an eigenvalue of G is 1: that is
+where R. A. Burton's waves neither grow nor decay, for heat that has had one half-cycle to flow. Beyond it a
+complementarity problem with the same nodes in contact is none with a P-matrix: it may have several answers, or
+none (J. R. Barber, J. Elasticity 8, 1978, 409). Wear within a half-cycle opens the gap against it, by much
+less, and is left out.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigs
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.contact import CondensedContact, SlidingContact
+from fenwear.contact.operators import Solve
+
+FEW = 50  # contact nodes up to which all eigenvalues are found
+
+
+def heat_gain(system: Tribosystem, pressure: Array | None = None) -> float | None:
+    """Return the largest share of a pressure that its friction heat of a half-cycle gives back; collective.
+
+    The largest real part of the eigenvalues of G, in the middle phase of each half-cycle. From 1 on the contact may
+    have several answers. None without heat.
+
+    Args:
+        system: The assembled problem.
+        pressure: Of each phase (phases, n), MPa: where it is positive nodes are in contact; by default that of the
+            unworn bodies without heat.
+
+    Raises:
+        ConvergenceError: contact without heat did not converge.
+    """
+    exchange, positions = system.exchange, system.motion.positions
+    if exchange is None:
+        return None
+    found = [0.0]
+    for phase in range(positions // 2, len(system.motion.phases), positions):
+        if pressure is None:
+            carried = system.phase_contact((phase,)).solve(system.gap(phase, system.unworn())).pressure[0]
+        else:
+            carried = pressure[phase]
+        closed = carried > 0
+        if not closed.any():
+            continue
+        unit = np.eye(len(closed))[:, closed]
+        changes, _ = exchange.change(phase, exchange.conductance(carried), pressure=unit)
+        interface = system.interfaces[phase]
+        opened = exchange.gap_change(changes, phase)[closed] / interface.elastic_length  # as the contact is scaled
+        contact = CondensedContact([SlidingContact(interface, system.friction_ratios()[phase])], team=system.team)
+        modes = contact.size - len(closed)
+        found.append(contact.on_closed_contact(partial(_gain, opened, modes), closed))
+    return max(found)
+
+
+def heat_warnings(gain: float | None) -> list[str]:
+    """Return what is to be said of a contact whose friction heat gives back a share of the pressure."""
+    if gain is None or gain < 1:
+        return []
+    return [
+        f"friction heats what presses, and what is heated presses more: within a half-cycle the heat gives back "
+        f"{gain:.3g} times the pressure that it is from, and from 1 on the contact may have several answers; which of "
+        "them is found depends on how and from where it is solved. Expected less friction or speed, less heat into the "
+        "contact, or, to follow how the contact breaks up, shorter half-cycles"
+    ]
+
+
+def _gain(opened: Array, modes: int, solve: Solve) -> float:
+    """Return the largest real part of the eigenvalues of -X Theta on closed nodes."""
+    n = len(opened)
+    if not opened.any():
+        return 0.0
+
+    def apply(pressure: Array) -> Array:
+        right = np.zeros(n + modes)
+        right[:n] = opened @ pressure.ravel()
+        return -np.asarray(solve(right)[:n])
+
+    operator = LinearOperator((n, n), matvec=apply, dtype=float)
+    if n <= FEW:
+        return float(np.linalg.eigvals(operator @ np.eye(n)).real.max())
+    start = np.cos(np.pi * np.arange(n) / n)  # the longest waves are fed most
+    return float(eigs(operator, k=1, which="LR", v0=start, return_eigenvectors=False, tol=1e-4).real.max())

@@ -1,0 +1,69 @@
+"""The common normal of surfaces that stick: half-way between those of both bodies, neither before the other.
+
+Bodies that are mirror images then have the plane between them for their contact, as they do when they are pressed on
+each other. Where the punch has an edge, as a flat face beside its chamfer, the face that looks at the other body
+counts: it is the one that touches.
+"""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import ContactSurface
+
+EDGE = np.cos(np.radians(20))  # cosine of the angle between facets beyond which an edge is no smooth surface
+
+
+def common_normal(punch: ContactSurface, strip: Array) -> Array:
+    """Return e_n (n, d), unit normals into the punch.
+
+    Args:
+        punch: Whose pressure nodes they are.
+        strip: Unit normals out of the strip opposite each node (n, d).
+    """
+    return unit(strip - facing_normal(punch, strip))
+
+
+def unit(vectors: Array) -> Array:
+    """Return vectors (n, d) of length 1."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def facing_normal(surface: ContactSurface, other: Array) -> Array:
+    """Return the unit normals out of a body at its pressure nodes (n, d); at an edge of the facets that face most.
+
+    Args:
+        surface: The surface.
+        other: Unit normals of the other body opposite each node (n, d).
+    """
+    number = np.full(len(surface.trace), -1)
+    number[surface.nodes] = np.arange(len(surface.nodes))
+    own = number[surface.facets].ravel()
+    used = own >= 0
+    node = own[used]
+    area = _area_vectors(surface).reshape(-1, surface.dim)[used]
+    area *= np.sign(np.einsum("ic,ic->i", area, surface.outward[node]))[:, None]
+    normal = unit(area)
+    facing = -np.einsum("ic,ic->i", normal, other[node])
+    order = np.lexsort((facing, node))  # of each node the facet that faces most comes last
+    most = order[np.append(node[order][1:] != node[order][:-1], True)]
+    smooth = np.einsum("ic,ic->i", normal, normal[most][node]) > EDGE
+    found = surface.outward.copy()
+    edge = np.unique(node[~smooth])
+    kept = np.zeros_like(found)
+    np.add.at(kept, node[smooth], area[smooth])
+    found[edge] = unit(kept[edge])
+    return found
+
+
+def _area_vectors(surface: ContactSurface) -> Array:
+    """Return normals of the facets at their trace nodes, as long as the facet is large there (f, k, d), of any sign."""
+    cell = basix.CellType[surface.cell]
+    variant = basix.LagrangeVariant.gll_warped
+    element = basix.create_element(basix.ElementFamily.P, cell, surface.degree, variant)
+    slopes = np.einsum("tqk,fkd->tfqd", element.tabulate(1, element.points)[1:, :, :, 0], surface.trace[surface.facets])
+    if surface.dim == 2:
+        return np.stack([slopes[0, :, :, 1], -slopes[0, :, :, 0]], axis=2)
+    return np.asarray(np.cross(slopes[0], slopes[1]))

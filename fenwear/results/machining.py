@@ -1,0 +1,90 @@
+"""The files of a shape to machine: its profile, its surface as triangles, and the case of the bodies made with it."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.case import Case, make_case
+from fenwear.case.profile import profile_text
+from fenwear.initial_shape import InitialShape
+from fenwear.results.disk import write_text, writing
+from fenwear.results.history import make_directory, write_case
+from fenwear.results.surfaces import surface_cells
+
+PROFILE, SURFACE = "profile.csv", "surface.stl"
+AROUND = 360  # facets around a ring
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])  # of a binary STL
+
+
+def write_shape(directory: Path, case: Case, surface: ContactSurface, shape: InitialShape) -> None:
+    """Write profile.csv, surface.stl and case.toml into a new folder; for one rank.
+
+    Args:
+        directory: The folder.
+        case: That the shape was found for.
+        surface: The punch's contact surface.
+        shape: In addition to the profile that the surface has already.
+
+    Raises:
+        CaseError: the folder is not empty.
+        OutputError: it cannot be written.
+    """
+    make_directory(directory)
+    points = shape_points(surface, shape.depth)
+    axes = {"axisymmetric": ("r",), "solid": ("x", "y"), "plane": ("x",)}[case.model.kind]
+    write_text(directory / PROFILE, profile_text(axes, points))
+    thickness = case.model.thickness if case.model.kind == "plane" else 0.0
+    write_stl(directory / SURFACE, surface, shape.depth, thickness)
+    write_case(directory, with_shape(case, points))
+
+
+def shape_points(surface: ContactSurface, depth: Array) -> list[list[float]]:
+    """Return [x, depth] or [x, y, depth] of each node, mm: with the profile that the surface has already."""
+    axis = int(np.abs(surface.weights @ surface.outward).argmax())
+    whole = depth if surface.profile is None else depth + surface.profile
+    rows = np.column_stack([np.delete(surface.x, axis, axis=1), whole])
+    return [[float(value) for value in row] for row in rows]
+
+
+def with_shape(case: Case, points: list[list[float]]) -> Case:
+    """Return a case whose punch is made with a profile."""
+    tables = case.resolved()
+    tables["punch"]["profile"] = {"points": points}
+    return make_case(tables, case.folder)
+
+
+def write_stl(path: Path, surface: ContactSurface, depth: Array, thickness: float) -> None:
+    """Write the machined contact surface as a binary STL, mm.
+
+    Args:
+        path: Of the file.
+        surface: Of the punch.
+        depth: At its pressure nodes (n,), mm.
+        thickness: Of a plane model, along y; 0 for rings, which are turned about z, and solids.
+    """
+    x, cells = surface.unworn - depth[:, None] * surface.outward, surface_cells(surface)
+    if surface.dim == 2:
+        turned = np.linspace(0, 2 * np.pi, AROUND + 1)
+        rows = (
+            [np.column_stack([x[:, 0], np.full(len(x), y), x[:, 1]]) for y in (0.0, thickness)]
+            if thickness
+            else [np.column_stack([x[:, 0] * np.cos(a), x[:, 0] * np.sin(a), x[:, 1]]) for a in turned]
+        )
+        pairs = itertools.pairwise(rows)
+        quads = [np.stack([a[cells[:, 0]], a[cells[:, 1]], b[cells[:, 1]], b[cells[:, 0]]], axis=1) for a, b in pairs]
+        corners = np.concatenate(quads)
+    else:
+        corners = x[cells]
+    parts = [corners[:, [0, 1, 2]]] + ([corners[:, [0, 2, 3]]] if corners.shape[1] == 4 else [])
+    triangles = np.zeros(sum(map(len, parts)), dtype=TRIANGLE)
+    triangles["corners"] = np.concatenate(parts)
+    a, b, c = np.moveaxis(triangles["corners"].astype(float), 1, 0)
+    across = np.cross(b - a, c - a)
+    triangles["normal"] = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    with writing(path):
+        path.write_bytes(b"fenwear".ljust(80) + np.uint32(len(triangles)).tobytes() + triangles.tobytes())

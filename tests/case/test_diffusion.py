@@ -1,0 +1,31 @@
+"""What ready geometries are graded by where the strip's material passes under heat."""
+
+from __future__ import annotations
+
+import pytest
+
+from fenwear import load_case
+from fenwear.assembly import set_up_by
+from fenwear.case.program import stages_of
+
+DIFFUSIVITY = 50e3 / 3.6e6 * 1e3  # of the brake pad's disc, mm²/s
+
+
+@pytest.mark.parametrize("speed", [0.3, 10.0, 100.0, 1e4])
+def test_diffusivity_over_speed(speed: float) -> None:
+    """Between half of it and itself, so that cases of about the same speed have the same meshes."""
+    case = load_case("brake-pad", [f"motion.angular_speed={speed}"])
+    exact = DIFFUSIVITY / speed
+    assert exact / 2 < case.diffusion["diffusion_area"] <= exact
+    assert load_case("example1-heat").diffusion == {}  # to and fro
+    assert load_case("ring-on-ring-heat").diffusion == {}  # nothing passes
+
+
+def test_a_program_has_one_mesh() -> None:
+    """That of its fastest step, in all stages and rests."""
+    steps = "program.steps=[{angular_speed=[100, 0], time=4}, {angular_speed=0, time=10}, {angular_speed=1, time=7}]"
+    case = load_case("brake-pad", ["unset=run.half_cycles", steps])
+    alone = load_case("brake-pad", ["motion.angular_speed=100"])
+    stages = stages_of(case)
+    assert {stage.case.diffusion["diffusion_area"] for stage in stages} == {alone.diffusion["diffusion_area"]}
+    assert all(set_up_by(stage.case) == set_up_by(case) for stage in stages)

@@ -1,0 +1,61 @@
+"""Signorini's conditions, looked at after the solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fenwear import Tribosystem, march, steady
+from fenwear.contact import ContactState
+from fenwear.contact.complementarity import BROKEN, broken_text, complementarity_error
+from fenwear.contact.condensed import CondensedContact
+from fenwear.watch import Watch, steady_warnings
+
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
+
+
+@pytest.mark.parametrize(
+    ("pressure", "gap", "error"),
+    [
+        ([2.0, 1.0, 0.0], [0.0, 0.0, 5.0], 0.0),
+        ([2.0, 1.0, 0.0], [0.0, -0.02, 5.0], 0.1),  # overlap: 0.02 mm, 2 MPa open 0.2 mm
+        ([2.0, -0.5, 0.0], [0.0, 0.0, 5.0], 0.25),  # pull
+        ([2.0, 1.0, 0.0], [0.0, 0.02, 5.0], 0.1),  # pressure over a gap
+        ([0.0, 0.0, 0.0], [0.1, 0.2, 5.0], 0.0),
+    ],
+)
+def test_error(pressure: list[float], gap: list[float], error: float) -> None:
+    """Each of the three conditions is seen, over the scales of both."""
+    found = complementarity_error(np.array(pressure), np.array(gap), 0.1)
+    assert found == pytest.approx(error, abs=1e-15)
+    assert bool(broken_text(float(found), "here")) == (error > BROKEN)
+
+
+def test_of_runs_and_steady_states(assembled: Callable[..., Tribosystem]) -> None:
+    """What is solved fulfils them; partial contact as well."""
+    system = assembled("example1", *SMALL)
+    *_, block = march(system, 20)
+    assert block.complementarity_error.max() < 1e-8
+    state = steady(system)
+    assert state.complementarity_error < 1e-8
+    assert not [text for text in steady_warnings(system, state) if "conditions" in text]
+
+
+def test_a_contact_that_lies(assembled: Callable[..., Tribosystem], monkeypatch: pytest.MonkeyPatch) -> None:
+    """F / A everywhere, as of two parts with one balance of forces: force and volume are right, and it is told."""
+    system = assembled("example2", *SMALL)
+    solve = CondensedContact.solve
+
+    def lies(contact: CondensedContact, gap: np.ndarray, *args: object) -> ContactState:
+        found = solve(contact, gap, *args)  # type: ignore[arg-type]
+        even = np.full_like(found.pressure, system.rigid.mean_pressure)
+        return replace(found, pressure=even, gap=found.gap + 1e-3 * np.linspace(-1, 1, even.shape[1]))
+
+    monkeypatch.setattr(CondensedContact, "solve", lies)
+    *_, block = march(system, 2)
+    assert block.equilibrium_error.max() < 1e-12
+    assert block.complementarity_error.min() > 0.05
+    assert "in half-cycle 1 the contact breaks its own conditions" in Watch(system).see(block)[0]

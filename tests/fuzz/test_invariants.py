@@ -1,0 +1,68 @@
+"""A sample of the random problems that are held against invariants, and what they see."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import invariants
+
+from fenwear.cycle.state import RunState
+from fenwear.cycle.totals import PhaseMeter
+from fenwear.results import checkpoint
+from fenwear.sliding.wear import Worn
+
+# One seed of each kind, and each thing that is asked at least once; a night tries thousands of others.
+SEEDS = {
+    "plane, restart": 5000016,
+    "plane, refinement": 5000040,
+    "both, mirror": 5000009,
+    "both, jumps": 5000001,
+    "rings, sector": 5000010,
+    "solid, mirror": 5000011,
+    "curved, ranks": 5000004,
+    "curved, jumps": 5000020,
+    "stick, jumps": 5000005,
+    "program, restart": 5000006,
+    "heat, ranks": 5000063,
+    "heat, jumps": 5000007,
+    "solid, slice_of_solid": 5000155,
+}
+
+
+@pytest.mark.process
+@pytest.mark.parametrize("seed", SEEDS.values(), ids=SEEDS)
+def test_sample(seed: int, request: pytest.FixtureRequest) -> None:
+    """Balances hold, and other ways come to the same."""
+    made, ask = invariants.problem(seed)
+    assert f"{made.kind}, {ask}" in request.node.name
+    assert invariants.try_problem(seed) == ("ok", f"{made.kind}, {ask}")
+
+
+def test_a_meter_that_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what is worn off all material points."""
+    true = PhaseMeter.__call__
+    monkeypatch.setattr(PhaseMeter, "__call__", lambda self, pressure: true(self, pressure).times(1 + 1e-6))
+    verdict, why = invariants.try_problem(SEEDS["plane, restart"])
+    assert verdict == "wrong"
+    assert "volume" in why
+
+
+def test_a_checkpoint_that_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what a run comes to that never stopped."""
+    true = checkpoint.load
+
+    def load(*given: Any) -> RunState:
+        state = true(*given)
+        return replace(state, worn=Worn((1 + 1e-6) * state.worn.punch, state.worn.strip))
+
+    monkeypatch.setattr(checkpoint, "load", load)
+    verdict, why = invariants.try_problem(SEEDS["plane, restart"])
+    assert verdict == "wrong"
+    assert "restart: wear" in why

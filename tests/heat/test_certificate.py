@@ -1,0 +1,83 @@
+"""Reduced temperatures are those of the whole mesh to the tolerance asked for, and the number told says so."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fenwear import Tribosystem, assemble, load_case
+from fenwear.assembly import with_exchange, with_reduced_heat
+from fenwear.heat.exchange import HeatExchange
+from fenwear.watch import fineness_text, fineness_warnings
+
+COARSE = ("geometry.degree=2", "geometry.parameters.strip_length=160", "geometry.parameters.strip_height=16")
+
+
+def _random(way: str, random: np.random.Generator) -> Tribosystem:
+    """Return a case whose thermal lengths and times, losses and sharing are anything."""
+    settings = [
+        *COARSE,
+        f"heat.convection={10 ** random.uniform(1, 4)} W/(m^2*K)",
+        f"heat.conductance={10 ** random.uniform(1, 5)} W/(m^2*K)",
+        f"heat.steps={random.integers(1, 9)}",
+        f"geometry.parameters.elements_along_contact={2 * random.integers(2, 5)}",
+    ]
+    fast = 10 ** random.uniform(-1, 2)
+    if way == "to and fro":
+        amplitude = 10 ** random.uniform(-0.5, 1.5)
+        settings += [f"motion.amplitude={amplitude}", f"geometry.parameters.overlap={amplitude}"]
+        settings += [f"motion.angular_frequency={fast}"]
+    else:
+        slides = f"speed={10 ** random.uniform(0, 2.5)}, duration={1 / fast}"
+        settings += [f"motion={{kind='one-way', direction='{random.choice(['leftward', 'rightward'])}', {slides}}}"]
+    return assemble(load_case("example2-heat", settings))
+
+
+def _over(exchange: HeatExchange, pressures: np.ndarray, rigid: np.ndarray) -> list[np.ndarray]:
+    """Return contact temperatures and gaps, beside a rigid motion, after half-cycles of pressures (k, n)."""
+    state, found = exchange.initial(), []
+    q = np.linalg.qr(rigid)[0]
+    for number, pressure in enumerate(pressures):
+        phase = number % len(exchange.plans)
+        state, terms = exchange.half_cycle(state, phase, pressure, exchange.conductance(pressure))
+        assert abs(terms[0] - terms[1:].sum()) < 1e-8 * terms[0]
+        gap = exchange.gap(state, phase)
+        found.append(np.array([*exchange.contact_temperatures(state, phase), gap - q @ (q.T @ gap)]))
+    return found
+
+
+@pytest.mark.parametrize("way", ["to and fro", "one way"])
+@pytest.mark.parametrize("seed", [29, *(pytest.param(k, marks=pytest.mark.slow) for k in range(20))])
+def test_against_the_whole_mesh(way: str, seed: int) -> None:
+    """Contact temperatures and the thermal gap at every node are those of all nodes, in random cases."""
+    random = np.random.default_rng(seed)
+    system = _random(way, random)
+    pressures = random.uniform(0, 20, (4, len(system.pair.weights)))
+    pressures[random.random(pressures.shape) < 0.2] = 0.0
+    rigid = np.stack([np.ones(len(system.pair.x)), system.pair.x], axis=1)
+    whole = _over(with_exchange(system, reduced=False).exchange, pressures, rigid)
+    reduced = with_reduced_heat(system)
+    small = _over(reduced.exchange, pressures, rigid)
+    assert system.heat is not None
+    allowed = system.heat.reduction_difference
+    fineness = reduced.exchange.fineness
+    assert fineness is not None
+    assert fineness.difference is not None
+    assert fineness.difference <= allowed
+    for one, other in zip(small, whole, strict=True):
+        scale = np.abs(other).max(axis=1, keepdims=True)
+        assert (np.abs(one - other) <= allowed * scale).all(), (np.abs(one - other) / scale).max(axis=1)
+
+
+def test_a_basis_that_cannot_hold_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One try alone, at a rough tolerance: the difference stands in what is told, and in a warning by its key."""
+    for module in ("fitted", "passing_strip"):
+        monkeypatch.setattr(f"fenwear.heat.{module}.TRIES", 1)
+    system = assemble(load_case("example2-heat", [*COARSE, "heat.reduction_tolerance=0.1"]))
+    fineness = system.exchange.fineness
+    assert fineness is not None
+    assert fineness.difference is not None
+    assert fineness.difference > 5e-3
+    (told,) = (text for text in fineness_warnings(system) if "whole mesh" in text)
+    assert "more than heat.reduction_difference = 0.002; expected a lower heat.reduction_tolerance" in told
+    assert f"those of the whole mesh to {fineness.difference:.2g}" in fineness_text(system)

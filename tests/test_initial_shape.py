@@ -1,0 +1,141 @@
+"""The shape to machine: made with it, nothing runs in."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
+from fenwear.initial_shape import initial_shape
+from fenwear.results.machining import TRIANGLE, shape_points, with_shape
+
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
+
+RING = ("geometry.degree=2", "geometry.parameters.across=4", "wear.strip.coefficient=1e-30")
+
+
+def made_with(system: Tribosystem, *shapes: Any) -> Tribosystem:
+    return assemble(with_shape(system.case, shape_points(system.pair.punch, *shapes)))
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("example1", SMALL),
+        ("example2", (*SMALL, "wear.punch.coefficient='1e-8 MPa^-2'", "wear.punch.pressure_exponent=2.0")),
+        ("ring-on-ring", RING),
+        ("pin-on-disc", ("geometry.degree=1", "geometry.order=1")),
+    ],
+)
+def test_nothing_runs_in(assembled: Callable[..., Tribosystem], name: str, settings: tuple[str, ...]) -> None:
+    """The first pressures on a surface made so are the steady ones, at every node; on the unworn one they are not."""
+    system = assembled(name, *settings)
+    shape = initial_shape(system)
+    (state,) = shape.states
+    assert shape.depth.min() == 0
+    assert shape.left_to_run_in[0] < 1e-9
+    own = made_with(system, shape.depth)
+    np.testing.assert_allclose(own.pair.initial_gap - system.pair.initial_gap, shape.depth, atol=1e-12)
+    first = [own.phase_contact((k,)).solve(own.gap(k, own.unworn())) for k in range(len(own.motion.phases))]
+    pressure = np.array([contact.pressure[0] for contact in first])
+    np.testing.assert_allclose(pressure, state.phase_pressure, atol=1e-8 * state.phase_pressure.max())
+    unworn = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure[0]
+    assert np.abs(unworn - state.phase_pressure[0]).max() > 0.03 * state.phase_pressure.max()
+
+
+def test_it_stays(assembled: Callable[..., Tribosystem]) -> None:
+    """A march of a ring made so keeps its pressures; its shape is the optimum's, p r constant."""
+    system = assembled("ring-on-ring", *RING)
+    own = made_with(system, initial_shape(system).depth)
+    *_, block = march(own, 50)
+    r = own.pair.x
+    np.testing.assert_allclose(block.pressure, np.tile(2000 / (2 * np.pi * 10 * r), (len(block), 1)), rtol=1e-8)
+
+
+def test_tolerance_is_the_one_told(assembled: Callable[..., Tribosystem]) -> None:
+    """A surface off by that amplitude, a wave over the contact, has pressures off by a tenth of their scale."""
+    system = assembled("ring-on-ring", *RING)
+    shape = initial_shape(system)
+    r = system.pair.x
+    off = shape.tolerance * (1 + np.cos(2 * np.pi * (r - r.min()) / np.ptp(r)))
+    own = made_with(system, shape.depth + off)
+    pressure = own.phase_contact((0,)).solve(own.gap(0, own.unworn())).pressure[0]
+    exact = 2000 / (2 * np.pi * 10 * r)
+    scale = (exact**2 * own.pair.weights).sum() / (exact * own.pair.weights).sum()
+    assert np.abs(pressure - exact).max() / scale == pytest.approx(0.1, rel=1e-3)
+
+
+def test_loads_that_take_turns(assembled: Callable[..., Tribosystem]) -> None:
+    """The load and 1.2 times it, 3 to 1: the mean of both pressures wears a ring evenly, neither alone does."""
+    system = assembled("ring-on-ring", *RING)
+    shape = initial_shape(system, ((1.0, 3.0), (1.2, 1.0)))
+    points, pressures = shape_points(system.pair.punch, shape.depth), []
+    for force in (-2000.0, -2400.0):
+        tables = with_shape(system.case, points).resolved()
+        tables["punch"]["loads"][0]["force"] = [0.0, force]
+        own = assemble(make_case(tables))
+        pressures.append(own.phase_contact((0,)).solve(own.gap(0, own.unworn())).pressure[0])
+    assert min(p.min() for p in pressures) > 0  # whole contact, for which the mean is exact
+    worn = [p * system.pair.x for p in (*pressures, 3 * pressures[0] + pressures[1])]
+    assert min(np.ptp(one) / one.max() for one in worn[:2]) > 0.02
+    np.testing.assert_allclose(worn[2], worn[2].mean(), rtol=1e-8)
+    assert shape.largest_pressure == pytest.approx([p.max() for p in pressures], rel=1e-9)
+
+
+def test_files(fenwear: Callable[..., Any], tmp_path: Path) -> None:
+    """Profile, surface and case; the profile's file reads back as the same shape, with its unit."""
+    options = [word for setting in RING for word in ("--set", setting)]
+    done = fenwear("shape", "ring-on-ring", *options, "-o", "made", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["loads"][0]["left_to_run_in"] < 1e-9
+    (tmp_path / "case.toml").write_text('base = "ring-on-ring"\npunch.profile = {file = "made/profile.csv"}\n')
+    for case in (load_case(tmp_path / "case.toml"), load_case(tmp_path / "made" / "case.toml")):
+        profile = case.punch.profile
+        assert profile is not None
+        np.testing.assert_allclose(np.array(profile.points)[:, 1], told["depth"], atol=1e-12)
+    stl = (tmp_path / "made" / "surface.stl").read_bytes()
+    triangles = np.frombuffer(stl, TRIANGLE, offset=84)
+    sides = triangles["corners"][:, 1:] - triangles["corners"][:, :1]
+    area = np.linalg.norm(np.cross(sides[:, 0].astype(float), sides[:, 1].astype(float)), axis=1).sum() / 2
+    assert area == pytest.approx(np.pi * (30**2 - 20**2), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([[20, 0], [25, 1]], r"punch\.profile\.points: spans x = 20 to 25 mm, but the contact surface 20 to 30 mm"),
+        ([[20, 0], [20, 1], [30, 0]], r"punch\.profile\.points: two points are at the same place"),
+        ([[20, 0, 0], [30, 0, 0], [25, 1, 0]], r"punch\.profile\.points: expected rows \[x, depth\] for this model"),
+        ([[20, "1 N"], [30, 0]], r"punch\.profile\.points\.0\.1: .*mm"),
+    ],
+)
+def test_bad_profiles(points: list[list[Any]], message: str) -> None:
+    """By key, with what was expected."""
+    tables = load_case("ring-on-ring", ["geometry.degree=1", "geometry.parameters.across=4"]).resolved()
+    tables["punch"]["profile"] = {"points": points}
+    with pytest.raises(CaseError, match=message):
+        assemble(make_case(tables))
+
+
+def test_bad_files(tmp_path: Path) -> None:
+    """A column without a unit, and one that nobody knows."""
+    for text, message in (("x (mm),depth\n0,0\n1,0\n", "the column depth has no unit"),
+                          ("x (mm),height (um)\n0,0\n1,0\n", "the column 'height' is not known"),
+                          ("x (mm),y (mm)\n0,0\n1,0\n", "expected the columns x and depth")):  # fmt: skip
+        (tmp_path / "profile.csv").write_text(text)
+        (tmp_path / "case.toml").write_text('base = "example1"\nstrip.profile = {file = "profile.csv"}\n')
+        with pytest.raises(CaseError, match=f"strip.profile.file: .*{message}"):
+            load_case(tmp_path / "case.toml")
+
+
+@pytest.mark.parametrize("loads", [((0.0, 1.0),), ((1.0, -1.0),)])
+def test_bad_loads(assembled: Callable[..., Tribosystem], loads: Any) -> None:
+    """A share or factor that is not positive."""
+    with pytest.raises(CaseError, match="--load: expected positive numbers"):
+        initial_shape(assembled("example2", *SMALL), loads)

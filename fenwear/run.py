@@ -17,9 +17,8 @@ from fenwear.case import Case, doubts
 from fenwear.cycle import (
     Block,
     Span,
+    explicit_growth,
     follow_program,
-    heat_gain,
-    heat_warnings,
     jump,
     march,
     stability_number,
@@ -49,7 +48,7 @@ from fenwear.signals import Signals
 from fenwear.stick import checkpoint as stick_checkpoint
 from fenwear.stick.run import check_touching, run_stick
 from fenwear.stick.setup import make_rig
-from fenwear.watch import Watch, fineness_warnings, size_warnings, stroke_warnings
+from fenwear.watch import HeatWatch, Watch, size_warnings, stroke_warnings
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
@@ -137,7 +136,7 @@ def _run(
     def finish() -> dict[str, Any]:
         # Who interrupts a run is in a hurry: its figures can be drawn later.
         report = system.case.output.report and not isinstance(failure, InterruptedRunError)
-        warnings = [*run.warnings, *run.watch.warnings()]
+        warnings = [*run.all_warnings(), *run.watch.warnings()]
         seconds = time.perf_counter() - begin
         ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
         return run.finish({**ended, "warnings": warnings, "retries": run.remedies}, report=report)
@@ -201,18 +200,29 @@ class _Run:
         self.remedies: Counter[str] = Counter()
         if self.case.run.integration == "explicit":
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
-            self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"])
+            self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *doubts(self.case)]
         self.warnings += [*size_warnings(self.case, system.bodies, system.rigid), *stroke_warnings(system)]
-        before = None if start is None else joined(start.contacts)  # where a run that goes on touches
-        gain = heat_gain(system, None if before is None else before.pressure)
-        if gain is not None:
-            self.numbers["heat_gain"] = gain
-        self.warnings += [*heat_warnings(gain), *fineness_warnings(system)]
         for warning in self.warnings:
             log(f"warning: {warning}")
+        self._heat_watch = HeatWatch(self.extremes)
+        if self.case.program is None:  # else the motion and surroundings of its stages are what counts
+            self._see_heat(system, start)
         self._fields_at = frozenset(self.case.output.fields_at or ())
         self._lookout: Lookout | None = None  # while it marches
+
+    def _see_heat(self, system: Tribosystem, state: RunState | None = None) -> None:
+        """Look at the heat of a system with the contact of a state, or else of unworn bodies; collective."""
+        contacts = None if state is None else joined(state.contacts)
+        for warning in self._heat_watch.see(system, None if contacts is None else contacts.pressure):
+            self.log(f"warning: {warning}")
+        self.extremes.update(self._heat_watch.numbers)
+
+    def all_warnings(self) -> list[str]:
+        """Return what is to be said of the case, of all stages and of the contact at the end; collective."""
+        if self.last is not None and joined(self.state.contacts) is not None:  # a first half-cycle is no cycle
+            self._see_heat(self.system, self.state)
+        return [*self.warnings, *self._heat_watch.warnings()]
 
     def _open_history(self, after: int | None) -> None:
         if after is not None and not (self.directory / HISTORY).exists():
@@ -289,6 +299,9 @@ class _Run:
             self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
         elif block.system.bodies.warmed is not self.system.bodies.warmed:
             self.log(f"after half-cycle {self.state.half_cycle:,} properties are those of the temperatures there")
+        if block.system.exchange is not self.system.exchange:
+            self._see_heat(block.system)
+            self._see_heat(block.system, block.end)
         self.system = block.system
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
@@ -395,7 +408,12 @@ def position_warnings(system: Tribosystem) -> list[str]:
     ]
 
 
-def _warnings(number: float) -> list[str]:
+def _warnings(number: float, growth: float | None) -> list[str]:
+    if number <= 1 and growth is not None:
+        return [
+            f"with heat, explicit steps of wear let disturbances of the contact grow by {growth:.3g} 1/s, which "
+            'implicit ones let die out: the pressure will not settle; set run.integration = "implicit" or "jump"'
+        ]
     if number <= 1:
         return []
     return [

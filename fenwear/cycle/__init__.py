@@ -10,7 +10,7 @@ from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
 from fenwear.cycle.program import Span, at_step, follow_program, held
-from fenwear.cycle.stability import critical_speed, growth_rate, stability_number, stationary_growth
+from fenwear.cycle.stability import critical_speed, explicit_growth, growth_rate, stability_number, stationary_growth
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
 from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 
@@ -23,6 +23,7 @@ __all__ = [
     "critical_speed",
     "cycles_to_reach",
     "evolve",
+    "explicit_growth",
     "follow",
     "follow_program",
     "growth_rate",

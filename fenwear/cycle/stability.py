@@ -76,13 +76,15 @@ def _worn_response(worn: csr_array, size: int, solve: Solve) -> float:
     return float(np.abs(eigs(operator, k=1, v0=start, return_eigenvectors=False, tol=1e-4)).max())
 
 
-def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None = None) -> float:
+def growth_rate(
+    system: Tribosystem, pressure: Array, conductances: Array | None = None, *, implicit: bool = True
+) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
     Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
     state is that of the given pressures and of the temperatures that repeat under them. The cycle's map
     of temperature and worn depth is linearised there, friction, wear and conductance with it, for the
-    same nodes in contact and implicit wear, and its eigenvalue largest in size taken: ln |lambda| over
+    same nodes in contact, and its eigenvalue largest in size taken: ln |lambda| over
     the duration of a cycle. A rigid motion of the worn shape changes nothing, nor does the shape where
     nothing touches; these disturbances (lambda = 1) do not count.
 
@@ -91,6 +93,7 @@ def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None
         pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
         conductances: By which its temperatures have come about (phases, n), as `Steady.conductances`; by default those
             of the nodes that these pressures close by more than rounding.
+        implicit: Which of the two steps wears; explicit ones may grow where implicit ones do not.
 
     Raises:
         CaseError: a coefficient is negative or not finite there.
@@ -101,10 +104,10 @@ def growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None
             InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
         )
     system = with_reduced_heat(system)  # before rank 0 leads
-    return system.led_whole(partial(_growth_rate, system, pressure, conductances))
+    return system.led_whole(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
 
 
-def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None) -> float:
+def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool) -> float:
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
@@ -113,10 +116,28 @@ def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | Non
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
         state = states[phase] if states else None
-        cycle = phase_tangent(system, phase, pressure[phase], heat, state, conductance) @ cycle
+        tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit)
+        cycle = tangent @ cycle
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
+
+
+def explicit_growth(system: Tribosystem) -> float | None:
+    """Return the rate at which explicit steps of wear let disturbances of full contact grow, 1/s; collective.
+
+    What the friction heat gives back leaves less of the pressure that an opened gap takes away, half-cycle for
+    half-cycle, so that explicit steps may fail far below `stability_number` = 1. None where they do not, where implicit
+    ones let disturbances grow, too, and where nothing can be told: without heat, or with laws that pass.
+    """
+    if system.exchange is None or system.passing_laws:
+        return None
+    even = np.full((len(system.motion.phases), len(system.pair.weights)), system.rigid.mean_pressure)
+    try:
+        rate = growth_rate(system, even, implicit=False)
+        return rate if rate > 0 >= growth_rate(system, even) else None
+    except (CaseError, ConvergenceError):
+        return None
 
 
 def stationary_growth(
@@ -262,6 +283,8 @@ def phase_tangent(
     heat: CycleHeat | None = None,
     state: HeatState | None = None,
     conductance: Array | None = None,
+    *,
+    implicit: bool = True,
 ) -> Array:
     """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
 
@@ -271,7 +294,9 @@ def phase_tangent(
 
     and where nodes are in contact the gap stays closed at its end, and the load balanced:
 
-        dw' + G ds' + S dp + S_tau p dtau + H da = 0,   E dp + E_tau p dtau = 0.
+        dw' + G ds' + S dp + S_tau p dtau + H da = 0,   E dp + E_tau p dtau = 0,
+
+    with dw in place of dw' where the wear is explicit.
 
     Args:
         system: The assembled problem.
@@ -280,6 +305,7 @@ def phase_tangent(
         heat: Of cycles, at the friction there; None without heat.
         state: Temperatures at its start; None where nothing depends on them.
         conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
+        implicit: Whether the wear is.
     """
     n, interface = len(pressure), system.interfaces[phase]
     laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
@@ -298,13 +324,16 @@ def phase_tangent(
         state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
-    opened = interface.compliance(friction_ratio) + by_mu * traction_p + gap_rows @ state_p + laws.worn_p
+    opened = interface.compliance(friction_ratio) + by_mu * traction_p + gap_rows @ state_p
+    by_state = by_mu @ traction_s + gap_rows @ state_s
+    if implicit:
+        opened, by_state = opened + laws.worn_p, by_state + laws.worn_s
     matrix: Array = np.zeros((k + r, k + r))
     matrix[:k, :k] = opened[np.ix_(closed, closed)] / scale
     matrix[:k, k:] = rigid.rigid_normal[closed]
     matrix[k:, :k] = (rigid.equilibrium(friction_ratio) + balance_by_mu * traction_p)[:, closed]
     disturbance: Array = np.zeros((k + r, dim + n))
-    disturbance[:k, :dim] = (by_mu @ traction_s + gap_rows @ state_s + laws.worn_s)[closed] / scale
+    disturbance[:k, :dim] = by_state[closed] / scale
     disturbance[:k, dim:] = np.eye(n)[closed] / scale
     disturbance[k:, :dim] = balance_by_mu @ traction_s
     answer: Array = np.zeros((n, dim + n))

@@ -49,10 +49,13 @@ LABELS = {
     "temperature_strip_degC": "temperature of the strip",
     "temperature_strip_K": "temperature of the strip",
     "heat_mJ": "heat of the last half-cycle",
-    "heat_steps": "time steps of the heat in each half-cycle",
-    "heat_change_by_halving_steps": "change of contact temperatures by halving them, relative",
-    "heat_difference_from_whole_mesh": "difference of contact temperatures and thermal gap from the whole mesh's, "
-    "relative",
+    "heat_steps": "time steps of the heat in each half-cycle, the fewest of all stages",
+    "heat_change_by_halving_steps": "largest change of contact temperatures by halving them, relative",
+    "heat_difference_from_whole_mesh": "largest difference of contact temperatures and thermal gap from the whole "
+    "mesh's, relative",
+    "heat_gain": "largest share of a pressure that its friction heat of a half-cycle gives back; from 1 on contact may "
+    "have several answers",
+    "wear_step_over_explicit_limit": "wear of a half-cycle over the limit of explicit steps",
     "periodicity": "periodicity: change of pressure against one cycle ago, over the pressure scale",
     "growth_rate_per_s": "growth rate of disturbances of the final state; below 0 they die out",
     "largest_complementarity_error": "largest error of p >= 0, gap >= 0 and p gap = 0, over their scales",

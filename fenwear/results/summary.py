@@ -112,17 +112,7 @@ def _heat_summary(system: Tribosystem, last: Block, hottest: float) -> dict[str,
             f"temperature_punch_{degrees.unit}": degrees.of(interpolate(heat.temperature_punch[-1], places)).tolist(),
             f"temperature_strip_{degrees.unit}": degrees.of(interpolate(heat.temperature_strip[-1], places)).tolist(),
         }
-    fineness = None if system.exchange is None else system.exchange.fineness
-    told: dict[str, Any] = {}
-    if fineness is not None:
-        numbers = {
-            "heat_steps": fineness.steps,
-            "heat_change_by_halving_steps": fineness.change,
-            "heat_difference_from_whole_mesh": fineness.difference,
-        }
-        told = {name: value for name, value in numbers.items() if value is not None}
     return {
-        **told,
         f"max_temperature_{degrees.unit}": float(heat.max_temperature[-1]) - degrees.zero,
         f"{HOTTEST}_{degrees.unit}": hottest - degrees.zero,
         **along,

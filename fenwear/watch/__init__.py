@@ -7,12 +7,14 @@ few       contact on a few nodes
 stroke    strokes that the bodies take up elastically
 thickness bodies that are worn through
 fineness  steps, bases and elements of the heat that are too coarse
+heated    the same of all stages of a run, and contact that has several answers
 layer     elements thicker than the layer that heats up below a fast contact
 size      bodies whose mesh is hardly in mm
 states    a run's blocks, the first contact and the steady state: clipped, too hot, harder pressed than hard
 """
 
 from fenwear.watch.fineness import fineness_text, fineness_warnings
+from fenwear.watch.heated import HeatWatch
 from fenwear.watch.layer import HeatedLayer, heated_layer, layer_warnings
 from fenwear.watch.size import size_warnings
 from fenwear.watch.states import Watch, hot, initial_warnings, pressed, steady_warnings
@@ -20,6 +22,7 @@ from fenwear.watch.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_wa
 
 __all__ = [
     "TAKEN_UP",
+    "HeatWatch",
     "HeatedLayer",
     "Watch",
     "elastic_share",

@@ -24,17 +24,22 @@ def fineness_warnings(system: Tribosystem) -> list[str]:
 
     And where elements are thicker than the layer that heats up, see `layer_warnings`; collective.
     """
-    told = layer_warnings(system)
+    return list(fineness_remarks(system).values())
+
+
+def fineness_remarks(system: Tribosystem) -> dict[str, str]:
+    """Return the same, each by its kind; collective."""
+    told = {f"layer {number}": text for number, text in enumerate(layer_warnings(system))}
     heat, found = system.heat, None if system.exchange is None else system.exchange.fineness
     if heat is None or found is None:
         return told
     if found.change is not None and found.change > heat.step_tolerance:
-        told.append(
+        told["steps"] = (
             f"heat: halving the {found.steps} steps of a half-cycle would change contact temperatures by "
             f"{found.change:.2g}, more than heat.step_tolerance = {heat.step_tolerance:g}; expected more heat.steps"
         )
     if found.difference is not None and found.difference > heat.reduction_difference:
-        told.append(
+        told["basis"] = (
             f"heat: contact temperatures or thermal gap differ from those of the whole mesh by {found.difference:.2g}, "
             f"more than heat.reduction_difference = {heat.reduction_difference:g}; expected a lower "
             "heat.reduction_tolerance"

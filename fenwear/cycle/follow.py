@@ -102,7 +102,7 @@ def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:
         return None
     pairs = zip(state.functions(), bodies, strict=True)
     moved_along = [_in_place(old, body.function(body.initial())) for old, body in pairs]
-    return HeatState.nodal(bodies, moved_along, state.bulk)
+    return HeatState.nodal(bodies, moved_along, state.track)
 
 
 def _in_place(old: fem.Function, new: fem.Function) -> Array:

@@ -187,7 +187,7 @@ def _warmed(state: Steady, share: float) -> Steady:
         if followed < 1 and heat is not None:
             pairs = zip(found.end.temperatures(), taken_at(system), strict=True)
             mixed = [followed * new + (1 - followed) * old for new, old in pairs]
-            system = warmed_system(system, HeatState.nodal(heat, mixed, found.end.bulk))
+            system = warmed_system(system, HeatState.nodal(heat, mixed, found.end.track))
         else:
             system = warmed_system(system, found.end)
         state = _of_these_bodies(system)

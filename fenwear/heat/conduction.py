@@ -139,6 +139,10 @@ class HeatBody:
         ds = ufl.Measure("ds", domain=self.body.mesh, subdomain_data=self.boundary, metadata=self._quadrature)
         return self._measure * integrand * ds(tag)
 
+    def on_free_boundary(self, integrand: Any) -> Any:
+        """Return the form of an integral over the free boundary, per thickness."""
+        return self._ds(integrand, FREE)
+
     def _dx(self, integrand: Any) -> Any:
         return self._measure * integrand * ufl.dx(self.body.mesh, metadata=self._quadrature)
 

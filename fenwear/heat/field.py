@@ -83,25 +83,48 @@ class ReducedBasis(Basis):
 
 @dataclass(frozen=True, eq=False)
 class TrackBasis(ReducedBasis):
-    """A reduced basis with the temperature of the bulk of a closed track as its last coordinate, less the reference.
+    """A reduced basis with what is on its way back on a closed track as its last coordinates.
+
+    Of each cell of the track, from where the mesh is left on, they are the modes over its section and the temperature
+    of its bulk, less the reference.
 
     Attributes:
         reference: K.
+        modes: How many over a section.
+        cells: Of the track.
     """
 
     reference: float
+    modes: int
+    cells: int
 
     def __len__(self) -> int:
-        """Return dim + 1."""
-        return self.columns.shape[1] + 1
+        """Return dim + cells (modes + 1)."""
+        return self.columns.shape[1] + self.cells * (self.modes + 1)
 
     def temperature(self, coordinates: Array) -> Array:
         """Return the temperature of the mesh."""
-        return self.lift + self.columns @ coordinates[:-1]
+        return self.lift + self.columns @ coordinates[: self.columns.shape[1]]
 
     def coordinates(self, temperature: Array) -> Array:
-        """Return the projection, with the bulk at the reference."""
-        return np.append(super().coordinates(temperature), 0.0)
+        """Return the projection, with all of the track at the reference."""
+        return np.append(super().coordinates(temperature), np.zeros(self.cells * (self.modes + 1)))
+
+    def track(self, coordinates: Array) -> Array:
+        """Return modes and temperature of each cell (cells, modes + 1), K, of coordinates that end with them."""
+        track = coordinates[-self.cells * (self.modes + 1) :].reshape(self.cells, -1).copy()
+        track[:, -1] += self.reference
+        return track
+
+    def on_track(self, coordinates: Array, track: Array) -> Array:
+        """Return coordinates with what is on its way back: of a track with other modes its temperatures alone."""
+        found: Array = np.zeros((self.cells, self.modes + 1))
+        if track.shape == found.shape:
+            found[:] = track
+        else:
+            found[:, -1] = track[:, -1].mean()
+        found[:, -1] -= self.reference
+        return np.append(coordinates[: self.columns.shape[1]], found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,28 +134,33 @@ class HeatState:
     Attributes:
         bases: Of the punch and of the strip.
         values: Coordinates on the punch's and then on the strip's basis.
-        told: Temperature of the bulk of a closed track, K, where no basis has it; None for the initial one.
+        told: What is on its way back on a closed track, see `track`, where no basis has it; None for the initial state.
         surfaces: Temperatures of both contact surfaces at the interface nodes (n,), K, at the end of a step: a basis
             may leave out what fades within one. None where the coordinates say all.
     """
 
     bases: tuple[Basis, Basis]
     values: Array
-    told: float | None = None
+    told: Array | None = None
     surfaces: tuple[Array, Array] | None = None
 
     @classmethod
     def nodal(
-        cls, bodies: tuple[HeatBody, HeatBody], temperatures: Sequence[Array], bulk: float | None = None
+        cls, bodies: tuple[HeatBody, HeatBody], temperatures: Sequence[Array], track: Array | None = None
     ) -> HeatState:
-        """Return the state of these temperatures of this rank's own nodes of both bodies, and of a track's bulk."""
-        return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)), bulk)
+        """Return the state of these temperatures of this rank's own nodes of both bodies, and of a closed track."""
+        return cls((Basis(bodies[0]), Basis(bodies[1])), np.concatenate(list(temperatures)), track)
 
     @property
     def bulk(self) -> float | None:
         """Temperature of the bulk of the strip's closed track, K; None where there is none, or for the initial one."""
+        return None if self.track is None else float(self.track[:, -1].mean())
+
+    @property
+    def track(self) -> Array | None:
+        """What is on its way back on the strip's closed track, see `TrackBasis.track`."""
         basis = self.bases[1]
-        return float(self.values[-1]) + basis.reference if isinstance(basis, TrackBasis) else self.told
+        return basis.track(self.values) if isinstance(basis, TrackBasis) else self.told
 
     def temperatures(self) -> tuple[Array, Array]:
         """Return the temperatures of this rank's own nodes of punch and strip (owned,), K."""
@@ -150,9 +178,10 @@ class HeatState:
             return self
         own = np.split(self.values, [len(self.bases[0])])
         parts = [to.translated(old, part) for to, old, part in zip(bases, self.bases, own, strict=True)]
-        if isinstance(bases[1], TrackBasis) and self.bulk is not None:
-            parts[1][-1] = self.bulk - bases[1].reference
-        return HeatState(bases, np.concatenate(parts), self.bulk)
+        track = self.track
+        if isinstance(bases[1], TrackBasis) and track is not None:
+            parts[1] = bases[1].on_track(parts[1], track)
+        return HeatState(bases, np.concatenate(parts), track)
 
 
 @dataclass(frozen=True)

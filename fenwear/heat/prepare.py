@@ -21,6 +21,7 @@ from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.passage import Passage
 from fenwear.heat.passing import ModalField, PassingField
 from fenwear.heat.passing_strip import MANY, STEPS, PassingStrip
+from fenwear.heat.section import section_modes
 from fenwear.heat.side import Fineness, Reading, Side, StepPlan
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
@@ -273,15 +274,32 @@ def _on_track(
         raise CaseError(InputError("heat.track", message))
     # What enters at a kelvin, as large as a unit flux: what is small against the largest is dropped from the basis.
     comm, inflow = body.body.mesh.comm, trial.inflow
-    unit_step = body.step(max(wish.velocities, key=abs) or 1.0, wish.duration, around)
-    entering = unit_step.entering
+    fastest = max(wish.velocities, key=abs) or 1.0
+    unit_step = body.step(fastest, wish.duration, around)
+    entering = unit_step.entering / abs(fastest)
     unit_step.free()
-    fluxes, unit = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], np.abs(entering).sum()]))
-    both = csc_array(hstack([inflow, csc_array(entering[:, None] * (fluxes / unit))]))
-    cold = [np.vstack([flux, np.zeros(flux.shape[1])]) for flux in trial.entering]
-    inner, difference = fitted_field(body, steps, own, replace(trial, inflow=both, entering=cold), wish)
-    kelvins = [float(total(comm, np.array(step.entering.sum()))) / fluxes for step in steps]
-    return TrackField(inner, steps, kelvins, wish.duration, track, thickness), difference
+    fluxes, flow = total(comm, np.array([np.abs(inflow).sum() / inflow.shape[1], entering.sum()]))
+    away = track.heat_capacity / thickness / (flow * abs(fastest))
+    section = section_modes(body, around.sliding, float(np.sign(fastest)), away)
+    steady = body.step(fastest, np.inf, around, at_once=True)
+    heated = steady.respond(inflow @ (trial.entering[-1][:, :2]))  # even, and growing along the contact
+    steady.free()
+    rises = np.abs(total(comm, trial.contact @ heated)).max(axis=0)
+    section = section.of_note(total(comm, section.leaving.T @ heated) / flow, rises, away)
+    loads = np.column_stack([section.entering, entering])
+    kelvins = total(comm, np.abs(loads).sum(axis=0)) / fluxes
+    both = csc_array(hstack([inflow, csc_array(loads / kelvins)]))
+    tried = [_with_inlets(flux, len(kelvins)) for flux in trial.entering]
+    inner, difference = fitted_field(body, steps, own, replace(trial, inflow=both, entering=tried), wish)
+    return TrackField(inner, steps, own, kelvins, wish.duration, track, section, thickness), difference
+
+
+def _with_inlets(flux: Array, count: int) -> Array:
+    """Return fluxes (n, m) with none that enters by the end of the mesh, and then as much by each mode, (., m + 1)."""
+    found: Array = np.zeros((len(flux) + count, flux.shape[1] + 1))
+    found[: len(flux), :-1] = flux
+    found[len(flux) :, -1] = flux[:, 0].sum()
+    return found
 
 
 def _surroundings(body: HeatBody, pair: ContactPair, sliding: SlidingField, *, renewed: bool) -> Surroundings:

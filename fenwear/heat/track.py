@@ -1,12 +1,18 @@
 """A closed track: what the strip's material carries out of the mesh warms the rest of the disc or ring, and comes back.
 
-Beyond the mesh the material mixes to one temperature T_b, that of the bulk. With its capacity C, the mW/K G by which
-it loses heat to the surroundings, and what is carried out of the mesh less what enters it at T_b,
+Beyond the mesh it goes through a row of cells, in each of which it mixes. With the capacity C / N of one of N, its
+part G / N of the mW/K by which the track loses heat to the surroundings, F the flow of heat capacity, and what is
+carried out of the mesh for F T_0,
 
-    C dT_b/dt = (integral of rho c v . n theta over both ends) - G (T_b - theta_a),
+    C / N dT_c/dt = F (T_{c-1} - T_c) - G / N (T_c - theta_a),
 
-implicitly in each step together with the temperatures of the mesh. It holds where the heat of a turn spreads through
-the section until it comes back: at a low Biot number of the disc.
+implicitly in each step together with the temperatures of the mesh, which T_N enters. What differs over the section
+comes back, too, less what has decayed until then: each mode phi_j of `fenwear.heat.section` by lambda_j over C / F,
+
+    C / N dB_c/dt = F (B_{c-1} - e^(lambda_j C / (N F)) B_c),   F B_0 = integral of rho c (v . n) theta phi_j,
+
+over the end by which the material leaves, in whose steady state e^(-lambda_j C / F) of what leaves comes back; at rest
+it decays by lambda_j. These modes carry no heat in all.
 """
 
 from __future__ import annotations
@@ -15,44 +21,51 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Track
 from fenwear.heat.conduction import HeatStep
 from fenwear.heat.field import Functional, ReducedField, TrackBasis
+from fenwear.heat.section import Section
 from fenwear.heat.side import Side
 from fenwear.parallel import total
+
+CELLS = 8  # of a track
+GONE = 40.0  # e-folds after which nothing comes back
 
 
 @dataclass(frozen=True)
 class _Coupling:
-    """How the bulk meets the mesh in a step.
+    """How the cells of a track meet the mesh in a step, each of them m modes over the section, and its bulk.
 
     Attributes:
-        enters: Coordinates at the end for each kelvin that the material enters warmer (dim,).
-        leaves: What is carried out a second for each coordinate (dim,), mW/mm.
-        constant: The same without any, less what enters at the reference and what the bulk then loses, mW/mm.
-        stays: C over the duration of the step, mW/(mm K).
-        resists: What a kelvin of the bulk takes in all, mW/(mm K).
+        enters: Coordinates at the end for each kelvin that the material of the last cell enters warmer (dim, m + 1).
+        leaves: What is carried out a second into the first cell for each coordinate (m + 1, dim), mW/mm.
+        constant: The same without any, and what the cells lose at the reference, as a gain (cells (m + 1),), mW/mm.
+        stays: Capacity of a cell over the duration of the step, mW/(mm K).
+        takes: What a kelvin takes in all, inverted (cells (m + 1), cells (m + 1)), mm K/mW.
     """
 
     enters: Array
     leaves: Array
-    constant: float
+    constant: Array
     stays: float
-    resists: float
+    takes: Array
 
 
 class TrackField:
-    """The reduced temperature of the strip with that of the bulk of its track, less the reference, as the last one.
+    """The reduced temperature of the strip with what comes back on its track as the last coordinates.
 
     Args:
-        inner: Of the strip, whose last inflow is what enters at a kelvin, in some proportion.
+        inner: Of the strip, whose last inflows are what enters at a kelvin of each mode and of the bulk, scaled.
         steps: Of the strip.
-        kelvins: What of the last inflow a kelvin is in each step.
+        speeds: Of its material in each of them.
+        kelvins: What of the last inflows a kelvin is at unit speed (m + 1,).
         duration: Of a step, s.
         track: The bulk.
+        section: The modes over its section.
         thickness: Of a plane model, mm.
     """
 
@@ -62,48 +75,59 @@ class TrackField:
         self,
         inner: ReducedField,
         steps: Sequence[HeatStep],
-        kelvins: Sequence[float],
+        speeds: Sequence[float],
+        kelvins: Array,
         duration: float,
         track: Track,
+        section: Section,
         thickness: float,
     ) -> None:
         self.inner, body = inner, steps[0].body
-        reference = body.heat.initial
-        self.basis = TrackBasis(body, inner.basis.lift, inner.basis.columns, reference)
+        reference, modes = body.heat.initial, len(section.rates)
+        self._inlets = modes + 1
+        comm, lift, columns = body.body.mesh.comm, inner.basis.lift, inner.basis.columns
+        self.basis = TrackBasis(body, lift, columns, reference, modes, CELLS)
         self.capacity, self.loss = track.heat_capacity / thickness, track.loss / thickness
-        comm = body.body.mesh.comm
+        read = total(comm, section.leaving.T @ np.column_stack([columns, lift - reference]))
+        lost = np.tile(np.append(np.zeros(modes), self.loss / CELLS * (reference - body.heat.ambient)), CELLS)
         self._couplings: list[_Coupling] = []
         self.responses: Sequence[Array] = []
         found = []
-        for step, kelvin, answers in zip(steps, kelvins, inner.responses, strict=True):
-            leaves = total(comm, step.carried @ inner.basis.columns)
-            at_lift, entering = total(comm, np.array([step.carried @ inner.basis.lift, step.entering.sum()]))
-            enters, stays = kelvin * answers[:, -1], self.capacity / duration
-            constant = at_lift - entering * reference - self.loss * (reference - body.heat.ambient)
-            resists = stays + entering + self.loss - float(leaves @ enters)
-            self._couplings.append(_Coupling(enters, leaves, float(constant), stays, float(resists)))
-            own = answers[:, :-1]
-            warms = leaves @ own / resists
-            found.append(np.vstack([own + np.outer(enters, warms), warms]))
+        for step, velocity, answers in zip(steps, speeds, inner.responses, strict=True):
+            speed, stays, own = abs(velocity), self.capacity / CELLS / duration, answers[:, : -self._inlets]
+            carried = total(comm, np.append(step.carried @ columns, step.carried @ lift))
+            flow = float(total(comm, np.array(step.entering.sum())))
+            leaves = np.vstack([speed * read[:, :-1], carried[:-1]])
+            constant = -lost
+            constant[: self._inlets] += np.append(speed * read[:, -1], carried[-1] - flow * reference)
+            enters = speed * kelvins * answers[:, -self._inlets :]
+            each = np.append(_decaying(section.rates, self.capacity / CELLS, flow), flow + self.loss / CELLS)
+            takes = np.diag(np.tile(stays + each, CELLS)) - flow * np.eye(len(constant), k=-self._inlets)
+            takes[: self._inlets, -self._inlets :] -= leaves @ enters
+            self._couplings.append(_Coupling(enters, leaves, constant, stays, np.asarray(scipy.linalg.inv(takes))))
+            warms = self._couplings[-1].takes[:, : self._inlets] @ (leaves @ own)
+            found.append(np.vstack([own + enters @ warms[-self._inlets :], warms]))
         self.responses = found
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
-        """Apply the step to the mesh and the bulk."""
-        one = self._couplings[step]
-        free = self.inner.advance(step, coordinates[:-1], sources=sources)
-        bulk = (one.stays * coordinates[-1] + one.leaves @ free + sources * one.constant) / one.resists
-        return np.concatenate([free + (one.enters * np.asarray(bulk)[..., None]).T, np.asarray(bulk)[None]])
+        """Apply the step to the mesh and to what comes back."""
+        one, mesh = self._couplings[step], len(coordinates) - CELLS * self._inlets
+        free = self.inner.advance(step, coordinates[:mesh], sources=sources)
+        gained = one.stays * coordinates[mesh:]
+        gained[: self._inlets] += one.leaves @ free
+        track = one.takes @ (gained + one.constant if sources else gained)
+        return np.concatenate([free + one.enters @ track[-self._inlets :], track])
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional of the mesh's temperatures; collective."""
-        return _with_bulk(self.inner.observe(rows))
+        return _with_track(self.inner.observe(rows), CELLS * self._inlets)
 
     def balanced(self, side: Side) -> Side:
         """Return the strip's side with the bulk in its balance: nothing is carried out any more."""
         rows, constant = side.balance.rows.copy(), side.balance.constant.copy()
         reference = self.basis.reference
         for row, value in ((0, self.capacity), (1, self.loss)):
-            rows[row, -1] += value
+            rows[row, len(self.inner.basis) :].reshape(CELLS, -1)[:, -1] += value / CELLS
             constant[row] += value * reference
         rows[4::3], constant[4::3] = 0.0, 0.0
         return replace(
@@ -117,6 +141,13 @@ class TrackField:
         )
 
 
-def _with_bulk(functional: Functional) -> Functional:
+def _decaying(rates: Array, capacity: float, flow: float) -> Array:
+    """Return what a kelvin of each mode takes in a cell (m,), mW/(mm K), through which F flows; at rest all decays."""
+    if flow == 0:
+        return capacity * rates
+    return np.asarray(flow * np.exp(np.minimum(rates * capacity / flow, GONE)))
+
+
+def _with_track(functional: Functional, count: int) -> Functional:
     rows = np.asarray(functional.rows)
-    return replace(functional, rows=np.hstack([rows, np.zeros((len(rows), 1))]))
+    return replace(functional, rows=np.hstack([rows, np.zeros((len(rows), count))]))

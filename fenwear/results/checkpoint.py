@@ -44,7 +44,7 @@ NUMBERS, WEAR, STATES = (
 )
 TOTALS = ("totals", "energy", "pressure_sum")
 WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
-BULK = "bulk"  # temperature of a closed track, NaN where there is none
+BULK = "bulk"  # what is on its way back on a closed track; NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES = 56, 65536  # that a temperature with its place takes, and a file beside its values
 # A run may go on farther than it was meant to, and keep other things.
@@ -155,8 +155,8 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
 
 
 def _bulk(temperature: HeatState | None) -> dict[str, Any]:
-    bulk = None if temperature is None else temperature.bulk
-    return {BULK: np.nan if bulk is None else bulk}
+    track = None if temperature is None else temperature.track
+    return {BULK: np.nan if track is None else track}
 
 
 def _totals(totals: Totals) -> dict[str, Any]:
@@ -219,9 +219,9 @@ def load(directory: Path, system: Tribosystem) -> RunState:
     arrays: dict[str, Any] = on_root(comm, lambda: _read(folder, system))
     temperature = None
     if system.bodies.heat is not None:
-        bulk = None if np.isnan(arrays[BULK]) else float(arrays[BULK])
+        track = None if np.isnan(arrays[BULK]).any() else np.atleast_2d(arrays[BULK])
         read = [read_temperature(folder, body) for body in system.bodies.heat]
-        temperature = HeatState.nodal(system.bodies.heat, read, bulk)
+        temperature = HeatState.nodal(system.bodies.heat, read, track)
     contacts = tuple(
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)

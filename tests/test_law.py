@@ -9,7 +9,7 @@ import pytest
 
 from fenwear import CaseError, load_case
 from fenwear.assembly import assemble
-from fenwear.law import check_slides, decided
+from fenwear.law import check_decided, decided
 from fenwear.run import run_case
 from fenwear.sweeps.evaluate import Workshop
 from fenwear.watch import stroke_warnings
@@ -24,12 +24,19 @@ WIDE = "geometry.parameters.overlap='0.6 mm'"
 ONE_WAY = "motion={kind='one-way', speed='1 mm/s', direction='leftward', duration='1 s'}"
 
 
+ACROSS = "contact.transverse_friction=0.1"
+
+
 @pytest.mark.parametrize(
     ("settings", "law", "reason"),
     [
         (("motion.amplitude='3 um'",), "coulomb", "% of the stroke"),
         (("motion.amplitude='300 um'", WIDE), "gross-sliding", "% of the stroke"),
-        (("motion.amplitude='3 um'", "run.integration='implicit'"), "gross-sliding", "run.integration"),
+        (
+            ("motion.amplitude='3 um'", "contact.transverse_friction=0.1"),
+            "gross-sliding",
+            "contact.transverse_friction",
+        ),
         (("motion.amplitude='300 um'", "stick.force='60 N'"), "coulomb", "table stick"),
         ((ONE_WAY, "wear={punch={coefficient=1e-8}}"), "gross-sliding", "one way"),
     ],
@@ -40,15 +47,14 @@ def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) ->
     case = load_case("fretting-partial-slip", [*SMALL, *settings])
     found = decided(case, told.append)
     assert found.case.contact.law == found.numbers["contact_law"] == law
-    assert (found.system is None) == (law == "coulomb")
+    assert found.system.sticks == (law == "coulomb")
     assert found.case.folder == case.folder
     assert found.case.materials == case.materials
     assert len(told) == 1
     assert f"'{law}' is taken" in told[0]
     assert reason in told[0]
-    if reason == "run.integration":
-        assert found.system is not None
-        assert "cannot be followed here: run.integration" in stroke_warnings(found.system)[0]
+    if reason == "contact.transverse_friction":
+        assert "cannot be followed here: contact.transverse_friction" in stroke_warnings(found.system)[0]
 
 
 def test_the_estimate_decides_where_it_says() -> None:
@@ -68,20 +74,18 @@ def test_a_law_that_is_given_stays() -> None:
     """Without a word; a table stick that does not go with the case is an error."""
     case = load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'", "stick={}"])
     assert decided(case, pytest.fail).case is case
-    with pytest.raises(CaseError, match=r"run\.integration: expected 'explicit' or 'jump'"):
-        load_case("fretting-partial-slip", [*SMALL, "stick.force='60 N'", "run.integration='implicit'"])
-    with pytest.raises(CaseError, match=r"wear\.strip\.coefficient: expected a constant with contact\.law = 'coulomb'"):
-        load_case("fretting-partial-slip", ["wear.strip={coefficient={expression='1e-8 * p'}}"])
+    with pytest.raises(CaseError, match=r"contact\.transverse_friction: expected 0 with contact\.law = 'coulomb'"):
+        load_case("fretting-partial-slip", [*SMALL, "stick.force='60 N'", "contact.transverse_friction=0.1"])
 
 
-def test_what_knows_gross_sliding_alone_says_so() -> None:
+def test_what_follows_one_law_says_so() -> None:
     """Sweeps and lives are no results of a law that the case does not call for; the law given, they are."""
     case = load_case("fretting-partial-slip", [*SMALL, "motion.amplitude='3 um'"])
-    with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken: .* set 'gross-sliding' to leave it out"):
+    with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken: .* or 'gross-sliding' to leave stick out"):
         Workshop().values(case, "steady")
     with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken"):
-        check_slides(assemble(case))
-    check_slides(assemble(load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'"])))
+        check_decided(assemble(case))
+    check_decided(assemble(load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'"])))
 
 
 def test_a_run_tells_its_law(tmp_path: Path) -> None:

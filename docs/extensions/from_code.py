@@ -15,8 +15,7 @@ from fenwear.bodies.mesh import meshes_folder
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history, sheet, surfaces
-from fenwear.stick import results as stick
+from fenwear.results import history, sheet, steps, surfaces
 from fenwear.verify.suite import registered
 
 
@@ -135,8 +134,9 @@ class Results(Written):
             "With heat": {**history.HEAT_VARIABLES, **heat},
             "With heat.track": history.BULK,
             "Of solids and rings instead, or as well": _of_surfaces(),
-            "With contact.law = coulomb, these alone": stick.VARIABLES,
-            "With contact.law = coulomb in a solid instead, or as well": stick.of_solids(),
+            "With contact.law = coulomb": steps.VARIABLES,
+            "With contact.law = coulomb and heat": steps.HEAT_VARIABLES,
+            "With contact.law = coulomb in a solid instead, or as well": steps.of_solids(),
         }
         for title, variables in groups.items():
             yield f"\n**{title}**\n"

@@ -12,8 +12,9 @@ takes again what a changed case makes necessary, and keeps the rest.
 """
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
+from fenwear.assembly.laws import ContactLaw, law_named
 from fenwear.assembly.needs import Needs, body_needs
-from fenwear.assembly.placed import Clock, Placed, place
+from fenwear.assembly.placed import Clock, Placed, place, place_at_rest
 from fenwear.assembly.shares import body_lines, shares_text
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
@@ -23,13 +24,14 @@ from fenwear.assembly.tribosystem import (
     elastic,
     expansions,
     heating_friction,
+    joined,
     needs_of,
     preparation,
     steady_exchange,
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.assembly.variants import assemble, in_parts, place_case, set_up_by, vary, with_case
+from fenwear.assembly.variants import assemble, in_parts, place_case, renewed, set_up_by, vary, with_case
 from fenwear.assembly.warmed import outwarmed, property_change, taken_at, warmed_system, warming_key
 from fenwear.assembly.ways import settle
 
@@ -37,6 +39,7 @@ __all__ = [
     "Bodies",
     "Clock",
     "Condensed",
+    "ContactLaw",
     "Needs",
     "Placed",
     "Preparation",
@@ -52,13 +55,17 @@ __all__ = [
     "expansions",
     "heating_friction",
     "in_parts",
+    "joined",
+    "law_named",
     "make_sliding",
     "needs_of",
     "outwarmed",
     "place",
+    "place_at_rest",
     "place_case",
     "preparation",
     "property_change",
+    "renewed",
     "set_up_by",
     "settle",
     "shares_text",

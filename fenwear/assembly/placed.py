@@ -62,6 +62,7 @@ class Placed:
         sliding: Motion, friction and wear.
         heat: Settings of the heat between the bodies; None without.
         solver: Of the contact: "condensed", or "full" for the reference on both bodies' meshes.
+        law: Of the contact: "gross-sliding", or "coulomb" where nodes stick or slip.
         made_from: The case; None where it was made in Python.
         loaded: The bodies under the loads of each phase.
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
@@ -75,6 +76,7 @@ class Placed:
     sliding: Sliding
     heat: Heat | None
     solver: str
+    law: str = "gross-sliding"
     made_from: Case | None
     loaded: tuple[Bodies, ...]
     rigids: tuple[RigidEquilibrium, ...]
@@ -86,6 +88,11 @@ class Placed:
     def time(self, half_cycle: NDArray[np.int64]) -> Array:
         """Return the time at the end of half-cycles of its motion, given by their numbers from 1, s."""
         return self.clock.time + self.motion.time(np.asarray(half_cycle) - self.clock.half_cycles)
+
+    @property
+    def sticks(self) -> bool:
+        """Whether nodes stick or slip by themselves."""
+        return self.law == "coulomb"
 
     @property
     def normal_force(self) -> float:
@@ -408,6 +415,33 @@ def place(
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         check_equilibrium(one, placed.direction_words[phase.direction], ratio)
     return placed
+
+
+def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, case: Case | None = None) -> Placed:
+    """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
+
+    Where nodes stick or slip by themselves their law says how friction acts, and where the strip is in a time step.
+
+    Args:
+        bodies: Both bodies, under the mean of their loads.
+        sliding: Motion, friction and wear; a phase for each half-cycle.
+        middle: The surfaces there.
+        case: What they were made from.
+    """
+    loaded = _loaded(bodies, sliding.motion, case)
+    rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
+    own = [rigid if one is bodies else rigid_equilibrium(middle, one.punch, one.strip) for one in loaded]
+    return Placed(
+        bodies=bodies,
+        sliding=sliding,
+        heat=None if case is None else case.heat,
+        solver="condensed" if case is None else case.contact.solver,
+        law="coulomb",
+        made_from=case,
+        loaded=loaded,
+        rigids=tuple(own),
+        rigid=rigid,
+    )
 
 
 def _passage(middle: ContactPair, sliding: Sliding) -> Passage | None:

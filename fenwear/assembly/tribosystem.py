@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 from mpi4py import MPI
@@ -80,17 +80,24 @@ class Tribosystem(Placed):
         interface: The condensed interface in the middle position, under the mean loads.
         interfaces: The same in each phase.
         exchange: The bodies' temperatures over the phases; None without heat, or where it was not asked for.
+        lawful: What the law of contact has prepared of it, where it needs more.
     """
 
     condensed: Condensed
     interface: Interface
     interfaces: tuple[Interface, ...]
     exchange: HeatExchange | None = None
+    lawful: Any = None
+
+    @property
+    def elastic_length(self) -> float:
+        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
+        return float(self.lawful.elastic_length) if self.sticks else self.interface.elastic_length
 
     @property
     def replicated(self) -> bool:
         """Whether every rank could go on alone: no temperatures of all nodes, no contact on all displacements."""
-        return self.solver == "condensed" and (self.exchange is None or self.exchange.reduced)
+        return (self.solver == "condensed" or self.sticks) and (self.exchange is None or self.exchange.reduced)
 
     def led(self, function: Callable[[], T]) -> T:
         """Call what goes on from prepared bodies, on rank 0 for all where that can be, else on every rank; collective.
@@ -133,6 +140,9 @@ class Tribosystem(Placed):
             CaseError: they never meet: no pressure, no wear, nothing to follow.
             ConvergenceError: the contact of a phase did not converge.
         """
+        if self.sticks:
+            self.lawful.check_touching()
+            return
         gaps = []
         for phase in range(len(self.motion.phases)):
             contact = self.phase_contact((phase,)).solve(self.gap(phase, self.unworn()))

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies, build_conduction
+from fenwear.assembly.laws import GROSS, LAWS, law_named
 from fenwear.assembly.placed import Placed, place
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
@@ -24,7 +25,6 @@ from fenwear.assembly.tribosystem import (
     with_reduced_heat,
 )
 from fenwear.case import Case, Heat, changed_case
-from fenwear.errors import CaseError, InputError
 from fenwear.sliding.wear import Worn
 
 
@@ -53,14 +53,32 @@ def assemble(
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    if case.contact.law == "coulomb":
-        reason = "expected 'gross-sliding' here: with 'coulomb', `run`, `check`, `steady` and fenwear.stick go on"
-        raise CaseError(InputError("contact.law", reason))
+    if case.contact.law in LAWS and case.contact.law != GROSS:
+        law = law_named(case.contact.law)
+        return law.assemble(case, comm, followed, heat=heat, fresh=fresh, warmed=warmed)
     system = elastic(place_case(case, comm, followed, warmed), fresh=fresh)
     if heat == "none":
         return system
     prepare = with_reduced_heat if heat == "reduced" else with_exchange
     return prepare(system, keep=True, fresh=fresh)
+
+
+def renewed(
+    system: Tribosystem, followed: Worn | None = None, warmed: tuple[Array, Array] | None = None
+) -> Tribosystem:
+    """Return the system of the same case on meshes and with properties of now; collective.
+
+    Args:
+        system: Of a case.
+        followed: Worn depths that the meshes follow.
+        warmed: Temperatures of this rank's own nodes that the materials' properties are taken at.
+
+    Raises:
+        MeshQualityError: an element does not survive the motion of its mesh.
+    """
+    if system.law != GROSS:
+        return law_named(system.law).renewed(system, followed, warmed)
+    return assemble(system.case, system.comm, followed, heat=preparation(system), warmed=warmed)
 
 
 def place_case(
@@ -112,6 +130,8 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
         CaseError: the punch would tip over.
     """
     before = system.case
+    if {before.contact.law, case.contact.law} & (LAWS.keys() - {GROSS}):
+        return law_named(case.contact.law).varied(system, case)
     if set_up_by(before) != set_up_by(case):
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
     bodies, condensed, sliding = system.bodies, system.condensed, system.sliding

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies, build_conduction, elastic_body
+from fenwear.assembly.laws import GROSS, law_named
 from fenwear.assembly.placed import place
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
@@ -126,6 +127,8 @@ def warmed_system(system: Tribosystem, state: HeatState) -> Tribosystem:
     """
     case = system.case
     bodies = _bodies_at(system.bodies, case, state.temperatures())
+    if system.law != GROSS:
+        return law_named(system.law).at_temperatures(system, bodies)
     placed = place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case)
     condensed = system.condensed if bodies.punch is system.bodies.punch else condense_bodies(placed)
     new = joined(placed, condensed)

@@ -280,25 +280,15 @@ class Case(Part):
     def against_stick(self) -> list[str]:
         """What does not go with contact with stick: a key and what it expects, each."""
         wrong = {
-            "contact.friction: expected a constant": isinstance(self.contact.friction, Dependence),
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
-            "heat.track: expected none": self.heat is not None and self.heat.track is not None,
             "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
-            "materials: expected properties that do not depend on the temperature": self.warming,
-            "program: expected none": self.program is not None,
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
             "motion.axis: expected 'x'": not self.passes,
-            "run.integration: expected 'explicit' or 'jump'": self.run.integration == "implicit",
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)
             ),
-            **{
-                f"wear.{body}.coefficient: expected a constant": isinstance(law.coefficient, Dependence)
-                for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip))
-                if law is not None
-            },
         }
         return [problem for problem, so in wrong.items() if so]
 

@@ -28,7 +28,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.parallel import on_root
 
 if TYPE_CHECKING:
-    from fenwear.assembly import Bodies
+    from fenwear.assembly import Tribosystem
     from fenwear.progress import How
 
 
@@ -56,7 +56,6 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
-    from fenwear.report.stick import key_numbers_text
     from fenwear.results.sheet import sheet_text
     from fenwear.run import run_case
 
@@ -74,14 +73,14 @@ def run(
         print_json(summary)
     else:
         if not quiet:
-            show(key_numbers_text(summary) if "energy_ratio" in summary else sheet_text(summary))
+            show(sheet_text(summary))
         say(f"results in {directory}")
 
 
 @app.command("check")
 def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import elastic, needs_of, place_case, shares_text, with_reduced_heat
+    from fenwear.assembly import elastic, law_named, needs_of, place_case, shares_text, with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings, stability_number
     from fenwear.law import choose_law, with_law
     from fenwear.run import position_warnings
@@ -101,7 +100,7 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         log(choice.text)
         loaded = with_law(loaded, choice.law)
         if choice.law == "coulomb":
-            _check_stick(loaded, system.bodies)
+            _check_stick(loaded, law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False))
             return
         system = replace(system, made_from=loaded)
     number = stability_number(system)
@@ -119,11 +118,11 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
 
 
-def _check_stick(case: Case, bodies: Bodies | None = None) -> None:
+def _check_stick(case: Case, system: Tribosystem | None = None) -> None:
     """Print a case with stick with all defaults, and what its first cycle comes to."""
-    from fenwear.stick.command import check_text
+    from fenwear.cli.partial_slip import check_text
 
-    text = check_text(case, bodies)
+    text = check_text(case, system)
     for warning in doubts(case):
         log(f"warning: {warning}")
     show(case.to_toml())

@@ -17,7 +17,6 @@ from fenwear.errors import CaseError, InputError
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
     from fenwear.cycle import Steady
-    from fenwear.law import Decided
 
 
 StepOption = Annotated[
@@ -50,13 +49,15 @@ def steady_command(
     held_at(given, _number(step))  # before anything is set up
     lawful = decided(given, log, heat="reduced" if given.program is None else "none", fresh=fresh)
     loaded, system = lawful.case, lawful.system
-    of_step = None if system is None else held(system, _number(step))
-    if system is not None and of_step is not None:
+    of_step = held(system, _number(step))
+    if of_step is not None:
         loaded = of_step[0]
-        system = with_reduced_heat(with_case(system, loaded), keep=True, fresh=fresh)
-    if system is None:
-        _print_final(case, lawful, as_json=as_json, fresh=fresh)
+        system = with_case(system, loaded)
+    if system.sticks:
+        _print_final(case, system, as_json=as_json)
         return
+    if of_step is not None:
+        system = with_reduced_heat(system, keep=True, fresh=fresh)
     setup = time.perf_counter() - begin
     state = steady(system)
     found = state.system
@@ -106,11 +107,11 @@ def steady_command(
     )
 
 
-def _print_final(name: str, lawful: Decided, *, as_json: bool, fresh: bool) -> None:
+def _print_final(name: str, system: Tribosystem, *, as_json: bool) -> None:
     """Print the shape to which partial slip wears."""
-    from fenwear.stick.command import final_of, final_text
+    from fenwear.cli.partial_slip import final_of, final_text
 
-    _, numbers = final_of(lawful.case, fresh=fresh, bodies=lawful.bodies)
+    _, numbers = final_of(system.case, system)
     if as_json:
         print_json(numbers)
     else:
@@ -202,6 +203,9 @@ def optimum_command(
     from fenwear.cycle import held
 
     given = load(case, settings)
+    if given.sticks:
+        reason = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
+        raise CaseError(InputError("contact.law", reason))
     held_at(given, _number(step))  # before any mesh is made
     system = place_case(given)
     of_step = held(system, _number(step))

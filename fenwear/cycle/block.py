@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import reduce
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.state import RunState, pressure_scales
 from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
+from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.wear import Worn
 
 
@@ -95,6 +96,8 @@ class Block:
         remedies: How it was solved then, and how often.
         load_factor: Of all loads in it (k,).
         end: From where the run goes on.
+        steps: Time steps of each half-cycle, where the law of contact resolves it in time; else none.
+        traction: tau of the last one in its middle (n, d), where its direction alone does not tell; else None.
     """
 
     system: Tribosystem
@@ -116,6 +119,8 @@ class Block:
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
     load_factor: Array = field(kw_only=True)
     end: RunState = field(kw_only=True)
+    steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
+    traction: Array | None = field(default=None, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.half_cycle)
@@ -188,6 +193,7 @@ class PhaseRecord:
         before: Pressure of the same phase one cycle ago (n,), MPa; None in the first cycle.
         adds: What it adds to the totals.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
+        equilibrium: What it is in; by default that of the phase.
     """
 
     phase: int
@@ -195,17 +201,49 @@ class PhaseRecord:
     before: Array | None
     adds: Totals
     friction_ratio: Array
+    equilibrium: RigidEquilibrium | None = None
 
 
-class _Row(NamedTuple):
-    """One half-cycle, as it is added."""
+class StepRecords(Protocol):
+    """The k time steps of a half-cycle of n contact nodes, of a law that resolves it in time."""
 
-    half_cycle: int
+    @property
+    def pressure(self) -> Array:
+        """At the end of each step (k, n), MPa."""
+
+    @property
+    def before(self) -> Array:
+        """The same a cycle ago (k, n), MPa; NaN where there was none."""
+
+    @property
+    def gap(self) -> Array:
+        """At the end of each step (k, n), mm."""
+
+    @property
+    def wear(self) -> Worn:
+        """Depths worn off both bodies in all steps."""
+
+
+class HalfCycle(NamedTuple):
+    """One half-cycle that is to be recorded.
+
+    Attributes:
+        number: From 1.
+        phases: In their order.
+        worn: Depths at its end.
+        totals: Of all half-cycles up to its end.
+        heat: Of all its phases; None without heat.
+        load: Factor of all loads.
+        steps: Of a law that resolves it in time; None where its phases are all there is.
+    """
+
+    number: int
     phases: Sequence[PhaseRecord]
     worn: Worn
     totals: Totals
-    retries: int
-    load: float
+    heat: HalfCycleHeat | None
+    load: float = 1.0
+    steps: StepRecords | None = None
 
 
 @dataclass
@@ -214,43 +252,29 @@ class Recorder:
 
     system: Tribosystem
     size: int
-    _rows: list[_Row] = field(default_factory=list)
-    _heat: list[HalfCycleHeat] = field(default_factory=list)
+    _rows: list[HalfCycle] = field(default_factory=list)
+    _retries: list[int] = field(default_factory=list)
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
 
-    def add(
-        self,
-        half_cycle: int,
-        phases: Sequence[PhaseRecord],
-        worn: Worn,
-        totals: Totals,
-        heat: HalfCycleHeat | None,
-        load: float = 1.0,
-    ) -> None:
-        """Record one half-cycle.
-
-        Args:
-            half_cycle: Its number.
-            phases: Its phases in their order.
-            worn: Depths at its end.
-            totals: Of all half-cycles up to its end.
-            heat: Of all its phases.
-            load: Factor of all loads.
-        """
+    def add(self, one: HalfCycle) -> None:
+        """Record one half-cycle."""
         taken = self.system.remedies.take()
         if taken:
             self._remedies += taken
-        self._rows.append(_Row(half_cycle, phases, worn, totals, taken.total(), load))
-        if heat is not None:
-            self._heat.append(heat)
+        self._rows.append(one)
+        self._retries.append(taken.total())
 
     def change(self) -> float:
         """Return the periodicity of the last half-cycle."""
         return float(self._changes(self._rows[-1:])[0][0])
 
-    def _changes(self, rows: Sequence[_Row]) -> tuple[Array, Array]:
+    def _changes(self, rows: Sequence[HalfCycle]) -> tuple[Array, Array]:
         """Return the periodicity of half-cycles, and the scale of their pressures (k,), MPa."""
+        if rows[0].steps is not None:  # their numbers need not be equal
+            pairs = [(row.steps.pressure, row.steps.before) for row in rows if row.steps is not None]
+            found = np.array([pressure_scales(self.system, now[None])[0] for now, _ in pairs])
+            return np.array([np.abs(now - before).max() for now, before in pairs]) / found, found
         pressure = np.array([[p.contact.pressure[0] for p in row.phases] for row in rows])
         unknown = np.full(pressure.shape[2], np.nan)
         before = np.array([[unknown if p.before is None else p.before for p in row.phases] for row in rows])
@@ -273,13 +297,13 @@ class Recorder:
         loads = np.array([row.load for row in rows])
         # Pressures that balance the loads grow with them.
         optima = np.array([f * self._optimum(d, p) for d, p, f in zip(directions, pressure, loads, strict=True)])
-        heat = None
-        if self._heat:
+        heat, heats = None, [row.heat for row in rows if row.heat is not None]
+        if heats:
             names = ("temperature_punch", "temperature_strip", "terms", "coupling_iterations", "temperature_bulk")
-            heat = BlockHeat(*(np.array([getattr(row, name) for row in self._heat]) for name in names))
+            heat = BlockHeat(*(np.array([getattr(one, name) for one in heats]) for name in names))
         block = Block(
             system,
-            np.array([row.half_cycle for row in rows]),
+            np.array([row.number for row in rows]),
             np.array(directions),
             pressure,
             np.concatenate([middle.contact.gap for middle in middles]),
@@ -292,13 +316,15 @@ class Recorder:
             changes,
             self._balances(),
             self._complementarity(),
-            np.array([row.retries for row in rows]),
+            np.array(self._retries),
             heat=heat,
             remedies=self._remedies,
             load_factor=loads,
             end=end,
+            steps=tuple(row.steps for row in rows if row.steps is not None),
+            traction=middles[-1].friction_ratio if rows[-1].steps is not None else None,
         )
-        self._rows, self._heat, self._remedies = [], [], Counter()
+        self._rows, self._retries, self._remedies = [], [], Counter()
         return block
 
     def __bool__(self) -> bool:
@@ -313,7 +339,7 @@ class Recorder:
         errors = np.zeros(len(self._rows))
         for members in groups.values():
             numbers, records = zip(*members, strict=True)
-            equilibrium = self.system.interfaces[records[0].phase].rigid
+            equilibrium = records[0].equilibrium or self.system.interfaces[records[0].phase].rigid
             pressure = np.concatenate([record.contact.pressure for record in records])
             force = (pressure * equilibrium.pair.weights).sum(axis=1)
             force[force == 0] = np.abs(equilibrium.resultant).max(initial=0.0) or 1.0
@@ -326,7 +352,10 @@ class Recorder:
 
     def _complementarity(self) -> Array:
         """Return the largest error of Signorini's conditions in each half-cycle (k,)."""
-        length = self.system.interface.elastic_length
+        length = self.system.elastic_length
+        if self._rows and self._rows[0].steps is not None:
+            steps = [row.steps for row in self._rows if row.steps is not None]
+            return np.array([complementarity_error(one.pressure, one.gap, length).max() for one in steps])
         states = [[record.contact for record in row.phases] for row in self._rows]
         pressure, gap = (
             np.array([[getattr(c, name)[0] for c in row] for row in states]) for name in ("pressure", "gap")
@@ -334,10 +363,12 @@ class Recorder:
         return complementarity_error(pressure, gap, length).max(axis=1)
 
     def _optimum(self, direction: int, pressure: Array) -> Array:
-        """Return the optimal pressure on the present contact zone, NaN where a threshold or cap leaves none.
+        """Return the optimal pressure on the present contact zone, NaN where there is none.
 
-        Solved anew only when the zone changes.
+        So where a threshold or cap leaves none, or nodes stick. Solved anew only when the zone changes.
         """
+        if self.system.sticks:
+            return np.full(len(pressure), np.nan)
         zone = pressure > 0
         key = (direction, zone.tobytes())
         if key not in self._optima:

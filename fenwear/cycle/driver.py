@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple, Protocol
 
 from fenwear.assembly import Tribosystem
-from fenwear.cycle.block import Block, HalfCycleHeat, PhaseRecord, Recorder
+from fenwear.cycle.block import Block, HalfCycle, Recorder
 from fenwear.cycle.state import RunState
-from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError, InterruptedRunError
 from fenwear.parallel import Team
-from fenwear.sliding.wear import Worn
 
 BLOCK = 200  # half-cycles
 
@@ -70,22 +68,22 @@ class Watching:
         return bool(self._watch())
 
 
-class HalfCycle(NamedTuple):
-    """One half-cycle that is to be recorded."""
-
-    number: int
-    phases: Sequence[PhaseRecord]
-    worn: Worn
-    totals: Totals
-    heat: HalfCycleHeat | None
-    load: float = 1.0
-
-
 class Step(Protocol):
     """Goes on by a half-cycle, or by a jump."""
 
     def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after a step that ends at half-cycle `until` at the latest, and what to record of it."""
+
+
+class Jumps(Step, Protocol):
+    """Goes on by jumps."""
+
+    @property
+    def system(self) -> Tribosystem:
+        """With its heat on bases as jumps need them."""
+
+    def beginning(self) -> RunState:
+        """Return where a run begins."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +174,7 @@ class _Stretches:
         """Record half-cycles; return how many in a row have repeated, from those before them."""
         recorder, limit, team = self._recorder, self.course.periodic_within, self.system.team
         for one in recorded:
-            recorder.add(one.number, one.phases, one.worn, one.totals, one.heat, one.load)
+            recorder.add(one)
             repeats = limit is not None and team.lead(lambda: recorder.change() < limit)
             periodic = periodic + 1 if repeats else 0
         return periodic

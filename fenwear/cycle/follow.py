@@ -21,7 +21,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, outwarmed, preparation, warmed_system, warming_key
+from fenwear.assembly import Tribosystem, outwarmed, renewed, warmed_system, warming_key
 from fenwear.bodies.assembly import interpolate
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
@@ -53,7 +53,7 @@ def follow(
     while True:
         if state is not None and _Leaving(system).is_worn(state):  # a run may also go on from just there
             warmed = None if state.temperature is None else state.temperature.temperatures()
-            again = assemble(system.case, system.comm, state.worn, heat=preparation(system), warmed=warmed)
+            again = renewed(system, state.worn, warmed)
             moved = adapt(again)
             state = replace(state, temperature=_carried(state.temperature, moved))
             system = moved

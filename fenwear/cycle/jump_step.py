@@ -40,9 +40,9 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
-from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
+from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, Passing
-from fenwear.cycle.driver import HalfCycle, Loading, Watch, as_given, unwatched
+from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
 from fenwear.cycle.jump_error import Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals

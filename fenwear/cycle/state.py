@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,7 @@ class RunState:
         totals: What all half-cycles so far add up to.
         jump_length: Cycles that the next jump tries.
         periodic_phases: Half-cycles in a row that repeated.
+        memory: What the law of contact must remember besides; a data class of arrays, numbers and such classes.
     """
 
     half_cycle: int
@@ -36,6 +38,7 @@ class RunState:
     totals: Totals
     jump_length: int = 1
     periodic_phases: int = 0
+    memory: Any = None
 
 
 def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:

@@ -28,7 +28,15 @@ from scipy.optimize import linprog
 from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, property_change, taken_at, warmed_system, warming_key, with_reduced_heat
+from fenwear.assembly import (
+    Tribosystem,
+    law_named,
+    property_change,
+    taken_at,
+    warmed_system,
+    warming_key,
+    with_reduced_heat,
+)
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
@@ -124,7 +132,8 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
     """Solve for the cyclic steady state; collective.
 
     With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is. Of a case with a
-    program it is the state of what acts at the end of its last step: see `at_step` for another one.
+    program it is the state of what acts at the end of its last step: see `at_step` for another one. Where nodes stick
+    or slip by themselves it is the shape to which partial slip wears, `stick.final.FinalShape`.
 
     Args:
         system: The assembled problem.
@@ -139,6 +148,9 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
     """
     begin = time.perf_counter()
     system = at_step(system)
+    if system.sticks:
+        found: Steady = law_named(system.law).end(system)
+        return found
     state = _of_these_bodies(system)
     if warming_key(system) and system.heat is not None:
         share = LEFT if properties_within is None else properties_within / system.heat.property_tolerance

@@ -29,6 +29,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Placed
+from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import PhasesWear
 
@@ -129,19 +130,21 @@ class PhaseMeter:
 
 
 def _along_approach(system: Placed, phase: int, mu: Array) -> Array:
-    """Return what pressure and friction of each node give the load, over the pressure (n,).
-
-    The load acts along the translation of the bodies that brings them together; where supports hold it,
-    along the mean normal.
-    """
+    """Return what pressure and friction of each node give the load, over the pressure (n,)."""
     rigid = system.rigids[phase]
     traction = rigid.pair.normal + system.phase_friction(phase, mu)
+    return np.asarray(np.einsum("id,id->i", traction, approach(rigid)))
+
+
+def approach(rigid: RigidEquilibrium) -> Array:
+    """Return the way in which the load acts at each node (n, d).
+
+    It is the translation of the bodies that brings them together; where supports hold it, the mean normal.
+    """
     if "lambda_F" in rigid.mode_names:
-        motion = rigid.motion[:, :, rigid.mode_names.index("lambda_F")]
-    else:
-        mean = rigid.pair.weights @ rigid.pair.normal
-        motion = np.broadcast_to(mean / np.linalg.norm(mean), traction.shape)
-    return np.asarray(np.einsum("id,id->i", traction, motion))
+        return rigid.motion[:, :, rigid.mode_names.index("lambda_F")]
+    mean = rigid.pair.weights @ rigid.pair.normal
+    return np.broadcast_to(mean / np.linalg.norm(mean), rigid.pair.normal.shape)
 
 
 def cycle_totals(system: Placed, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:

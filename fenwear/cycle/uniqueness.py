@@ -28,7 +28,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None) -> float | Non
     """Return the largest share of a pressure that its friction heat of a half-cycle gives back; collective.
 
     The largest real part of the eigenvalues of G, in the middle phase of each half-cycle. From 1 on the contact may
-    have several answers. None without heat.
+    have several answers. None without heat, and where nodes stick or slip by themselves.
 
     Args:
         system: The assembled problem.
@@ -39,7 +39,7 @@ def heat_gain(system: Tribosystem, pressure: Array | None = None) -> float | Non
         ConvergenceError: contact without heat did not converge.
     """
     exchange, positions = system.exchange, system.motion.positions
-    if exchange is None:
+    if exchange is None or system.sticks:  # there every time step tells whether its answer is the only one near
         return None
     found = [0.0]
     for phase in range(positions // 2, len(system.motion.phases), positions):

@@ -22,22 +22,59 @@ EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matric
 class Interface:
     """Two condensed bodies in contact: gap = S(tau) p + H a + g_load + g_0 + w.
 
+    What the bodies answer along e_n is made when it is first asked for, and kept.
+
     Attributes:
         rigid: H, F, the nodes and the transfer.
-        gap_by_force: Gap at node i from a unit force along each axis at node j, on the punch and its
-            reaction on the strip (n, n, d), mm per N/mm in the plane; this rank's own rows where ranks share them.
-        load_gap: g_load (n,), mm.
-        own_by_force: Gap at each node from a unit force along each axis at itself (n, d).
-        by_even: Gap that a unit pressure everywhere opens without friction (n,), mm/MPa.
-        rows: Of each rank; None where every rank has all.
+        punch: Condensed onto its pressure nodes.
+        strip: Condensed onto its trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        strip_moves: Which of the two.
+        rows: Of the contact nodes on each rank; None where every rank has all.
     """
 
     rigid: RigidEquilibrium
-    gap_by_force: Array
-    load_gap: Array
-    own_by_force: Array
-    by_even: Array
+    punch: CondensedBody
+    strip: CondensedBody
+    strip_moves: bool
     rows: Rows | None = None
+
+    @property
+    def _own(self) -> slice:
+        """This rank's own rows."""
+        return slice(0, len(self.pair.weights)) if self.rows is None else self.rows.own
+
+    @cached_property
+    def gap_by_force(self) -> Array:
+        """Gap at node i from a unit force along each axis at node j, on the punch and its reaction on the strip.
+
+        (n, n, d), mm per N/mm in the plane; this rank's own rows where ranks share them.
+        """
+        pair = self.pair
+        reading = pair.transfer if self.strip_moves else None
+        on_strip = self.strip.normal_response(pair.normal_on_strip, reading, self._own)
+        if pair.placement.turn != ZERO:
+            on_strip = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
+        return self.punch.normal_response(pair.normal, None, self._own) + on_strip
+
+    @cached_property
+    def load_gap(self) -> Array:
+        """g_load (n,), mm."""
+        pair, strip = self.pair, self.strip.by_load
+        by_load = pair.transfer @ strip if self.strip_moves else strip
+        return _along(pair.normal, self.punch.by_load) - _along(pair.normal_on_strip, by_load)
+
+    @cached_property
+    def own_by_force(self) -> Array:
+        """Gap at each node from a unit force along each axis at itself (n, d); collective where ranks share rows."""
+        own, by_force = self._own, self.gap_by_force
+        diagonal = by_force[np.arange(len(by_force)), np.arange(own.start, own.stop)]
+        return diagonal if self.rows is None else self.rows.gathered(diagonal)
+
+    @cached_property
+    def by_even(self) -> Array:
+        """Gap that an even unit pressure opens without friction (n,), mm/MPa; collective where ranks share rows."""
+        even = np.einsum("ijd,jd->i", self.gap_by_force, self.pair.normal * self.pair.weights[:, None])
+        return even if self.rows is None else self.rows.gathered(even)
 
     def compliance(self, friction_ratio: Array | float) -> Array:
         """Return S (n, n), mm/MPa: the gap from unit pressures with their friction; collective where ranks share it.
@@ -98,22 +135,9 @@ def join(
         strip_moves: Which of the two.
         rows: Of the contact nodes on each rank; None where every rank has all.
     """
-    pair = rigid.pair
-    own = slice(0, len(pair.weights)) if rows is None else rows.own
-    reading = pair.transfer if strip_moves else None
-    on_strip = strip.normal_response(pair.normal_on_strip, reading, own)
-    if pair.placement.turn != ZERO:
-        on_strip = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
-    by_load = strip.by_load if reading is None else reading @ strip.by_load
-    load_gap = _along(pair.normal, punch.by_load) - _along(pair.normal_on_strip, by_load)
-    by_force = punch.normal_response(pair.normal, None, own) + on_strip
-    diagonal = by_force[np.arange(len(by_force)), np.arange(own.start, own.stop)]
-    even = np.einsum("ijd,jd->i", by_force, pair.normal * pair.weights[:, None])
-    if rows is not None:
-        diagonal, even = rows.gathered(diagonal), rows.gathered(even)
-    interface = Interface(rigid, by_force, load_gap, diagonal, even, rows)
-    if rows is not None:
-        _ = interface.elastic_length  # now, while all ranks are here
+    interface = Interface(rigid, punch, strip, strip_moves, rows)
+    if rows is not None:  # now, while all ranks are here
+        _ = interface.own_by_force, interface.by_even, interface.elastic_length
     return interface
 
 

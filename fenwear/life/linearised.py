@@ -29,6 +29,8 @@ from fenwear.sliding.pressure_law import PressureLaw
 
 def differentiable(system: Tribosystem) -> bool:
     """Return whether the equations above are all there is: constant coefficients and conductances."""
+    if system.sticks:
+        return False
     heat = system.heat
     laws = [law for law in system.sliding.wear if law is not None]
     if not all(PressureLaw.of(law).power for law in laws):

@@ -8,21 +8,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, with_case
+from fenwear.assembly import Tribosystem, assemble, law_named, with_case
 from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
-from fenwear.cycle.totals import Totals, cycle_totals
+from fenwear.cycle.totals import SUMS, Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
-from fenwear.law import check_no_stick, check_slides
+from fenwear.law import check_decided
 from fenwear.life.keys import with_values
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import Worn
+from fenwear.stick.final import FinalShape
 from fenwear.watch.stroke import stroke_warnings
 
 BODIES = ("punch", "strip")
@@ -138,12 +142,11 @@ class Model:
     _courses: dict[tuple[object, ...], Course] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse a test program, and stick.
+        """Refuse a test program, and laws that change with the run.
 
         Raises:
             CaseError: the case has one of them.
         """
-        check_no_stick(self.case)
         if self.case.program is not None:
             message = "not followed here; expected a case of constant loads and motion, or `run`"
             raise CaseError(InputError("program", message))
@@ -161,7 +164,7 @@ class Model:
 
     def stick_left_out(self) -> list[str]:
         """Return what is to be said of stick that the case leaves out, with an estimate of it."""
-        return stroke_warnings(self.system())
+        return [] if self.system().sticks else stroke_warnings(self.system())
 
     def check_constant(self) -> None:
         """Refuse properties of the temperature where they are followed in steps.
@@ -199,7 +202,7 @@ class Model:
             first = next(iter(self._bases.values()), None)
             case = with_values(self.case, {}, settings)
             base = assemble(case, MPI.COMM_SELF, heat="reduced") if first is None else with_case(first, case)
-            check_slides(base)
+            check_decided(base)
             self._bases[settings] = base
         return self._bases[settings]
 
@@ -247,8 +250,7 @@ class Model:
         def integrate(on: Tribosystem, reached: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
             start = reached
             if sequence is not None:
-                heat = cycle_heat(on)
-                start = start or beginning(on, None if heat is None else heat.exchange.initial())
+                start = start or beginning(on, None if on.exchange is None else on.exchange.initial())
                 start = replace(start, jump_length=ONE_STEP)
             return jump(on, strokes * cycles, tolerance=tolerance, block=strokes, start=start, stops=ends, leave=leave)
 
@@ -295,6 +297,8 @@ class Model:
         """
         system = self.system(values, settings)
         self.evaluations += 1
+        if system.sticks:
+            return _of_final_shape(system)
         state = steady(system, properties_within=WITHIN if self.warming else None)
         return steady_snapshot(state.system, state.phase_pressure, state.velocity, state.conductances)
 
@@ -305,7 +309,7 @@ class Model:
             ConvergenceError: there is no steady state.
         """
         self.check_constant()
-        system = self.system(values, settings)
+        system = self._sliding("run_in", values, settings)
         self.evaluations += 1
         state = steady(system)
         cycles = cycles_to_reach(state.system, state, NEAR_THE_END)
@@ -318,30 +322,103 @@ class Model:
             CaseError: the case has no heat.
         """
         self.check_constant()
-        system = self.system(values, settings)
+        system = self._sliding("critical_speed", values, settings)
         self.evaluations += 1
         return min(critical_speed(system, d) for d in sorted(set(system.motion.directions)))
 
+    def _sliding(self, quantity: str, values: Mapping[str, float], settings: Sequence[str]) -> Tribosystem:
+        """Return the system for a quantity of surfaces that slide as a whole.
 
-def _surfaces(
-    system: Tribosystem, pressure: Array, states: Sequence[ContactConditions], adds: Totals, end: RunState | None
+        Raises:
+            CaseError: nodes stick or slip by themselves.
+        """
+        system = self.system(values, settings)
+        if system.sticks:
+            message = "a quantity of gross sliding: in partial slip wear goes on until what slips carries nothing"
+            raise CaseError(InputError(quantity, message))
+        return system
+
+
+def _of_final_shape(system: Tribosystem) -> Snapshot:
+    """Return the shape to which partial slip wears: where nothing that slips carries pressure, and nothing wears on."""
+    found: FinalShape = law_named(system.law).end(system)
+    none = Totals(np.zeros(len(SUMS)), np.zeros(0), np.zeros(0))
+    surfaces = _worn_surfaces(system, found.worn, found.worn.times(0.0), none)
+    thickness = system.bodies.punch.thickness
+    for body, own in surfaces.items():
+        assert own.depth is not None
+        surfaces[body] = replace(own, volume=thickness * float(own.weights @ own.depth))
+    warm = None if found.temperature is None else found.temperature[None]
+    return Snapshot(np.inf, surfaces, system.pair.x, system.pair.weights, found.pressures, warm, 0.0, {},
+                    _stroke(system), system.motion.period)  # fmt: skip
+
+
+def _stroke(system: Tribosystem) -> float:
+    """Return how far the strip is moved in a cycle, mm, mean over the contact."""
+    weights = system.pair.weights
+    each = np.array([phase.distance for phase in system.motion.phases])
+    return float(each @ (system.slid @ weights)) / float(weights.sum())
+
+
+def _of_steps(block: Block) -> Snapshot:
+    """Return the end of the last cycle of a block whose law resolves half-cycles."""
+    system, strokes = block.system, block.system.motion.half_cycles
+    steps: tuple[Any, ...] = block.steps[-strokes:]
+    adds = Totals(block.adds.sums[-strokes:].sum(axis=0), np.zeros(0), np.zeros(0))
+    worn = reduce(Worn.__add__, [one.wear for one in steps])
+    surfaces = _worn_surfaces(system, block.end.worn, worn, adds, block.end.totals)
+    records = [one.records for one in steps]
+    warm = np.concatenate([one.temperature for one in records]) if records[0].heat.size else None
+    path = float(adds.of("load_path"))
+    return Snapshot(
+        float(block.half_cycle[-1] // strokes),
+        surfaces,
+        system.pair.x,
+        system.pair.weights,
+        np.concatenate([one.pressure for one in records]),
+        warm,
+        float(adds.of("work")) / path if path > 0 else 0.0,
+        {},
+        _stroke(system),
+        system.motion.period,
+    )
+
+
+def _worn_surfaces(
+    system: Tribosystem, depth: Worn | None, rate: Worn, adds: Totals, totals: Totals | None = None
 ) -> dict[str, WornSurface]:
-    """Return both bodies' worn surfaces, nodes ascending along x."""
+    """Return both bodies' worn surfaces, nodes ascending along x.
+
+    Args:
+        system: The bodies.
+        depth: Worn so far; None in a steady state, whose depth grows without end.
+        rate: Worn in a cycle.
+        adds: What a cycle adds to the totals.
+        totals: So far.
+    """
     facing = system.pair
     nodes = {"punch": (facing.x, facing.weights), "strip": (facing.strip.x[:, 0], facing.strip.weights)}
-    worn = system.wear.phases(states).worn(pressure)
     surfaces = {}
     for body, (x, weights) in nodes.items():
         order, volume = np.argsort(x, kind="stable"), f"volume_{body}"
         surfaces[body] = WornSurface(
             x[order],
             weights[order],
-            None if end is None else getattr(end.worn, body)[order],
-            getattr(worn, body)[order],
-            None if end is None else float(end.totals.of(volume)),
+            None if depth is None else getattr(depth, body)[order],
+            getattr(rate, body)[order],
+            None if totals is None else float(totals.of(volume)),
             float(adds.of(volume)),
         )
     return surfaces
+
+
+def _surfaces(
+    system: Tribosystem, pressure: Array, states: Sequence[ContactConditions], adds: Totals, end: RunState | None
+) -> dict[str, WornSurface]:
+    """Return both bodies' worn surfaces at pressures of the phases (m, n)."""
+    rate = system.wear.phases(states).worn(pressure)
+    depth, totals = (None, None) if end is None else (end.worn, end.totals)
+    return _worn_surfaces(system, depth, rate, adds, totals)
 
 
 def _snapshot(
@@ -374,6 +451,8 @@ def _snapshot(
 
 def _of_block(block: Block) -> Snapshot:
     """Return the end of the last cycle of a block."""
+    if block.steps:
+        return _of_steps(block)
     system, contacts = block.system, joined(block.end.contacts)
     pressure = block.pressure if contacts is None else contacts.pressure
     heat, temperature = block.heat, None

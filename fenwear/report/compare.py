@@ -28,6 +28,7 @@ from fenwear.report.style import (
     strip_moves,
 )
 from fenwear.report.surface import model_of
+from fenwear.results.cycles import by_cycles, resolves
 from fenwear.results.degrees import in_kelvin
 from fenwear.results.disk import writing
 from fenwear.results.reading import load_history
@@ -169,7 +170,7 @@ def _read(directory: Path) -> xarray.Dataset:
         CaseError: there is none, or it holds nothing yet.
     """
     history = load_history(directory)
-    return history if has_stick(history) and history.sizes["cycle"] else of_half_cycles(directory, history)
+    return by_cycles(history) if resolves(history) else of_half_cycles(directory, history)
 
 
 def comparison_figure(comparison: Comparison) -> Figure:

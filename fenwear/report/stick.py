@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,9 +28,11 @@ from fenwear.report.style import (
     shades,
 )
 from fenwear.report.surface import model_of
+from fenwear.results.cycles import by_cycles
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.reading import load_history
+from fenwear.results.sheet import sheet_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,48 +41,6 @@ REPORT = "report.html"
 CAPTIONS = "captions.txt"
 Drawing = Callable[[xarray.Dataset, Look], "Figure"]
 GROSS = 0.2  # energy ratio above which sliding is called gross (Fouvry)
-LABELS = {
-    "cycles": ("cycles done", ""),
-    "largest_force_N": ("largest tangential force", "N"),
-    "max_pressure_MPa": ("largest pressure", "MPa"),
-    **{f"max_pressure_at_{axis}_mm": (f"where the pressure is largest, {axis}", "mm") for axis in "xyz"},
-    "pressure_beside_max_MPa": ("mean pressure of the nodes beside it", "MPa"),
-    "nodes_across_contact": ("nodes across the contact", ""),
-    "nodes_along_sliding": ("nodes across the contact, along the sliding", ""),
-    "nodes_across_sliding": ("nodes across the contact, across the sliding", ""),
-    "largest_traction_MPa": ("largest tangential traction", "MPa"),
-    "largest_stick_traction_MPa": ("largest tangential traction where it sticks", "MPa"),
-    "largest_surface_stress_MPa": ("largest stress along x in the strip's surface", "MPa"),
-    "dissipated_energy_mJ": ("work of friction in the last cycle", "mJ"),
-    "accumulated_energy_mJ": ("work of friction in all cycles", "mJ"),
-    "energy_ratio": ("energy ratio of the last cycle", ""),
-    "contact_width_mm": ("width in contact", "mm"),
-    "contact_area_mm2": ("area in contact", "mm²"),
-    "stick_width_mm": ("width that sticks all through the cycle", "mm"),
-    "stick_width_within_mm": ("half the interval of that width", "mm"),
-    "stick_area_mm2": ("area that sticks all through the cycle", "mm²"),
-    "stick_area_within_mm2": ("half the interval of that area", "mm²"),
-    "wear_max_mm": ("largest worn depth of the punch", "mm"),
-    "wear_strip_max_mm": ("largest worn depth of the strip", "mm"),
-    "worn_area_punch_mm2": ("cross-section worn off the punch", "mm²"),
-    "worn_volume_punch_mm3": ("volume worn off the punch", "mm³"),
-    "largest_energy_balance_error": ("largest error of the energy balance, over its largest term", ""),
-    "max_temperature_K": ("largest temperature of the contact surfaces at the end, in the last cycle", "K"),
-    "max_temperature_degC": ("largest temperature of the contact surfaces at the end, in the last cycle", "°C"),
-    "largest_temperature_K": ("largest temperature of the contact surfaces over the run", "K"),
-    "largest_temperature_degC": ("largest temperature of the contact surfaces over the run", "°C"),
-    "largest_heat_balance_error": ("largest error of the balance of heat, over its largest term", ""),
-    "largest_jump_error": ("largest estimated error of a jump's depths", ""),
-    "steps_per_half_cycle": ("time steps of a half-cycle", ""),
-    "contact_nodes": ("contact nodes", ""),
-}
-
-
-def key_numbers_text(summary: Mapping[str, Any]) -> str:
-    """Return the key numbers of a run with stick as lines for people."""
-    rows = [(f"{label} ({unit})" if unit else label, summary[k]) for k, (label, unit) in LABELS.items() if k in summary]
-    wide = max(len(label) for label, _ in rows)
-    return "\n".join(f"{label:{wide}}  {value:>12,.5g}" for label, value in rows)
 
 
 def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
@@ -286,7 +246,7 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look:
         CaseError: the folder holds no run, or the run has no such axis.
         OutputError: a figure or the page cannot be written.
     """
-    history = load_history(directory)
+    history = by_cycles(load_history(directory))
     folder = directory / FOLDER
     paths, pictures, captions = [], [], []
     with writing(directory):
@@ -307,9 +267,8 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look:
 def _page(directory: Path, history: xarray.Dataset, pictures: list[Any]) -> str:
     summary = read_summary(directory)
     numbers = [
-        (label, f"{summary[key]:.5g}" if isinstance(summary[key], float) else f"{summary[key]:,}", unit)
-        for key, (label, unit) in LABELS.items()
-        if key in summary
+        (label, " and ".join("-" if value is None else f"{value:,.5g}" for value in row), unit)
+        for label, unit, row in sheet_rows(summary)
     ]
     return render(
         "stick.html",

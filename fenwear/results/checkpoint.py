@@ -13,16 +13,18 @@ import tomllib
 import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from dolfinx import fem
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Tribosystem, law_named
 from fenwear.case import Case, OneWay, Rotation
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
@@ -44,6 +46,7 @@ NUMBERS, WEAR, STATES = (
 )
 TOTALS = ("totals", "energy", "pressure_sum")
 WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
+MEMORY, REMEMBERED = "memory", "remembered"  # what a law of contact remembers, and its temperatures
 BULK = "bulk"  # what is on its way back on a closed track; NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
 BYTES_PER_NODE, BYTES = 56, 65536  # that a temperature with its place takes, and a file beside its values
@@ -75,6 +78,10 @@ def _save(directory: Path, system: Tribosystem, state: RunState, extremes: Mappi
     on_root(comm, lambda: _begin(new, system, state, extremes))
     if state.temperature is not None:
         write_temperatures(new, comm, state.temperature)
+    for number, warm in enumerate(_remembered(state.memory)):
+        folder = new / f"{REMEMBERED}_{number}"
+        on_root(comm, partial(folder.mkdir))
+        write_temperatures(folder, comm, warm)
     if system.bodies.warmed is not None and system.bodies.heat is not None:
         for body, taken in zip(system.bodies.heat, system.bodies.warmed, strict=True):
             _write_function(comm, new, f"{WARMED}_{body.body.name}", body.function(taken))
@@ -149,9 +156,40 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
             **_bulk(state.temperature),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
+            **_packed(state.memory),
         )
         file.flush()
         os.fsync(file.fileno())
+
+
+def _remembered(memory: Any) -> tuple[HeatState, ...]:
+    """Return the temperatures that a law of contact remembers."""
+    return () if memory is None else tuple(memory.warm)
+
+
+def _packed(memory: Any) -> dict[str, Any]:
+    """Return the arrays of what a law of contact remembers, by their paths."""
+    arrays = dict[str, Any]()
+    if memory is not None:
+        pack(replace(memory, warm=()), MEMORY, arrays)
+    return arrays
+
+
+def _memory(folder: Path, system: Tribosystem, arrays: dict[str, Any]) -> Any:
+    """Return what a law of contact remembers; collective."""
+    if not any(name.startswith(f"{MEMORY}.") for name in arrays):
+        return None
+    kind: Any = law_named(system.law).memory
+    try:
+        memory = unpack(kind, MEMORY, arrays)
+    except (KeyError, TypeError, ValueError):
+        raise damaged(folder) from None
+    warm, number, bodies = [], 0, system.bodies.heat
+    while bodies is not None and on_root(system.comm, (folder / f"{REMEMBERED}_{number}").is_dir):
+        own = folder / f"{REMEMBERED}_{number}"
+        warm.append(HeatState.nodal(bodies, [read_temperature(own, body) for body in bodies]))
+        number += 1
+    return replace(memory, warm=tuple(warm))
 
 
 def _bulk(temperature: HeatState | None) -> dict[str, Any]:
@@ -226,9 +264,10 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         None if np.isnan(p).any() else ContactState(p[None], g[None], a[None], 0)
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
-    numbers = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
+    length, periodic = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
     worn, totals = Worn(*(arrays[name] for name in WEAR)), Totals(*(arrays[name] for name in TOTALS))
-    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, *numbers)
+    memory = _memory(folder, system, arrays)
+    return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, length, periodic, memory)
 
 
 def read_temperature(folder: Path, body: HeatBody, name: str = "temperature") -> Array:
@@ -275,7 +314,8 @@ def _arrays(folder: Path) -> dict[str, Any]:
     try:
         with np.load(folder / ARRAYS) as arrays:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
-            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed)}
+            memory = [name for name in arrays if name.startswith(f"{MEMORY}.")]
+            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed, *memory)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         raise damaged(folder) from None
 
@@ -331,3 +371,34 @@ def _flat(tables: Any, path: str = "") -> dict[str, Any]:
     else:
         return {path: tables}
     return {k: v for key, value in items for k, v in _flat(value, f"{path}.{key}" if path else str(key)).items()}
+
+
+def pack(value: Any, path: str, into: dict[str, Any]) -> None:
+    """Put a data class, a list of them, an array or a number under its path; None is left out."""
+    if is_dataclass(value):
+        for field in fields(value):
+            pack(getattr(value, field.name), f"{path}.{field.name}", into)
+    elif isinstance(value, list):
+        into[path] = np.asarray(len(value))
+        for number, item in enumerate(value):
+            pack(item, f"{path}.{number}", into)
+    elif value is not None:
+        into[path] = np.asarray(value)
+
+
+def unpack(kind: Any, path: str, arrays: dict[str, NDArray[Any]]) -> Any:
+    """Return what was put under a path."""
+    if isinstance(kind, type) and is_dataclass(kind):
+        hints = get_type_hints(kind)
+        return kind(**{f.name: unpack(hints[f.name], f"{path}.{f.name}", arrays) for f in fields(kind)})
+    if get_origin(kind) is tuple:  # of temperatures, which are kept apart
+        return ()
+    inner = next((one for one in get_args(kind) if is_dataclass(one)), None)
+    if get_origin(kind) is not list and inner is not None and any(name.startswith(f"{path}.") for name in arrays):
+        return unpack(inner, path, arrays)
+    if get_origin(kind) is list:
+        return [unpack(get_args(kind)[0], f"{path}.{k}", arrays) for k in range(int(arrays[path]))]
+    if path not in arrays and type(None) in get_args(kind):
+        return None
+    values = arrays[path]
+    return values if values.ndim else values.item()

@@ -14,16 +14,18 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray
 
 from fenwear.errors import CaseError, InputError
+from fenwear.results.cycles import by_cycles, resolves
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import HISTORY
 from fenwear.results.reading import load_history
 
 FOLDER = "export"
 COURSE, LOOPS = "history.csv", "loops.csv"
-RECORDS = {"half_cycle": "half-cycle", "cycle": "cycle"}  # what the records of a run are, and its word
+RECORDS = {"half_cycle": "half-cycle"}  # what the records of a run are, and its word
 SURFACES = {"profile_punch.csv": ("x", "node"), "profile_strip.csv": ("x_strip", "node_strip")}
 STEPS = "step"
 RAISED = {"": 1, "_strip": -1}  # wear lowers the strip; the punch's surface, which looks down, it raises
@@ -51,8 +53,8 @@ def export(directory: Path, folder: Path | None = None, at: str = "first,last") 
     record = _record(directory / HISTORY, history)
     rows = _chosen(history, record, at)
     tables = {COURSE: _course(history, record)}
-    if STEPS in history.sizes:
-        tables[LOOPS] = _loops(history, record, rows)
+    if resolves(history):
+        tables[LOOPS] = _loops(history, rows)
     for name, dimensions in SURFACES.items():
         for dimension in dimensions:
             if dimension in history.sizes:
@@ -111,16 +113,19 @@ def _course(history: xarray.Dataset, record: str) -> list[Column]:
     return [(_heading(history, name), history[name].values.tolist()) for name in names]
 
 
-def _loops(history: xarray.Dataset, record: str, rows: Sequence[int]) -> list[Column]:
-    """Return the time steps of the chosen cycles, one below the other."""
-    count = history.sizes[STEPS]
-    chosen = history[record].values[list(rows)].tolist()
-    columns: list[Column] = [(record, [number for number in chosen for _ in range(count)])]
-    for name in history.variables:
-        if history[name].dims == (STEPS,):
-            columns.append((_heading(history, name), history[name].values.tolist() * len(chosen)))
-        elif history[name].dims == (record, STEPS):
-            columns.append((_heading(history, name), history[name].values[list(rows)].ravel().tolist()))
+def _loops(history: xarray.Dataset, rows: Sequence[int]) -> list[Column]:
+    """Return the time steps of the cycles that end with the chosen half-cycles or hold them, one below the other."""
+    cycles = by_cycles(history)
+    strokes = round(float(history.half_cycle[-1] / history.cycles[-1]))
+    wanted = {-(-int(history.half_cycle[row]) // strokes) for row in rows}
+    cycles = cycles.isel(cycle=[k for k, number in enumerate(cycles.cycle.values) if int(number) in wanted])
+    count = cycles.sizes[STEPS]
+    columns: list[Column] = [("cycle", np.repeat(cycles.cycle.values, count).tolist())]
+    for name in cycles.variables:
+        if cycles[name].dims == (STEPS,):
+            columns.append((_heading(cycles, name), np.tile(cycles[name].values, cycles.sizes["cycle"]).tolist()))
+        elif cycles[name].dims == ("cycle", STEPS):
+            columns.append((_heading(cycles, name), cycles[name].values.ravel().tolist()))
     return columns
 
 

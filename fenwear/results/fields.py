@@ -75,7 +75,12 @@ class BodyFields:
 
 
 def body_fields(
-    system: Tribosystem, pressure: Array, rigid: Array, phase: int, temperatures: tuple[Array, Array] | None
+    system: Tribosystem,
+    pressure: Array,
+    rigid: Array,
+    phase: int,
+    temperatures: tuple[Array, Array] | None,
+    friction_ratio: Array | None = None,
 ) -> tuple[BodyFields, BodyFields]:
     """Return the fields of the punch and the strip; collective.
 
@@ -85,8 +90,10 @@ def body_fields(
         rigid: Amplitudes of the rigid modes (modes,).
         phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
+        friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; by default that of sliding.
     """
-    pair, traction = system.pairs[phase], _traction(system, phase, pressure, temperatures)
+    pair, traction = system.pairs[phase], friction_ratio
+    traction = _traction(system, phase, pressure, temperatures) if traction is None else in_space(traction)
     force = in_space(pair.normal) + traction
     force *= (pair.weights * pressure)[:, None]
     on_punch, on_strip = pair.punch.spread @ force, -(pair.transfer.T @ force)

@@ -21,7 +21,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
-from fenwear.results import sheet
+from fenwear.results import sheet, steps
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.scar import conforming
@@ -116,7 +116,7 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
-    variables = {**variables, **sheet.variables(system)}
+    variables = {**variables, **sheet.variables(system), **steps.variables(system)}
     if case.model.kind == "plane":
         return variables
     return on_surfaces(variables)
@@ -126,7 +126,7 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
     pair = system.pair
     if system.case.model.kind != "plane":
-        return surface_columns(system)
+        return {**surface_columns(system), **steps.columns(system)}
     text = "position along the contact, from the centre of the geometry"
     columns = {
         "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
@@ -137,12 +137,12 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
         columns["x_strip"] = Column(("x_strip",), pair.strip.x[:, 0], {"units": "mm", "long_name": along})
         unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
         columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
-    return columns
+    return {**columns, **steps.columns(system)}
 
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    own = sheet.values(block)
+    own = {**sheet.values(block), **steps.values(block)}
     return {name: own[name] if name in own else _values(block, name) for name in names}
 
 
@@ -242,6 +242,7 @@ class HistoryWriter:
             file.attrs["directions"] = " ".join(system.direction_words.values())  # of d = 1 and d = -1
             file.attrs["conforming"] = int(conforming(system.pair))
             file.attrs["versions"] = json.dumps(versions())
+            file.attrs.update(steps.attributes(system))
             sizes = self._sizes()
             file.dimensions = {"half_cycle": None, **sizes}
             if system.case.model.kind != "plane":

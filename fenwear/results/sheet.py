@@ -208,6 +208,18 @@ LINES = {
         for unit, shown in (("K", "K"), ("degC", "°C"))
         for name, when in (("max_temperature", "at the end"), ("largest_temperature", "over the run"))
     },
+    "largest_force_N": Line("largest tangential force in the last cycle", "N"),
+    "largest_torque_N_mm": Line("largest torque in the last cycle", "N m", 1e-3),
+    "largest_pressure_in_cycle_MPa": Line("largest pressure in it", "MPa"),
+    "largest_traction_MPa": Line("largest tangential traction in it", "MPa"),
+    "largest_stick_traction_MPa": Line("... where it sticks", "MPa"),
+    "largest_surface_stress_MPa": Line("largest stress along the sliding in the strip's surface", "MPa"),
+    "friction_work_of_cycle_mJ": Line("work of friction in the last cycle", "mJ"),
+    "energy_ratio": Line("energy ratio of the last cycle", ""),
+    "stick_width_mm": Line("width that sticks all through it", "mm"),
+    "stick_width_within_mm": Line("half the interval of that width", "mm"),
+    "stick_area_mm2": Line("area that sticks all through it", "mm²"),
+    "stick_area_within_mm2": Line("half the interval of that area", "mm²"),
     "worn_area_mm2": Line("worn area", "mm²"),
     "worn_volume_mm3": Line("worn volume", "mm³"),
     "worn_mass_mg": Line("worn mass", "mg"),

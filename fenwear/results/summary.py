@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fenwear.assembly import Placed, Tribosystem
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
-from fenwear.results import sheet
+from fenwear.results import sheet, steps
 from fenwear.results.degrees import degrees_of
 from fenwear.results.scar import conforming
 from fenwear.results.zone import ContactNet, contact_net, without_noise
@@ -34,6 +34,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **run,
         **sheet.sheet(last),
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
+        **steps.numbers(last),
         **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
         "periodicity": float(last.periodicity[-1]),
         **{name: value for name, value in extremes.items() if name != HOTTEST},

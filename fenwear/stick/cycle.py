@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.driver import Watching
+from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import Moment, together
@@ -19,9 +20,10 @@ from fenwear.stick.interface import Loaded, OppositeBodies, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
-from fenwear.stick.wear import LocalWear
+from fenwear.stick.wear import LocalLaws, LocalWear
 
 T = TypeVar("T")
+MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depends on its pressure; their change
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Records:
         heat: Terms of the balance of heat (k, 6), mJ, as `heat.exchange.TERMS`; (k, 0) without heat, as the next two.
         temperature: Of both contact surfaces, punch and strip, at the end (k, 2, n), K.
         conductance: Of each node (k, n), N/(mm s K); NaN where none conducts.
+        coupling: Iterations of contact and heat (k,); 0 without heat.
+        rigid: Amplitudes of the rigid modes at the end (k, r).
     """
 
     displacement: Array
@@ -69,6 +73,8 @@ class Records:
     heat: Array
     temperature: Array
     conductance: Array
+    coupling: Array
+    rigid: Array
 
     def __len__(self) -> int:
         return len(self.force)
@@ -123,6 +129,10 @@ class RigState:
         conductance: Of the nodes in the last step (n,), N/(mm s K), NaN where none conducts; None without heat.
         pressures, trials: Of each time step of the cycle when it was computed last (k, n) and (k, n, m), NaN where it
             was not: zones come back from cycle to cycle, so that Newton starts there. None before the first cycle.
+        load: Factor of all loads in the steps to come.
+        slid: What each node has slipped from the start (n,), mm, where a law depends on it; else None.
+        speed: Of the slip of each node in the last step (n,), mm/s, where a law depends on it; else None.
+        coupling: Iterations of contact and heat in the last step.
     """
 
     contact: StickState
@@ -134,6 +144,10 @@ class RigState:
     conductance: Array | None = None
     pressures: Array | None = None
     trials: Array | None = None
+    load: float = 1.0
+    coupling: int = 0
+    slid: Array | None = None
+    speed: Array | None = None
 
     @property
     def near(self) -> tuple[Array, Array] | None:
@@ -162,6 +176,7 @@ class Rig:
         heat: Of friction; None without.
         watch: Called before every time step: may raise InterruptedRunError.
         expanded: What loads do with a thermal expansion that stays as it is, at an offset of the strip.
+        laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
     """
 
     def __init__(
@@ -173,16 +188,25 @@ class Rig:
         watch: Callable[[], object] = lambda: None,
         heat: StickHeat | None = None,
         expanded: Callable[[Loaded, float], Loaded] = lambda loaded, _: loaded,
+        laws: LocalLaws | None = None,
     ) -> None:
-        self.expanded = expanded
+        self.expanded, self.laws = expanded, laws
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
 
     def watched(self, watch: Callable[[], object]) -> Rig:
         """Return the same, watched."""
-        watching = Watching(self.interface.team, watch)
-        return Rig(self.interface, self.program, self.wear, self.friction, watching, self.heat, self.expanded)
+        return self.watching(Watching(self.interface.team, watch))
+
+    def watching(self, watch: Callable[[], object]) -> Rig:
+        """Return the same, with what is called before every time step as it is."""
+        return self._with(watch=watch)
+
+    def _with(self, **changed: Any) -> Rig:
+        """Return the same with other arguments."""
+        names = ("interface", "program", "wear", "friction", "watch", "heat", "expanded", "laws")
+        return Rig(**{**{name: getattr(self, name) for name in names}, **changed})
 
     def led(self, function: Callable[[], T]) -> T:
         """Call what goes on from condensed bodies, on rank 0 for all; collective.
@@ -198,11 +222,15 @@ class Rig:
         def expanded(loaded: Loaded, offset: float) -> Loaded:
             return heat.expanded(loaded, temperature, offset)
 
-        return Rig(self.interface, self.program, self.wear, self.friction, self.watch, None, expanded)
+        return self._with(heat=None, expanded=expanded)
+
+    def with_heat(self, heat: StickHeat | None) -> Rig:
+        """Return the same with the heat of friction."""
+        return self._with(heat=heat)
 
     def driven(self, program: Program) -> Rig:
         """Return the same in other time steps, without heat."""
-        return Rig(self.interface, program, self.wear, self.friction, self.watch)
+        return self._with(program=program, heat=None)
 
     @cached_property
     def reach(self) -> float:
@@ -215,20 +243,22 @@ class Rig:
         pair = self.interface.middle.pair
         return Worn(np.zeros(len(pair.weights)), np.zeros(len(pair.strip.weights)))
 
-    def beginning(self, shape: Worn | None = None) -> RigState:
+    def beginning(self, shape: Worn | None = None, load: float = 1.0) -> RigState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
 
         Args:
             shape: Depths worn before; by default none.
+            load: Factor of all loads.
 
         Raises:
             ConvergenceError: a step did not converge.
         """
-        return self.led(partial(self._begun, shape))
+        return self.led(partial(self._begun, shape, load))
 
-    def _begun(self, shape: Worn | None) -> RigState:
+    def _begun(self, shape: Worn | None, load: float) -> RigState:
         interface, program, worn = self.interface, self.program, shape or self.unworn()
-        loaded = self.expanded(interface.loaded(None if program.steps[-1].fraction is None else 0.0), 0.0)
+        given = interface.loaded(None if program.steps[-1].fraction is None else 0.0).times(load)
+        loaded = self.expanded(given, 0.0)
         opening = self.opening(interface.middle, worn)
         state, before = untouched(interface), Imposed(loaded.times(0), opening)
         for k in range(1, program.pressing + 1):
@@ -236,7 +266,7 @@ class Rig:
             state, before = advance(interface, state, before, imposed, self.friction), imposed
         if program.steps[0].force is not None:
             before = replace(before, displacement=None, force=state.force)
-        at = RigState(state, before, worn)
+        at = RigState(state, before, worn, load=load)
         for step in program.lead_in:
             at = self._stepped(at, step)
         steps, (n, m) = len(program.steps), state.trial.shape
@@ -247,13 +277,16 @@ class Rig:
 
     def opening(self, position: Position, worn: Worn) -> Array:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
-        return position.pair.initial_gap + position.pair.opening(worn.punch, worn.strip)
+        moved = self.interface.moved
+        rest = worn if moved is None else worn - moved
+        return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip)
 
-    def imposed(self, step: TimeStep, worn: Worn) -> tuple[Position, Imposed]:
+    def imposed(self, step: TimeStep, worn: Worn, load: float = 1.0) -> tuple[Position, Imposed]:
         """Return the place of the strip in a time step, and what is imposed at its end; collective."""
         interface = self.interface
         position = interface.position(step.offset)
-        loaded = self.expanded(interface.loaded(step.fraction if step.fraction is not None else 0.0), step.offset)
+        given = interface.loaded(step.fraction if step.fraction is not None else 0.0).times(load)
+        loaded = self.expanded(given, step.offset)
         return position, Imposed(loaded, self.opening(position, worn), step.displacement, step.force, step.strain)
 
     def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
@@ -265,26 +298,62 @@ class Rig:
         return after, self._record(at, after, step)
 
     def _stepped(self, at: RigState, step: TimeStep) -> RigState:
+        if self.laws is None or not self.laws.changes():
+            return self._advanced(at, step, self.friction)
+        laws, position = self.laws, self.interface.position(step.offset)
+        pressure = at.contact.pressure if at.near is None else at.near[0]
+        for _ in range(MOST_FRICTIONS):
+            conditions = laws.conditions(position.pair, pressure, **self._known(at))
+            after = self._advanced(at, step, laws.friction_at(conditions))
+            change, pressure = np.abs(after.contact.pressure - pressure).max(), after.contact.pressure
+            if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
+                return after
+        raise ConvergenceError(
+            "friction and the pressure that it depends on did not come together in a time step: a weaker dependence "
+            "on p, or a smoother table may help"
+        )
+
+    def _known(self, at: RigState) -> dict[str, Any]:
+        """Return what is known of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
+        warm = None
+        if self.heat is not None and at.temperature is not None:
+            punch, strip = self.heat.surfaces(at.temperature)
+            warm = punch, strip
+        return {"temperatures": warm, "worn": at.worn, "slid": at.slid, "speed": 0.0 if at.speed is None else at.speed}
+
+    def _advanced(self, at: RigState, step: TimeStep, friction: Array) -> RigState:
+        """Return the state after a time step with friction mu (n,)."""
         self.watch()
-        position, imposed = self.imposed(step, at.worn)
+        position, imposed = self.imposed(step, at.worn, at.load)
         if self.heat is None or at.temperature is None or at.heating is None:
-            state = advance(self.interface, at.contact, at.imposed, imposed, self.friction, position, at.near)
-            return self._after(at, state, imposed)
+            state = advance(self.interface, at.contact, at.imposed, imposed, friction, position, at.near)
+            return self._after(at, state, imposed, step)
 
         def solved(loaded: Loaded, near: tuple[Array, Array] | None) -> StickState:
             end = replace(imposed, loaded=loaded)
-            return advance(self.interface, at.contact, at.imposed, end, self.friction, position, near or at.near)
+            return advance(self.interface, at.contact, at.imposed, end, friction, position, near or at.near)
 
-        flux = float((self.friction * at.contact.pressure).max()) * self.reach / step.duration
+        flux = float((friction * at.contact.pressure).max()) * self.reach / step.duration
         moment = Moment(at.next_step, step.duration, step.offset, at.temperature, at.heating)
         found = together(self.heat, solved, imposed.loaded, at.contact, moment, flux)
-        after = self._after(at, found.state, replace(imposed, loaded=found.loaded))
-        return replace(after, temperature=found.temperature, heating=found.heating, conductance=found.conductance)
+        after = self._after(at, found.state, replace(imposed, loaded=found.loaded), step)
+        return replace(
+            after,
+            temperature=found.temperature,
+            heating=found.heating,
+            conductance=found.conductance,
+            coupling=found.iterations,
+        )
 
-    def _after(self, at: RigState, state: StickState, imposed: Imposed) -> RigState:
+    def _after(self, at: RigState, state: StickState, imposed: Imposed, step: TimeStep) -> RigState:
         pressures, trials = at.then(state)
         following = (at.next_step + 1) % len(self.program.steps)
-        return RigState(state, imposed, at.worn, following, pressures=pressures, trials=trials)
+        after = RigState(state, imposed, at.worn, following, pressures=pressures, trials=trials, load=at.load)
+        if self.laws is None:
+            return after
+        slipped = np.linalg.norm(state.slip, axis=1)
+        before = np.zeros_like(slipped) if at.slid is None else at.slid
+        return replace(after, slid=before + slipped, speed=slipped / step.duration)
 
     def half_cycle(self, at: RigState) -> tuple[RigState, Records]:
         """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""
@@ -334,7 +403,11 @@ class Rig:
         stored = np.vdot(force, state.on_punch - before.on_punch) - np.vdot(back, state.on_strip - before.on_strip)
         lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
         work = state.force * (state.displacement - before.displacement) + lowered
-        punch, strip = self.wear.depths(state.pressure, np.linalg.norm(state.slip, axis=1), step.duration)
+        slipped, wear = np.linalg.norm(state.slip, axis=1), self.wear
+        if self.laws is not None:
+            known = {**self._known(at), "slid": after.slid, "speed": slipped / step.duration}
+            wear = self.laws.wear_at(self.laws.conditions(position.pair, state.pressure, **known))
+        punch, strip = wear.depths(state.pressure, slipped, step.duration)
         values = (
             state.displacement,
             state.force,
@@ -353,6 +426,8 @@ class Rig:
             state.unique,
             step.duration,
             *self._heat_record(at, after),
+            float(after.coupling),
+            state.rigid,
         )
         return Records(*(np.asarray(value)[None] for value in values))
 

@@ -20,6 +20,7 @@ from fenwear.stick.program import Program, make_program
 from fenwear.stick.setup import with_steps
 
 HALVINGS = 4  # of a step at most
+WHOLE = 2 ** (HALVINGS + 1)  # of the finest steps in a step: the halves of the last ones are compared with, too
 SHARE = 0.9  # of the difference that the halved steps make
 Ends = NDArray[np.int64]  # of steps, as numbers of the finest ones
 
@@ -33,11 +34,13 @@ class Fineness:
         change: By halving every step, of the largest force and, in all steps together, of friction's work; shares of
             the first cycle's.
         enough: Whether that is within the case's tolerance.
+        ends: Of the steps, as numbers of the finest ones.
     """
 
     steps: int
     change: float
     enough: bool
+    ends: Ends
 
     def text(self) -> str:
         """Return what is to be said of steps that are too coarse; "" of others."""
@@ -59,8 +62,7 @@ def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    whole = 2 ** (HALVINGS + 1)  # of the finest steps: the halves of the last ones are compared with, too
-    finest = make_program(case, case.stick.steps * whole)
+    whole, finest = WHOLE, _finest(case)
     ends = np.arange(whole - 1, len(finest.steps), whole)
     while True:
         halves, of = _halved(ends)
@@ -69,11 +71,20 @@ def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
         change, marked = rig.led(partial(_judged, rig, fine, of, splits, case.stick.step_tolerance))
         if marked is None:
             enough = change <= case.stick.step_tolerance
-            return rig, Fineness(round(len(ends) / finest.half_cycles), change, enough=enough)
+            return rig, Fineness(round(len(ends) / finest.half_cycles), change, enough, ends)
         if case.heat is not None:
             marked[:] = True
         ends = halves[marked[of] | _last(of)]
         rig = _driven(rig, case, finest, ends)
+
+
+def with_ends(rig: Rig, case: Case, ends: Ends) -> Rig:
+    """Return the rig with steps that end at these of the finest ones; collective."""
+    return _driven(rig, case, _finest(case), ends)
+
+
+def _finest(case: Case) -> Program:
+    return make_program(case, case.stick.steps * WHOLE)
 
 
 def _judged(

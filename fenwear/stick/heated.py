@@ -50,6 +50,7 @@ class Together:
     temperature: Array
     heating: Array
     conductance: Array
+    iterations: int
 
 
 def together(
@@ -99,4 +100,4 @@ def together(
     expanded = fixed_point(once, units * np.concatenate([moment.heating, before.pressure]), close, APART)
     made, conducts = np.asarray(last.heat / moment.duration), conductance(last.pressure, conducting)
     warm = heat.step(moment.number, moment.temperature, made, conducts).values
-    return Together(last, expanded, warm, made, conducts)
+    return Together(last, expanded, warm, made, conducts, tries)

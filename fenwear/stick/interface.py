@@ -28,6 +28,7 @@ from fenwear.interface import ContactPair, RigidEquilibrium, check_distance, pai
 from fenwear.interface.placement import in_model
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
+from fenwear.sliding.wear import Worn
 from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
@@ -47,6 +48,8 @@ class Loaded:
 
     def times(self, factor: float) -> Loaded:
         """Return the same of loads times a factor."""
+        if factor == 1:
+            return self
         return Loaded(factor * self.resultant, factor * self.on_punch, factor * self.on_strip)
 
 
@@ -117,6 +120,7 @@ class OppositeBodies:
     moves = False
     full = False  # whether each step is solved on all displacements
     team = ALONE  # the ranks that have them, of which one leads
+    moved: Worn | None = None  # depths that the meshes have followed
 
     def __init__(
         self, punch: CondensedBody, strip: CondensedBody, rigid: RigidEquilibrium, field: SlidingField
@@ -163,6 +167,7 @@ class StickInterface(OppositeBodies):
         keep: Whether the condensed bodies are kept on disk, and taken from there where they are.
         fresh: Condense them whatever is kept.
         full: Whether each time step is solved on all displacements, nothing condensed.
+        condensed: Both bodies, where they are condensed already.
 
     Raises:
         CaseError: there is not memory enough.
@@ -179,7 +184,9 @@ class StickInterface(OppositeBodies):
         keep: bool = False,
         fresh: bool = False,
         full: bool = False,
+        condensed: tuple[CondensedBody, CondensedBody] | None = None,
     ) -> None:
+        self.moved = bodies.moved
         self.bodies, self.sliding, self.case, self.moves, self.far = bodies, sliding, case, moves, moves or far
         self.team = Team.of(bodies.comm)
         self.team.serve(self)
@@ -190,9 +197,13 @@ class StickInterface(OppositeBodies):
         if bodies.followed is None:
             check_distance(middle)
         onto = _identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
-        self.needs = settle([bodies], self._needs(len(middle.weights), onto.shape[1]))
-        wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
-        self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
+        if condensed is None:
+            self.needs = settle([bodies], self._needs(len(middle.weights), onto.shape[1]))
+            wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
+            self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
+        else:
+            self.needs = self._needs(len(middle.weights), onto.shape[1])
+            self.punch, self.strip = condensed
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float | None, Loaded] = {}
         self._whole: dict[float, WholeBodies] = {}

@@ -116,14 +116,14 @@ def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) ->
     """
     now = start
     if now is None:
-        now = rig.led(lambda: _rate(rig, rig.beginning(), rig.unworn(), 0))
+        now = rig.led(lambda: first_cycle(rig, rig.beginning(), rig.unworn(), 0))
         yield now
     while now.number < cycles:
-        now = rig.led(partial(_jumped, rig, now, cycles, tolerance))
+        now = rig.led(partial(jumped, rig, now, cycles, tolerance))
         yield now
 
 
-def _jumped(rig: Rig, now: Cycle, cycles: int, tolerance: float) -> Cycle:
+def jumped(rig: Rig, now: Cycle, cycles: int, tolerance: float) -> Cycle:
     """Return the cycle after the next jump that is accurate enough."""
     length = now.length
     while True:
@@ -144,7 +144,14 @@ def _jumped(rig: Rig, now: Cycle, cycles: int, tolerance: float) -> Cycle:
         return replace(then, length=length)
 
 
-def _rate(rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None = None) -> Cycle:
+def first_cycle(rig: Rig, at: RigState, worn: Worn, number: int, warm: Array | None = None) -> Cycle:
+    """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,)."""
+    return _rate(rig, at, worn, number, warm=warm)
+
+
+def _rate(
+    rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None = None, warm: Array | None = None
+) -> Cycle:
     """Return the cycle at a shape, after one that leads to it, half a one without heat.
 
     Raises:
@@ -155,7 +162,7 @@ def _rate(rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None 
     for _ in range(1 if program.half_cycles == 2 and heat is None else program.half_cycles):
         at, _ = rig.half_cycle(at)
     if heat is not None and before is None:
-        at = replace(at, temperature=heat.initial())
+        at = replace(at, temperature=heat.initial() if warm is None else warm)
     if heat is None or before is None or before.warm is None or before.end.temperature is None:
         return _recorded(rig, at, worn, number)
     cycles, rate = number - before.number, before.end.temperature - before.warm
@@ -202,10 +209,11 @@ def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     factor = scipy.linalg.lu_factor(matrix)
     begin, rate = whole(now.worn), whole(now.rate)
     first = scipy.linalg.lu_solve(factor, rate)
-    middle = _rate(rig, now.end, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, now)
+    start = _slid_on(now, cycles)
+    middle = _rate(rig, start, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, now)
     second = scipy.linalg.lu_solve(factor, whole(middle.rate) - 2 * first)
     end = np.maximum(begin + cycles * (1.5 * first + 0.5 * second), begin)
-    then = _rate(rig, middle.end, parted(end), now.number + cycles, now)
+    then = _rate(rig, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
     missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
     area = np.concatenate([pair.weights, pair.strip.weights])
@@ -213,6 +221,14 @@ def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     error = float(area @ np.abs(missing) / max(scale, 1e-300))
     work = sum(cycle.records.energy(rig.weights) for cycle in (now, then)) / 2  # by the trapezoidal rule
     return replace(then, error=max(error, then.error), spent=now.spent + cycles * work)
+
+
+def _slid_on(now: Cycle, cycles: int) -> RigState:
+    """Return the end of a cycle after so many more, as far as what its nodes have slipped tells."""
+    slid = now.end.slid
+    if slid is None:
+        return now.end
+    return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slid.sum(axis=0))
 
 
 def _derivative(rig: Rig, now: Cycle) -> Array:

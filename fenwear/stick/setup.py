@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from fenwear.arrays import Array
 from fenwear.assembly import Bodies, build_bodies, make_sliding
+from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
-from fenwear.results.surfaces import border_nodes
 from fenwear.stick.cycle import Rig
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.program import far_enough, make_program
-from fenwear.stick.wear import local_wear
+from fenwear.stick.wear import LocalLaws
 
 
 def make_rig(
@@ -25,6 +24,7 @@ def make_rig(
     steps: int | None = None,
     fresh: bool = False,
     bodies: Bodies | None = None,
+    condensed: tuple[CondensedBody, CondensedBody] | None = None,
 ) -> Rig:
     """Return the bodies of a case with what is done to them; collective.
 
@@ -36,29 +36,51 @@ def make_rig(
         steps: Of a half-cycle, in place of the case's.
         fresh: Condense the bodies again, even where they are kept.
         bodies: Of the case, where they are built already.
+        condensed: Both, where they are condensed already.
 
     Raises:
         CaseError: it is a case of gross sliding, or what only the geometry can tell is wrong.
     """
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
-    bodies, sliding = bodies or build_bodies(case, comm), make_sliding(case)
-    moves = _moves(case, bodies.punch.surface)
-    full = case.contact.solver == "full"
-    far = case.stick.force is None and far_enough(case, bodies.punch.surface)
-    interface = StickInterface(bodies, sliding, case, moves=moves, far=far, keep=True, fresh=fresh, full=full)
+    return heated(unheated_rig(case, bodies or build_bodies(case, comm), steps, fresh=fresh, condensed=condensed), case)
+
+
+def unheated_rig(
+    case: Case,
+    bodies: Bodies,
+    steps: int | None = None,
+    *,
+    fresh: bool = False,
+    condensed: tuple[CondensedBody, CondensedBody] | None = None,
+) -> Rig:
+    """Return the same without heat; collective. Arguments as of `make_rig`."""
+    sliding, surface = make_sliding(case), bodies.punch.surface
+    interface = StickInterface(
+        bodies,
+        sliding,
+        case,
+        moves=_moves(case, surface),
+        far=case.stick.force is None and far_enough(case, surface),
+        keep=bodies.warmed is None,
+        fresh=fresh,
+        full=case.contact.solver == "full",
+        condensed=condensed,
+    )
     middle = interface.middle
-    wear = local_wear(sliding.wear, sliding.friction, middle.pair, middle.rigid.mean_pressure)
-    mu = case.contact.friction
-    if not isinstance(mu, float):
-        raise CaseError(InputError("contact.friction", "expected a constant with contact.law = 'coulomb'"))
-    rig = Rig(interface, make_program(case, steps), wear, np.full(len(middle.pair.weights), mu))
-    return heated(rig, case)
+    of_punch, of_strip = bodies.regions
+    regions = of_punch, {name: middle.pair.material @ share for name, share in of_strip.items()}
+    initial = 0.0 if case.heat is None else case.heat.initial
+    laws = LocalLaws(sliding.friction, sliding.wear, regions, initial)
+    mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
+    conditions = laws.conditions(middle.pair, mean)
+    wear, mu = laws.wear_at(conditions), laws.friction_at(conditions)
+    return Rig(interface, make_program(case, steps), wear, mu, laws=None if laws.constant else laws)
 
 
 def with_steps(rig: Rig, case: Case, steps: int) -> Rig:
     """Return the same with other time steps."""
-    return heated(Rig(rig.interface, make_program(case, steps), rig.wear, rig.friction, rig.watch), case)
+    return heated(rig.driven(make_program(case, steps)), case)
 
 
 def heated(rig: Rig, case: Case) -> Rig:
@@ -67,19 +89,7 @@ def heated(rig: Rig, case: Case) -> Rig:
         return rig
     steps = len(rig.program.steps) // rig.program.half_cycles
     heat = stick_heat(meshed(rig.interface), case, steps)
-    return Rig(rig.interface, rig.program, rig.wear, rig.friction, rig.watch, heat)
-
-
-def reaches_border(rig: Rig, pressure: Array) -> bool:
-    """Return whether contact reaches where its meshed surface ends, but for planes of symmetry; collective.
-
-    Args:
-        rig: The bodies.
-        pressure: Of some time steps (k, n), MPa.
-    """
-    border = border_nodes(rig.interface.middle.pair.punch)
-    free = border[~rig.interface.held_nodes()[border]]
-    return bool((pressure[:, free] > 0).any())
+    return rig.with_heat(heat)
 
 
 def _moves(case: Case, surface: ContactSurface) -> bool:

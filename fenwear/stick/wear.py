@@ -1,18 +1,24 @@
-"""Wear by local slip: depth = beta~ p^b v^a of each node, both bodies; v = abs(slip) over the time of its step."""
+"""Friction and wear by local slip: depth = beta~ p^b v^a of each node, both bodies; v = abs(slip) over its step's time.
+
+Coefficients may depend on the conditions of each node: its pressure and temperature, the speed of its slip, how deep
+it is worn and how far it has slipped. Friction is that of the pressure at the end of a time step, of the temperature
+and depth at its start and of the speed in the step before; wear is that of the step itself.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
-from fenwear.errors import CaseError, InputError
 from fenwear.interface import ContactPair
+from fenwear.interface.placement import in_space
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
-from fenwear.sliding.wear import coefficient
+from fenwear.sliding.wear import Worn, coefficient
 
 
 @dataclass(frozen=True)
@@ -52,23 +58,86 @@ class LocalWear:
         )
 
 
-def local_wear(
-    laws: tuple[WearLaw | None, WearLaw | None], friction: Friction, pair: ContactPair, mean_pressure: float
-) -> LocalWear:
-    """Return the wear by local slip of a case's laws.
+@dataclass(frozen=True)
+class LocalLaws:
+    """Friction and wear of each node by its own conditions.
 
-    Raises:
-        CaseError: a coefficient depends on anything.
+    Attributes:
+        friction: The law of friction.
+        wear: The wear laws of punch and strip; None where a body does not wear.
+        regions: Shares of the regions of punch and strip at the contact nodes (n,), by their names.
+        initial: Temperature without heat, K.
     """
-    n = len(pair.weights)
-    state = ContactConditions.at(np.full(n, mean_pressure))
-    found = []
-    for law, key in zip(laws, ("wear.punch", "wear.strip"), strict=True):
-        if law is not None and isinstance(law.coefficient, Dependence):
-            raise CaseError(InputError(f"{key}.coefficient", "expected a constant with contact.law = 'coulomb'"))
-        found.append(
+
+    friction: Friction
+    wear: tuple[WearLaw | None, WearLaw | None]
+    regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
+    initial: float = 0.0
+
+    @property
+    def constant(self) -> bool:
+        """Whether nothing depends on more than the place."""
+        return self.friction.constant and not self.changes(of_wear=True)
+
+    def changes(self, *, of_wear: bool = False) -> bool:
+        """Return whether friction changes with the state, or wear does."""
+        if not of_wear:
+            return not self.friction.constant
+        laws = [law for law in self.wear if law is not None]
+        of_friction = any(law.beta is not None or law.energy is not None for law in laws)
+        dependent = any(isinstance(law.coefficient, Dependence) and law.coefficient.varies for law in laws)
+        return dependent or (of_friction and not self.friction.constant)
+
+    def conditions(
+        self,
+        pair: ContactPair,
+        pressure: Array,
+        *,
+        speed: Array | float = 0.0,
+        temperatures: tuple[Array, Array] | None = None,
+        worn: Worn | None = None,
+        slid: Array | None = None,
+    ) -> ContactConditions:
+        """Return what coefficients depend on.
+
+        Args:
+            pair: The surfaces opposite each other.
+            pressure: (n,), MPa.
+            speed: Of slip (n,), mm/s.
+            temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
+            worn: Depths; by default none.
+            slid: What each node has slipped from the start (n,), mm; by default nothing.
+        """
+        none, x = np.zeros_like(pressure), pair.punch.x
+        initial = np.full_like(pressure, self.initial)
+        return ContactConditions(
+            pressure,
+            speed,
+            (initial, initial) if temperatures is None else temperatures,
+            (in_space(x), in_space(pair.placement.points_back(x))),
+            (none, none) if worn is None else (worn.punch, pair.material @ worn.strip),
+            none if slid is None else slid,
+            self.regions,
+        )
+
+    def friction_at(self, conditions: ContactConditions) -> Array:
+        """Return mu at the nodes (n,).
+
+        Raises:
+            CaseError: it is negative or not finite there.
+        """
+        return self.friction.values(conditions)
+
+    def wear_at(self, conditions: ContactConditions) -> LocalWear:
+        """Return the wear by local slip.
+
+        Raises:
+            CaseError: a coefficient is negative or not finite there.
+        """
+        found = [
             None
             if law is None
-            else BodyRate(coefficient(law, friction, state, key), PressureLaw.of(law), law.speed_exponent)
-        )
-    return LocalWear(found[0], found[1])
+            else BodyRate(coefficient(law, self.friction, conditions, key), PressureLaw.of(law), law.speed_exponent)
+            for law, key in zip(self.wear, ("wear.punch", "wear.strip"), strict=True)
+        ]
+        return LocalWear(found[0], found[1])

@@ -11,12 +11,14 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.assembly import Preparation, Tribosystem, assemble, set_up_by, with_case
+from fenwear.assembly import Preparation, Tribosystem, assemble, law_named, set_up_by, with_case
 from fenwear.case import Case
 from fenwear.cycle import Block, at_step, follow, jump, march, steady
 from fenwear.cycle.state import RunState, joined
-from fenwear.errors import ConvergenceError
-from fenwear.law import check_no_stick, check_slides
+from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.law import check_decided
+from fenwear.results.steps import numbers
+from fenwear.stick.final import FinalShape
 from fenwear.sweeps.plan import Of, preparation_for
 
 Values = Mapping[str, NDArray[np.float64]]
@@ -58,6 +60,10 @@ MEANINGS = {
     "largest_wear_strip": Meaning((), "mm", "largest worn depth of the strip"),
     "worn_volume": Meaning((), "mm3", "volume worn off the punch"),
     "worn_volume_strip": Meaning((), "mm3", "volume worn off the strip"),
+    "stick_size": Meaning((), SIZE, "size that sticks all through the cycle"),
+    "largest_force": Meaning((), "N", "largest tangential force in the last cycle, a torque in N mm where it turns"),
+    "energy_ratio": Meaning((), "", "work of friction in the last cycle over largest force times stroke"),
+    "friction_work_of_cycle": Meaning((), "mJ", "work of friction in the last cycle"),
     "temperature_punch": Meaning(("half_cycle", "node"), "K", "temperature of the punch at the end of the half-cycle"),
     "temperature_strip": Meaning(("half_cycle", "node"), "K", "temperature of the strip at the end of the half-cycle"),
     "largest_temperature": Meaning((), "K", "largest temperature of the contact"),
@@ -94,11 +100,9 @@ class Workshop:
         Raises:
             FenwearError: as the assembly of the case and its solution.
         """
-        if of != "optimum":
-            check_no_stick(case)
         system = self._assembled(case, preparation_for(case, of))
         if of != "optimum":
-            check_slides(system)
+            check_decided(system)
         return {**_nodes(system), **COMPUTED[of](system)}
 
     def _assembled(self, case: Case, heat: Preparation) -> Tribosystem:
@@ -117,7 +121,35 @@ def _nodes(system: Tribosystem) -> dict[str, Array]:
     return {"x": nodes[:, 0], **across, "weight": system.pair.weights}
 
 
+def _final_shape(system: Tribosystem) -> Values:
+    """Return the shape to which partial slip wears."""
+    found: FinalShape = law_named(system.law).end(at_step(system))
+    steps = system.lawful.rig.program.steps
+    ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
+    pressure = found.pressures[ends]
+    values: dict[str, Array] = {
+        "direction": np.array(system.motion.stroke_directions, dtype=float),
+        "pressure": pressure,
+        "largest_pressure": pressure.max(axis=1),
+        "mean_pressure": np.array(system.rigid.mean_pressure),
+        "contact_size": (pressure > 0) @ system.pair.weights,
+        "stick_size": np.array(found.size),
+        "wear": found.worn.punch,
+        "largest_wear": np.array(found.worn.punch.max()),
+        "worn_volume": np.array(system.bodies.punch.thickness * float(system.pair.weights @ found.worn.punch)),
+    }
+    if system.strip_wears:
+        values["largest_wear_strip"] = np.array(found.worn.strip.max())
+        volume = system.bodies.punch.thickness * float(system.pair.strip.weights @ found.worn.strip)
+        values["worn_volume_strip"] = np.array(volume)
+    if found.temperature is not None:
+        values |= _temperatures(*np.repeat(found.temperature[:, None], len(ends), axis=1))
+    return values
+
+
 def _steady(system: Tribosystem) -> Values:
+    if system.sticks:
+        return _final_shape(system)
     state = steady(system)
     found = {
         "direction": np.array(state.directions, dtype=float),
@@ -136,6 +168,9 @@ def _steady(system: Tribosystem) -> Values:
 
 
 def _optimum(system: Tribosystem) -> Values:
+    if system.sticks:
+        reason = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
+        raise CaseError(InputError("contact.law", reason))
     system = at_step(system)
     directions = system.motion.stroke_directions
     found = [system.optimum(d) for d in directions]
@@ -173,6 +208,12 @@ def _run(system: Tribosystem) -> Values:
     if system.strip_wears:
         found["largest_wear_strip"] = last.wear_strip[-1].max()
         found["worn_volume_strip"] = last.totals.of("volume_strip")[-1]
+    if last.steps:
+        told = numbers(last)
+        for name, key in (("friction_work_of_cycle", "friction_work_of_cycle_mJ"), ("energy_ratio", "energy_ratio")):
+            found[name] = np.array(told[key])
+        found["largest_force"] = np.array(told.get("largest_force_N", told.get("largest_torque_N_mm")))
+        found["stick_size"] = np.array(told.get("stick_width_mm", told.get("stick_area_mm2")))
     if last.heat is not None:
         surfaces = [last.heat.temperature_punch, last.heat.temperature_strip]
         found |= _temperatures(*(_by_half_cycle(rows, last.half_cycle, motion.half_cycles) for rows in surfaces))

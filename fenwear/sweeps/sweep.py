@@ -10,7 +10,6 @@ from mpi4py import MPI
 
 from fenwear.case import Case, load_case
 from fenwear.errors import CaseError, InputError, InterruptedRunError
-from fenwear.law import check_no_stick
 from fenwear.parallel import on_root
 from fenwear.results.disk import writing
 from fenwear.results.history import make_directory, write_case
@@ -89,7 +88,6 @@ def _begin(
     case = given if isinstance(given, Case) else load_case(given)
     axes = [make_axis(case, key, values) for key, values in over.items()] if isinstance(over, Mapping) else list(over)
     plan = make_plan(case, axes, of, zipped=zipped)
-    _check_some_slide(plan)
     known: dict[tuple[int, ...], Outcome] = {}
     for variant in plan.variants:
         if variant.error is not None:
@@ -110,26 +108,6 @@ def _begin(
         if variant.case is not None and (found := kept(folder, variant.name)) is not None:
             known[variant.place] = Outcome(variant.place, found[0], "", found[1])
     return case, plan, known
-
-
-def _check_some_slide(plan: Plan) -> None:
-    """Make sure, before any variant is begun, that not all of them ask for stick, which no sweep follows.
-
-    Raises:
-        CaseError: they do.
-    """
-    problem: CaseError | None = None
-    for variant in plan.variants if plan.of != "optimum" else ():
-        if variant.case is None:
-            continue
-        try:
-            check_no_stick(variant.case)
-        except CaseError as error:
-            problem = error
-        else:
-            return
-    if problem is not None:
-        raise problem
 
 
 def _compute(

@@ -8,6 +8,7 @@ stroke    strokes that the bodies take up elastically
 thickness bodies that are worn through
 fineness  steps, bases and elements of the heat that are too coarse
 heated    the same of all stages of a run, and contact that has several answers
+slip      time steps of stick and slip: too coarse, several answers, sliding as a whole
 layer     elements thicker than the layer that heats up below a fast contact
 size      bodies whose mesh is hardly in mm
 states    a run's blocks, the first contact and the steady state: clipped, too hot, harder pressed than hard
@@ -17,6 +18,7 @@ from fenwear.watch.fineness import fineness_text, fineness_warnings
 from fenwear.watch.heated import HeatWatch
 from fenwear.watch.layer import HeatedLayer, heated_layer, layer_warnings
 from fenwear.watch.size import size_warnings
+from fenwear.watch.slip import law_warnings, sliding_text, unique_text, uniques
 from fenwear.watch.states import Watch, hot, initial_warnings, pressed, steady_warnings
 from fenwear.watch.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_warnings
 
@@ -32,9 +34,13 @@ __all__ = [
     "heated_layer",
     "hot",
     "initial_warnings",
+    "law_warnings",
     "layer_warnings",
     "pressed",
     "size_warnings",
+    "sliding_text",
     "steady_warnings",
     "stroke_warnings",
+    "unique_text",
+    "uniques",
 ]

@@ -129,7 +129,10 @@ def grid(side: int) -> Interface:
     rigid = cast(RigidEquilibrium, Rigid(np.full(n, 1.0 / n)))
     even = by_force[:, :, 0].mean(axis=1)
     even = even if rows is None else rows.gathered(even)
-    return Interface(rigid, by_force, np.zeros(n), np.full((n, 1), table[0, 0]), even, rows)
+    interface = Interface(rigid, None, None, False, rows)  # type: ignore[arg-type]  # its answers are known
+    own = np.full((n, 1), table[0, 0])
+    vars(interface).update(gap_by_force=by_force, load_gap=np.zeros(n), own_by_force=own, by_even=even)
+    return interface
 
 
 @dataclass(frozen=True)

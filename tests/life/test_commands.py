@@ -121,5 +121,6 @@ def test_stick_that_is_left_out_is_told_before_a_fit(monkeypatch: pytest.MonkeyP
     assert len(told) == 1
     assert "% of the amplitude" in told[0]
     assert "gross sliding leaves that out" in told[0]
-    with pytest.raises(CaseError, match="not followed here"):
-        Model(load_case("fretting-partial-slip"))
+    assert not Model(
+        load_case("fretting-partial-slip", ["geometry.parameters.elements_along_contact=8"])
+    ).stick_left_out()

@@ -197,9 +197,7 @@ def test_the_program_follows_the_motion() -> None:
         (["stick.steps=1"], "stick.steps"),
         (["stick.bulk_over_cycle=[[0, 1], [0.5, 0]]"], "stick.bulk_over_cycle: expected pairs"),
         (["contact.transverse_friction=0.1"], "contact.transverse_friction: expected 0 with contact.law"),
-        (["run.integration='implicit'"], "run.integration: expected 'explicit' or 'jump' with contact.law"),
         (["motion={kind='one-way', direction='rightward', speed=1, duration=1}"], "motion.kind: expected"),
-        (["contact.friction={table=[[0, 0.2], [100, 0.5]], of='p'}"], "contact.friction: expected a constant"),
     ],
 )
 def test_bad_cases_name_the_key(settings: list[str], message: str) -> None:

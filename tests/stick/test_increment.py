@@ -18,8 +18,8 @@ from fenwear.interface import join
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
 from fenwear.stick.cone import project
 from fenwear.stick.cycle import Records
-from fenwear.stick.run import unique_text
 from fenwear.stick.setup import make_rig
+from fenwear.watch.slip import unique_text
 
 RADIUS, LOAD = 200.0, 100.0
 SOFT_ON_STIFF = (

@@ -15,13 +15,15 @@ import pytest
 import xarray
 
 from fenwear import CaseError, load_case
+from fenwear.cycle.totals import Totals
 from fenwear.errors import InterruptedRunError
 from fenwear.report.compare import compare, comparison_figure
 from fenwear.report.page import write_report
-from fenwear.report.stick import key_numbers_text
+from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
+from fenwear.results.sheet import sheet_text
 from fenwear.run import run_case
-from fenwear.stick.results import Row, row_of
+from fenwear.stick.coulomb import Meter
 
 SMALL = ("geometry.parameters.elements_along_contact=20", "stick.steps=10", "run.jump_tolerance=0.05")
 
@@ -35,34 +37,36 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
 def test_history_holds_loops_zones_energy_and_stress(ran: tuple[dict, Path]) -> None:
     """Every variable has its unit; numbers that can be made of others agree with them."""
     summary, folder = ran
-    with xarray.open_dataset(folder / "history.nc") as history:
-        assert all("units" in history[name].attrs for name in history.data_vars)
-        assert list(history.cycle.values)[:1] == [0]
-        assert int(history.cycle[-1]) == 2000 == summary["cycles"]
-        along = history.normal_z * history.traction + history.normal_x * history.pressure
-        force = (along * history.weight).sum("x")
-        assert np.abs(force - history.tangential_force).max() < 1e-9 * np.abs(force).max()
-        down = history.normal_z * history.pressure - history.normal_x * history.traction
-        load = (down * history.weight).sum("x")
-        assert np.abs(load - 120).max() < 1e-8
-        assert (np.abs(history.traction) <= 0.9 * history.pressure * (1 + 1e-12)).all()
-        stuck = history.slip.where(history.stick == 1).fillna(0)
-        assert not stuck.any()
-        work = (np.abs(history.traction * history.slip).sum("step") * history.weight).sum("x")
-        assert np.abs(work - history.dissipated_energy).max() < 1e-9 * float(work.max())
-        assert float(history.energy_balance_error.max()) < 1e-8
-        assert (history.wear.diff("cycle") >= 0).all()
+    with xarray.open_dataset(folder / "history.nc") as stored:
+        assert all("units" in stored[name].attrs for name in stored.data_vars)
+        assert np.abs(stored.normal_force - 120).max() < 1e-8
+        assert float(stored.equilibrium_error.max()) < 1e-10
+    history = by_cycles(load_history(folder))
+    assert list(history.cycle.values)[:1] == [1]
+    assert int(history.cycle[-1]) == 2000 == summary["sliding"]["cycles"]
+    along = history.normal_z * history.traction + history.normal_x * history.pressure
+    force = (along * history.weight).sum("x")
+    assert np.abs(force - history.tangential_force).max() < 1e-9 * np.abs(force).max()
+    down = history.normal_z * history.pressure - history.normal_x * history.traction
+    load = (down * history.weight).sum("x")
+    assert np.abs(load - 120).max() < 1e-8
+    assert (np.abs(history.traction) <= 0.9 * history.pressure * (1 + 1e-12)).all()
+    stuck = history.slip.where(history.stick == 1).fillna(0)
+    assert not stuck.any()
+    work = (np.abs(history.traction * history.slip).sum("step") * history.weight).sum("x")
+    assert np.abs(work - history.dissipated_energy).max() < 1e-9 * float(work.max())
+    assert float(history.energy_balance_error.max()) < 1e-8
+    assert (history.wear.diff("cycle") >= 0).all()
     saved = json.loads((folder / "summary.json").read_text("utf-8"))
-    assert saved["stop"] == "all cycles done"
+    assert saved["stop"] == "all half-cycles done"
     assert saved["warnings"] == []
 
 
 def test_report_is_drawn_and_drawn_again(ran: tuple[dict, Path]) -> None:
     """Seven figures and a page; `plot` makes the same."""
     summary, folder = ran
-    lines = key_numbers_text(summary).splitlines()
-    assert any(line.startswith("largest tangential force (N)") for line in lines)
-    assert len({len(line) for line in lines}) == 1
+    lines = sheet_text(summary).splitlines()
+    assert any(line.startswith("largest tangential force in the last cycle (N)") for line in lines)
     names = {path.name for path in write_report(folder)}
     assert {"loops.png", "zones.png", "tractions.png", "surface_stress.png", "report.html"} <= names
     page = (folder / "report.html").read_text("utf-8")
@@ -79,7 +83,7 @@ def test_gross_sliding_is_told(tmp_path: Path) -> None:
     assert any("gross sliding" in text for text in summary["warnings"])
     assert any("gross sliding" in text for text in told)
     assert summary["energy_ratio"] > 0.5
-    with pytest.raises(CaseError, match=r"run\.half_cycles: the run has done 1 cycles already"):
+    with pytest.raises(CaseError, match=r"run\.half_cycles: the run is at half-cycle 2 already"):
         run_case(case, "fretting", tmp_path / "out", told.append, resume=True)
     other = load_case("fretting-partial-slip", [*SMALL, "run.half_cycles=4"])
     with pytest.raises(CaseError, match=r"motion\.amplitude: the checkpoint has '0.02 mm'"):
@@ -89,7 +93,7 @@ def test_gross_sliding_is_told(tmp_path: Path) -> None:
 def run(folder: Path, settings: list[str], *, resume: bool = False) -> xarray.Dataset:
     case = load_case("fretting-partial-slip", [*SMALL, "output.report=false", *settings])
     run_case(case, "fretting", folder, lambda _: None, progress="none", resume=resume)
-    return load_history(folder)
+    return by_cycles(load_history(folder))
 
 
 @pytest.mark.parametrize("integration", ["explicit", "jump"])
@@ -102,34 +106,27 @@ def test_every_half_cycle_wears(tmp_path: Path, integration: str) -> None:
     how = [*SMALL, "output.report=false", "output.every=3", f"run.integration='{integration}'", *laws]
     case = load_case("fretting-partial-slip", [*how, "run.half_cycles=8"])
     summary, folder = run_case(case, "fretting", tmp_path / "out", lambda _: None, progress="none")
-    history = load_history(folder)
+    history = by_cycles(load_history(folder))
     slid = np.abs(history.slip).where(history.pressure > 0, 0)
     rubbed = float(((history.pressure * slid).sum("step") * history.weight).sum("x").isel(cycle=-1))
-    assert summary["cycles"] == 4
-    assert summary["worn_area_punch_mm2"] == pytest.approx(4e-13 * rubbed, rel=2e-3)  # the first settles
-    assert summary["accumulated_energy_mJ"] == pytest.approx(4 * 0.9 * rubbed, rel=2e-3)
+    worn, work = summary["punch"]["worn_area_mm2"], summary["sliding"]["friction_work_mJ"]
+    assert summary["sliding"]["cycles"] == 4
+    assert worn == pytest.approx(4e-13 * rubbed, rel=2e-3)  # the first settles
+    assert work == pytest.approx(4 * 0.9 * rubbed, rel=2e-3)
     if integration == "explicit":
-        work = 0.9 * summary["worn_area_punch_mm2"] / 1e-13
-        assert summary["accumulated_energy_mJ"] == pytest.approx(work, rel=1e-9)
-
-
-def test_half_a_cycle_is_refused(tmp_path: Path) -> None:
-    """Cycles are followed as a whole."""
-    case = load_case("fretting-partial-slip", [*SMALL, "run.half_cycles=5"])
-    with pytest.raises(CaseError, match=r"run\.half_cycles: expected a multiple of the 2 half-cycles of a cycle"):
-        run_case(case, "fretting", tmp_path / "out", lambda _: None, progress="none")
+        assert work == pytest.approx(0.9 * worn / 1e-13, rel=1e-9)
 
 
 def interrupted_after(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
-    """Send SIGTERM to this process when so many cycles have been recorded."""
-    made = itertools.count(1)
+    """Send SIGTERM to this process when so many cycles have been metered."""
+    made, whole = itertools.count(1), Meter.__call__
 
-    def counted(*args: Any) -> Row:
-        if next(made) == rows:
+    def counted(*args: Any) -> Totals:
+        if next(made) == 2 * rows:
             os.kill(os.getpid(), signal.SIGTERM)
-        return row_of(*args)
+        return whole(*args)
 
-    monkeypatch.setattr("fenwear.stick.run.row_of", counted)
+    monkeypatch.setattr(Meter, "__call__", counted)
 
 
 @pytest.mark.parametrize(
@@ -147,9 +144,9 @@ def test_interrupted_and_resumed_equals_whole(tmp_path: Path, monkeypatch: pytes
         with pytest.raises(InterruptedRunError, match="to go on: --resume"):
             run(tmp_path / "parts", how)
     so_far = load_history(tmp_path / "parts")
-    assert 3 <= len(so_far.cycle) < len(whole.cycle)
+    assert len(so_far.half_cycle) < 2 * len(whole.cycle)
     stop = json.loads((tmp_path / "parts" / "summary.json").read_text("utf-8"))["stop"]
-    assert stop == "interrupted"
+    assert stop.startswith("interrupted")
     resumed = run(tmp_path / "parts", how, resume=True)
     xarray.testing.assert_identical(resumed, whole)
 

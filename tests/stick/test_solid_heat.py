@@ -14,6 +14,7 @@ from work import half_cycles_whose_work_is_heat
 from fenwear import assemble, load_case
 from fenwear.cycle import march as march_sliding
 from fenwear.report.stick import figures_of
+from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 from fenwear.stick.cycle import Records, Rig
@@ -94,7 +95,7 @@ def run(folder: Path, count: int, *, resume: bool = False) -> xarray.Dataset:
     if MPI.COMM_WORLD.rank == 0:
         assert summary["largest_heat_balance_error"] < 1e-8
         assert summary["max_temperature_K"] > 0
-    return load_history(folder)
+    return by_cycles(load_history(folder))
 
 
 @pytest.mark.mpi

@@ -12,10 +12,12 @@ import xarray
 from scipy.spatial import cKDTree
 
 from fenwear import CaseError, load_case
+from fenwear.cli.partial_slip import check_text, final_of, final_text
 from fenwear.report.page import write_report
+from fenwear.results.cycles import by_cycles
+from fenwear.results.reading import load_history
 from fenwear.results.surfaces import border_nodes
 from fenwear.run import run_case
-from fenwear.stick.command import check_text, final_of, final_text
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.setup import make_rig
 from fenwear.stick.strain import surface_gradient, surface_strain
@@ -48,32 +50,34 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
 def test_history_of_a_solid(ran: tuple[dict, Path]) -> None:
     """Nodes with coordinates; load, cone, forces and work from the tractions along and across a slanted sliding."""
     summary, folder = ran
-    with xarray.open_dataset(folder / "history.nc") as history:
-        assert all("units" in history[name].attrs for name in history.data_vars)
-        assert history.pressure.dims == ("cycle", "step", "node")
-        assert int(history.cycle[-1]) == 20 == summary["cycles"]
-        assert history.sliding_along.values == pytest.approx(np.tile([0.6, 0.8, 0.0], (81, 1)), abs=0.02)
-        assert np.abs((history.traction * history.weight).sum("node") - history.tangential_force).max() < 0.05
-        vectors = history.traction * history.sliding_along + history.traction_across * history.sliding_across
-        force = (vectors * history.weight).sum("node")
-        exact = history.tangential_force * xarray.DataArray([0.6, 0.8, 0.0], dims="axis")
-        assert np.abs((force - exact).isel(axis=[0, 1])).max() < 1e-9 + 0.02 * float(np.abs(exact).max())
-        assert np.abs((history.pressure * history.weight).sum("node") - 50).max() < 0.1
-        size = np.hypot(history.traction, history.traction_across)
-        assert (size <= 0.8 * history.pressure * (1 + 1e-12)).all()
-        assert not history.slip.where(history.stick == 1).fillna(0).any()
-        assert not history.slip_across.where(history.stick == 1).fillna(0).any()
-        work = -(history.traction * history.slip + history.traction_across * history.slip_across)
-        assert float(work.min()) >= -1e-18
-        energy = (work.sum("step") * history.weight).sum("node")
-        assert np.abs(energy - history.dissipated_energy).max() < 1e-9 * float(energy.max())
-        assert float(history.energy_balance_error.max()) < 1e-8
-        assert (history.stick_area < history.contact_area).all()
-        volume = float((history.wear * history.weight).sum("node")[-1])
-        assert volume == pytest.approx(float(history.worn_volume_increment[0]) * 20, rel=0.2)
+    with xarray.open_dataset(folder / "history.nc") as stored:
+        assert all("units" in stored[name].attrs for name in stored.data_vars)
+        assert np.abs(stored.normal_force - 50).max() < 0.1
+    history = by_cycles(load_history(folder))
+    assert history.pressure.dims == ("cycle", "step", "node")
+    assert int(history.cycle[-1]) == 20 == summary["sliding"]["cycles"]
+    assert history.sliding_along.values == pytest.approx(np.tile([0.6, 0.8, 0.0], (81, 1)), abs=0.02)
+    assert np.abs((history.traction * history.weight).sum("node") - history.tangential_force).max() < 0.05
+    vectors = history.traction * history.sliding_along + history.traction_across * history.sliding_across
+    force = (vectors * history.weight).sum("node")
+    exact = history.tangential_force * xarray.DataArray([0.6, 0.8, 0.0], dims="axis")
+    assert np.abs((force - exact).isel(axis=[0, 1])).max() < 1e-9 + 0.02 * float(np.abs(exact).max())
+    assert np.abs((history.pressure * history.weight).sum("node") - 50).max() < 0.1
+    size = np.hypot(history.traction, history.traction_across)
+    assert (size <= 0.8 * history.pressure * (1 + 1e-12)).all()
+    assert not history.slip.where(history.stick == 1).fillna(0).any()
+    assert not history.slip_across.where(history.stick == 1).fillna(0).any()
+    work = -(history.traction * history.slip + history.traction_across * history.slip_across)
+    assert float(work.min()) >= -1e-18
+    energy = (work.sum("step") * history.weight).sum("node")
+    assert np.abs(energy - history.dissipated_energy).max() < 1e-9 * float(energy.max())
+    assert float(history.energy_balance_error.max()) < 1e-8
+    assert (history.stick_area < history.contact_area).all()
+    volume = float((history.wear * history.weight).sum("node")[-1])
+    assert volume == pytest.approx(float(history.worn_volume_increment[0]) * 20, rel=0.2)
     saved = json.loads((folder / "summary.json").read_text("utf-8"))
-    assert saved["stop"] == "all cycles done"
-    assert saved["worn_volume_punch_mm3"] == pytest.approx(volume, rel=0.1)
+    assert saved["stop"] == "all half-cycles done"
+    assert saved["punch"]["worn_volume_mm3"] == pytest.approx(volume, rel=1e-9)
     assert all(np.isfinite(value) for value in saved.values() if isinstance(value, float))
 
 
@@ -85,7 +89,7 @@ def test_report_of_a_solid(ran: tuple[dict, Path]) -> None:
     page = (folder / "report.html").read_text("utf-8")
     assert page.count("<img") == 9
     assert "area that sticks" in page
-    assert "volume worn off the punch" in page
+    assert "worn volume" in page
 
 
 def test_along_y_is_along_x_turned() -> None:

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from fenwear import CaseError, ConvergenceError, assemble, load_case
-from fenwear.stick.command import check_text, final_of, final_text
+from fenwear import ConvergenceError, load_case
+from fenwear.cli.partial_slip import check_text, final_of, final_text
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "stick.steps=6")
 
@@ -34,9 +34,3 @@ def test_the_end_carries_the_load_where_it_sticks() -> None:
     assert re.search(r"carries all of the load.*\n.* \([0-9.]+ to [0-9.]+\) µm deep", final_text(numbers))
     with pytest.raises(ConvergenceError, match="no final shape exists"):
         final_of(load_case("fretting-partial-slip", [*COARSE, "motion.amplitude='40 um'", "motion.positions=1"]))
-
-
-def test_what_follows_gross_sliding_refuses_the_case() -> None:
-    """No command takes it for gross sliding without a word."""
-    with pytest.raises(CaseError, match=r"contact\.law: expected 'gross-sliding' here"):
-        assemble(load_case("fretting-partial-slip", list(COARSE)))

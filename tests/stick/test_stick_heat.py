@@ -12,10 +12,11 @@ import xarray
 from work import half_cycles_whose_work_is_heat
 
 from fenwear import CaseError, assemble, load_case
+from fenwear.cli.partial_slip import final_of
 from fenwear.cycle import march as march_sliding
+from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.command import final_of
 from fenwear.stick.cycle import Rig
 from fenwear.stick.heat import balance_error
 from fenwear.stick.jump import jump, march
@@ -106,7 +107,7 @@ def run(folder: Path, count: int, *, resume: bool = False) -> xarray.Dataset:
     summary, _ = run_case(case, "warm", folder, lambda _: None, resume=resume, progress="none")
     assert summary["largest_heat_balance_error"] < 1e-8
     assert summary["max_temperature_K"] > 0
-    return load_history(folder)
+    return by_cycles(load_history(folder))
 
 
 def test_a_resumed_run_goes_on_as_warm(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 import fenwear as package
 from fenwear import CaseError, Tribosystem, load_case, march, steady
+from fenwear.cycle import evolve
 from fenwear.errors import InterruptedRunError
 from fenwear.sweeps import engines
 from fenwear.sweeps.command import failures, text
@@ -92,18 +93,22 @@ def test_failed_variants_are_told_and_not_fatal(tmp_path: Path) -> None:
     assert "2 variants, 1 of them failed" in text(found)
 
 
-def test_a_case_with_stick_is_refused_before_any_variant(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steady states and runs slide as a whole; where one variant does so, the others fail alone."""
-
-    def computed(_self: object, _case: package.Case, _of: str) -> dict[str, Any]:
-        return {"mean_pressure": np.array(1.0)}
-
-    monkeypatch.setattr(engines.Workshop, "values", computed)
-    for of in ("run", "steady"):
-        with pytest.raises(package.CaseError, match=r"contact\.law: stick and partial slip are not followed here"):
-            package.sweep("fretting-partial-slip", {"contact.friction": [0.5, 0.6]}, of=of)
-    laws = {"contact.law": ["coulomb", "gross-sliding"]}
-    assert package.sweep("fretting-partial-slip", laws, of="run")["mean_pressure"].shape == (2,)
+def test_partial_slip_is_swept_like_sliding() -> None:
+    """Runs and ends of partial slip, and both laws side by side; each variant is what its own case gives."""
+    small = ["geometry.parameters.elements_along_contact=12", "stick.steps=4", "stick.step_tolerance=1",
+             "run.half_cycles=6", "run.integration=explicit"]  # fmt: skip
+    friction = {"contact.friction": [0.8, 0.9]}
+    case = load_case("fretting-partial-slip", small)
+    found = package.sweep(case, friction, of="run")
+    for k, mu in enumerate(friction["contact.friction"]):
+        alone = list(evolve(package.assemble(load_case("fretting-partial-slip", [*small, f"contact.friction={mu}"]))))
+        assert float(found["worn_volume"][k]) == pytest.approx(float(alone[-1].totals.of("volume_punch")[-1]), rel=1e-9)
+    assert found["stick_size"][0] < found["stick_size"][1]
+    ends = package.sweep(case, friction, of="steady")
+    assert ends["largest_wear"][0] > ends["largest_wear"][1] > 0
+    open_law = load_case("fretting-partial-slip", [small[0], *small[3:]])
+    laws = package.sweep(open_law, {"contact.law": ["coulomb", "gross-sliding"]}, of="run")
+    assert laws["worn_volume"][0] < 0.7 * laws["worn_volume"][1], "what sticks does not wear"
 
 
 def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:

@@ -7,39 +7,39 @@ from typing import Any
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Bodies, body_lines
+from fenwear.assembly import Tribosystem, assemble, body_lines
 from fenwear.case import Case
+from fenwear.errors import CaseError, InputError
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
+from fenwear.results.summary import net_of
 from fenwear.sliding.chart import sliding_chart
+from fenwear.stick.coulomb import touches
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import FinalShape, final_shape
-from fenwear.stick.fineness import fine_enough
 from fenwear.stick.interface import meshed
-from fenwear.stick.results import net_of
-from fenwear.stick.run import check_touching, unique_text
 from fenwear.stick.setup import make_rig
 from fenwear.watch.few import few_text
 from fenwear.watch.size import size_warnings
+from fenwear.watch.slip import law_warnings, unique_text
 
 
-def check_text(case: Case, bodies: Bodies | None = None) -> str:
+def check_text(case: Case, system: Tribosystem | None = None) -> str:
     """Return what a case with stick comes to in its first cycle; collective.
 
     Args:
         case: With contact.law = "coulomb".
-        bodies: Of the case, where they are built already.
+        system: Of the case, where there is one already.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: a time step did not converge.
     """
-    rig = make_rig(case, bodies=bodies)
+    system = system or assemble(case)
+    system.check_touching()
+    rig = system.lawful.rig
     both = meshed(rig.interface)
     setup = "\n".join((both.needs.text(), *body_lines(both.bodies, both.needs)))
-    check_touching(rig)
-    rig, fineness = fine_enough(rig, case)
-    interface = meshed(rig.interface)
-    sizes = size_warnings(case, interface.bodies, interface.middle.rigid)
+    sizes = size_warnings(case, system.bodies, system.rigid)
     records = Records.joined(rig.cycle(rig.beginning())[1])
     thick, weights = case.model.thickness, rig.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
@@ -47,8 +47,8 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
     regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
     if stuck == closed:
         regime = "full stick"
-    few = few_text(case, net_of(rig), records.pressure[0], "at the start")
-    warnings = (*sizes, fineness.text(), unique_text(records.unique.astype(bool)), few)
+    few = few_text(case, net_of(system), records.pressure[0], "at the start")
+    warnings = (*sizes, *law_warnings(system), unique_text(records.unique.astype(bool)), few)
     return (
         f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "
@@ -59,20 +59,20 @@ def check_text(case: Case, bodies: Bodies | None = None) -> str:
     )
 
 
-def final_of(case: Case, *, fresh: bool = False, bodies: Bodies | None = None) -> tuple[FinalShape, dict[str, Any]]:
+def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape, dict[str, Any]]:
     """Return the final shape of a case's partial slip, and its key numbers; collective.
 
     Args:
         case: With contact.law = "coulomb".
-        fresh: Condense the bodies again, even where they are kept on disk.
-        bodies: Of the case, where they are built already.
+        system: Of the case, where there is one already.
 
     Raises:
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
-    rig = make_rig(case, fresh=fresh, bodies=bodies)
-    check_touching(rig)
+    rig = make_rig(case) if system is None else system.lawful.rig
+    if not touches(rig):
+        raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
     found = final_shape(rig)
     solid = case.model.kind == "solid"
     pair, weights = rig.interface.middle.pair, rig.weights

@@ -1,0 +1,190 @@
+"""Gross sliding: every node slips in the direction of the motion; its steps over half-cycles and over many cycles.
+
+A half-cycle is solved phase by phase (`phase`). A jump takes the implicit step of `jump_step`, whole and in two halves.
+A third of their difference is the error estimate of the halves, which are kept: of the depths, of the pressures and of
+the temperatures, see `jump_error`.
+"""
+
+from __future__ import annotations
+
+from functools import reduce
+
+from mpi4py import MPI
+
+from fenwear.arrays import Array
+from fenwear.assembly import (
+    Bodies,
+    Preparation,
+    Tribosystem,
+    assemble,
+    elastic,
+    make_sliding,
+    place,
+    preparation,
+    property_change,
+    renewed,
+    with_case,
+    with_exchange,
+    with_reduced_heat,
+)
+from fenwear.case import Case
+from fenwear.cycle.block import HalfCycle, HalfCycleHeat
+from fenwear.cycle.driver import Loading, Watch
+from fenwear.cycle.jump_error import ORDER
+from fenwear.cycle.jump_step import Stepper
+from fenwear.cycle.phase import PhaseEnd, PhaseStep
+from fenwear.cycle.retry import SmallerSteps
+from fenwear.cycle.state import RunState
+from fenwear.cycle.steady import Steady, steady
+from fenwear.errors import ConvergenceError
+from fenwear.heat.field import HeatState
+from fenwear.remedies import SHORTER_JUMPS
+from fenwear.sliding.wear import Worn
+
+WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
+SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
+
+
+class HalfCycles:
+    """Steps of one half-cycle."""
+
+    def __init__(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> None:
+        self.system, self.watch, self.loading = system, watch, loading
+        phases = range(len(system.motion.phases))
+        self.steps = [PhaseStep(system, phase, implicit=implicit) for phase in phases]
+        self.smaller = SmallerSteps(system, implicit=implicit)
+
+    def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next half-cycle, and its record."""
+        motion = self.system.motion
+        first = state.half_cycle % motion.half_cycles * motion.positions
+        phases = range(first, first + motion.positions)
+        load = self.loading(state.half_cycle + 0.5)
+        try:
+            ends = self._whole(state, phases, load)
+        except ConvergenceError as error:
+            ends = self.smaller.half_cycle(state, phases, error, load)
+        worn, totals, contacts = state.worn, state.totals, list(state.contacts)
+        for phase, end in zip(phases, ends, strict=True):
+            worn, totals, contacts[phase] = worn + end.worn, totals + end.record.adds, end.record.contact
+        heats = [end.heat for end in ends if end.heat is not None]
+        heat = reduce(HalfCycleHeat.then, heats) if heats else None
+        number = state.half_cycle + 1
+        after = RunState(number, worn, tuple(contacts), ends[-1].temperature, totals)
+        return after, [HalfCycle(number, [end.record for end in ends], worn, totals, heat, load)]
+
+    def _whole(self, state: RunState, phases: range, load: float) -> list[PhaseEnd]:
+        """Return the ends of the phases of a half-cycle, each solved as a whole."""
+        worn, temperature, ends = state.worn, state.temperature, []
+        for number, phase in enumerate(phases):
+            if number:
+                self.watch()
+            done = state.half_cycle + (number + 0.5) / len(phases)
+            end = self.steps[phase].solve(temperature, worn, state.contacts[phase], load, done)
+            worn, temperature = worn + end.worn, end.temperature
+            ends.append(end)
+        return ends
+
+
+class Jumps:
+    """Steps of as many cycles as the tolerance allows, and the materials whose properties change with the warmth."""
+
+    def __init__(self, stepper: Stepper, tolerance: float) -> None:
+        self.stepper, self.tolerance = stepper, tolerance
+        self.system = stepper.system
+        stepper.system.team.serve(self)
+
+    def beginning(self) -> RunState:
+        """Return the unworn bodies at their initial temperature."""
+        return self.stepper.beginning()
+
+    def change(self, temperature: HeatState | None) -> float:
+        """Return the largest change of a property at temperatures; collective."""
+        return property_change(self.stepper.system, temperature)
+
+    def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next jump that is accurate enough, and its last cycle."""
+        stepper, tolerance = self.stepper, self.tolerance
+        strokes = stepper.system.motion.half_cycles
+        length, left = state.jump_length, (until - state.half_cycle) // strokes
+        while True:
+            tried = min(length, left)
+            try:
+                end, estimate = stepper.attempt(state, tried)
+            except ConvergenceError:
+                if tried == 1:
+                    raise
+                stepper.system.remedies.note(SHORTER_JUMPS)
+                length = max(1, tried // 4)
+                continue
+            largest = estimate.largest
+            factor = SAFETY * (tolerance / max(largest, 1e-300)) ** (1 / (ORDER + 1))
+            warmed = tried > 1 and stepper.system.team.each(self, "change", end.temperature) > WARMED
+            if (largest <= tolerance and not warmed) or tried == 1:
+                break
+            # A half is half made already.
+            length = max(1, int(tried * min(0.5, max(LEAST, factor))))
+        if tried == length or factor < 1:  # a step cut short by an end says little of the next length
+            length = max(1, int(tried * min(MOST, max(LEAST, factor))))
+            if factor > 1 and tried < 4:
+                length = max(length, tried + 1)
+        number = state.half_cycle + tried * strokes
+        after = RunState(number, end.worn, end.contacts, end.temperature, end.totals, length)
+        return after, stepper.last_cycle(state, after, tried)
+
+
+class GrossSliding:
+    """The law of gross sliding."""
+
+    memory: type | None = None
+
+    def assemble(
+        self,
+        case: Case,
+        comm: MPI.Comm,
+        followed: Worn | None,
+        *,
+        heat: Preparation,
+        fresh: bool,
+        warmed: tuple[Array, Array] | None,
+    ) -> Tribosystem:
+        """Return the system of a case; collective."""
+        return assemble(case, comm, followed, heat=heat, fresh=fresh, warmed=warmed)
+
+    def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
+        """Return the system of a case whose bodies are built; collective."""
+        system = elastic(
+            place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case), fresh=fresh
+        )
+        if heat == "none":
+            return system
+        return (with_reduced_heat if heat == "reduced" else with_exchange)(system, keep=True, fresh=fresh)
+
+    def at_temperatures(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
+        """Return the system of the same case and meshes with the properties that these bodies have; collective."""
+        return self.of_bodies(system.case, bodies, heat=preparation(system), fresh=False)
+
+    def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
+        """Return the system of another case; collective."""
+        if system.sticks:
+            return assemble(case, system.comm, system.bodies.followed)
+        return with_case(system, case)
+
+    def renewed(self, system: Tribosystem, followed: Worn | None, warmed: tuple[Array, Array] | None) -> Tribosystem:
+        """Return the system of the same case on meshes and with properties of now; collective."""
+        return renewed(system, followed, warmed)
+
+    def end(self, system: Tribosystem) -> Steady:
+        """Return the cyclic steady state; collective."""
+        return steady(system)
+
+    def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
+        """Return the step of one half-cycle."""
+        return HalfCycles(system, watch, loading, implicit=implicit)
+
+    def jumps(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> Jumps:
+        """Return the step of many cycles."""
+        return Jumps(Stepper(system, tolerance, watch, loading), tolerance)
+
+
+LAW = GrossSliding()

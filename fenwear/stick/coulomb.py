@@ -1,0 +1,527 @@
+"""Coulomb's law with stick, as a law of contact: its bodies, its steps over half-cycles and over many cycles.
+
+A half-cycle goes in time steps (`cycle`), on the shape at its start; its wear is taken off at its end. A jump over many
+cycles is that of `jump`. What a time step must remember of the one before goes with the state of a run, `Memory`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from mpi4py import MPI
+
+from fenwear.arrays import Array, Mask
+from fenwear.assembly import (
+    Bodies,
+    Preparation,
+    Tribosystem,
+    build_bodies,
+    build_conduction,
+    joined,
+    place_at_rest,
+    set_up_by,
+)
+from fenwear.assembly.tribosystem import Condensed
+from fenwear.bodies.condensation import CondensedBody, respond_to_load
+from fenwear.case import Case
+from fenwear.contact import ContactState
+from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
+from fenwear.cycle.driver import Loading, Watch
+from fenwear.cycle.state import RunState, beginning
+from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
+from fenwear.errors import CaseError, InputError
+from fenwear.heat.field import HeatState
+from fenwear.sliding.motion import make_motion
+from fenwear.sliding.wear import Worn
+from fenwear.stick.cycle import Records, Rig, RigState
+from fenwear.stick.final import FinalShape, final_shape
+from fenwear.stick.fineness import Ends, Fineness, fine_enough, with_ends
+from fenwear.stick.interface import meshed
+from fenwear.stick.jump import Cycle, first_cycle, jumped
+from fenwear.stick.setup import heated, unheated_rig
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a run remembers besides depths and temperatures.
+
+    Attributes:
+        at: Where the time steps are; its depths and temperature are those of the run.
+        cycle: The last one, on the shape of the run, from which jumps go on; None where there is none.
+        warm: Temperatures at the end of that cycle, where there is one with heat; else none.
+        stuck: Which nodes stuck in each half-cycle of the last cycle (half-cycles, n).
+        meshes: What tells apart the bodies that it belongs to.
+    """
+
+    at: RigState
+    cycle: Cycle | None = None
+    warm: tuple[HeatState, ...] = ()
+    stuck: Array | None = None
+    meshes: float = 0.0
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The time steps of a half-cycle.
+
+    Attributes:
+        records: k of them.
+        before: Their pressures a cycle ago (k, n), MPa; NaN where there was none.
+        stuck: Which nodes stick all through the cycle that ends with them (n,).
+        energy_ratio: Friction's work over twice the largest force times the stroke.
+        jump_error: Estimated error of the jump that they end; 0 without.
+        first: Number of the first one in the cycle.
+        wear: Depths worn off both bodies in all of them.
+    """
+
+    records: Records
+    before: Array
+    stuck: Mask
+    energy_ratio: float
+    jump_error: float
+    first: int
+    wear: Worn
+
+    @property
+    def pressure(self) -> Array:
+        """At the end of each step (k, n), MPa."""
+        return self.records.pressure
+
+    @property
+    def gap(self) -> Array:
+        """At the end of each step (k, n), mm."""
+        return self.records.gap
+
+
+@dataclass(frozen=True)
+class StickSetup:
+    """What the law has of a system.
+
+    Attributes:
+        rig: The bodies, and what is done to them in a cycle.
+        fineness: Of its time steps; None where they are taken as they are given.
+        meshes: What tells these bodies apart from those on other meshes or with other properties.
+        ends: Where its time steps end, as numbers of the finest ones; None where they are taken as they are given.
+    """
+
+    rig: Rig
+    fineness: Fineness | None
+    meshes: float
+    ends: Ends | None = None
+
+    @property
+    def elastic_length(self) -> float:
+        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
+        return self.rig.interface.middle.elastic_length
+
+    def check_touching(self) -> None:
+        """Make sure that the load brings the surfaces together; collective.
+
+        Raises:
+            CaseError: it does not.
+        """
+        if not touches(self.rig):
+            raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
+
+
+def touches(rig: Rig) -> bool:
+    """Return whether the load brings the surfaces together; collective."""
+    return rig.led(lambda: bool(rig.beginning().contact.closed.any()))
+
+
+class Coulomb:
+    """The law: nodes stick, or slip against their friction."""
+
+    memory: type | None = Memory
+
+    def assemble(
+        self,
+        case: Case,
+        comm: MPI.Comm,
+        followed: Worn | None,
+        *,
+        heat: Preparation,
+        fresh: bool,
+        warmed: tuple[Array, Array] | None,
+    ) -> Tribosystem:
+        """Return the system of a case; collective."""
+        return system_of(case, build_bodies(case, comm, followed, warmed), heat=heat, fresh=fresh)
+
+    def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
+        """Return the system of a case whose bodies are built; collective."""
+        return system_of(case, bodies, heat=heat, fresh=fresh)
+
+    def at_temperatures(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
+        """Return the system of the same case and meshes with the properties that these bodies have; collective."""
+        same = bodies.punch is system.bodies.punch
+        condensed = (system.condensed.punch, system.condensed.strip) if same else None
+        return system_of(system.case, bodies, condensed=condensed, ends=system.lawful.ends)
+
+    def renewed(self, system: Tribosystem, followed: Worn | None, warmed: tuple[Array, Array] | None) -> Tribosystem:
+        """Return the system of the same case on meshes and with properties of now; collective."""
+        bodies = build_bodies(system.case, system.comm, followed, warmed)
+        return system_of(system.case, bodies, ends=system.lawful.ends)
+
+    def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
+        """Return the system of another case that shares the bodies that the change leaves; collective."""
+        before = system.case
+        if not system.sticks or set_up_by(before) != set_up_by(case):
+            return self.assemble(
+                case, system.comm, system.bodies.followed, heat="as set", fresh=False, warmed=system.bodies.warmed
+            )
+        bodies, condensed = system.bodies, (system.condensed.punch, system.condensed.strip)
+        if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
+            bodies = bodies.under(case)
+            condensed = _under(bodies, condensed)
+        if (before.heat, before.punch.temperatures, before.strip.temperatures) != (
+            case.heat,
+            case.punch.temperatures,
+            case.strip.temperatures,
+        ):
+            bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
+        moves = unheated_rig(case, bodies, condensed=condensed).interface.moves
+        same = condensed if moves == system.condensed.strip_moves else None
+        return system_of(case, bodies, condensed=same, ends=system.lawful.ends)
+
+    def end(self, system: Tribosystem) -> FinalShape:
+        """Return the shape to which partial slip wears; collective."""
+        return final_shape(system.lawful.rig)
+
+    def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
+        """Return the step of one half-cycle; implicitly, of one cycle."""
+        return (Cycles if implicit else HalfCycles)(system, watch, loading)
+
+    def jumps(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> Jumps:
+        """Return the step of many cycles."""
+        return Jumps(system, tolerance, watch, loading)
+
+
+LAW = Coulomb()
+
+
+def _under(bodies: Bodies, condensed: tuple[CondensedBody, CondensedBody]) -> tuple[CondensedBody, CondensedBody]:
+    """Return the same under the loads of these bodies; collective."""
+    punch, strip = condensed
+    return (
+        replace(punch, by_load=respond_to_load(bodies.punch, punch.patterns)),
+        replace(strip, by_load=respond_to_load(bodies.strip, strip.patterns)),
+    )
+
+
+def system_of(
+    case: Case,
+    bodies: Bodies,
+    *,
+    heat: Preparation = "as set",
+    fresh: bool = False,
+    condensed: tuple[CondensedBody, CondensedBody] | None = None,
+    ends: Ends | None = None,
+) -> Tribosystem:
+    """Return the system of bodies that are built; collective.
+
+    Args:
+        case: With contact.law = "coulomb".
+        bodies: Of it.
+        heat: Whether heat is prepared, and the time steps are halved until they are fine enough: "none" for neither.
+        fresh: Condense the bodies again, even where they are kept on disk.
+        condensed: Both, where they are condensed already.
+        ends: Where time steps end, in place of those that are fine enough.
+
+    Raises:
+        CaseError: what only the geometry can tell is wrong.
+        ConvergenceError: a time step of the first cycle did not converge.
+    """
+    rig = unheated_rig(case, bodies, fresh=fresh, condensed=condensed)
+    interface, fineness = meshed(rig.interface), None
+    sliding = replace(interface.sliding, motion=make_motion(case.motion.model_copy(update={"positions": 1})))
+    placed = place_at_rest(bodies, sliding, interface.middle.pair, case)
+    system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))
+    if ends is not None:
+        rig = with_ends(rig, case, ends)
+    elif heat != "none":
+        rig = heated(rig, case)
+        if touches(rig):
+            rig, fineness = fine_enough(rig, case)
+            ends = fineness.ends
+    exchange = None if rig.heat is None else rig.heat.exchange
+    return replace(system, exchange=exchange, lawful=StickSetup(rig, fineness, _told_apart(bodies), ends))
+
+
+def _told_apart(bodies: Bodies) -> float:
+    """Return a number of the wear that the meshes follow and of the warmth of properties; collective."""
+    worn = 0.0 if bodies.followed is None else float(bodies.followed.punch.sum() + bodies.followed.strip.sum())
+    warm = 0.0 if bodies.warmed is None else float(sum(one.sum() for one in bodies.warmed))
+    return worn + bodies.comm.allreduce(warm)
+
+
+class _Run:
+    """What steps over half-cycles and over many cycles share."""
+
+    def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
+        setup: StickSetup = system.lawful
+        self.system, self.setup, self.loading = system, setup, loading
+        self.rig = setup.rig.watching(watch)
+        self.strokes = system.motion.half_cycles
+        self.meter = Meter(system, self.rig)
+
+    def beginning(self) -> RunState:
+        """Return the unworn bodies at their initial temperature."""
+        exchange = self.system.exchange
+        return beginning(self.system, None if exchange is None else exchange.initial())
+
+    def temperature(self, state: RunState) -> Array | None:
+        """Return the temperatures of a state on this system's bases (dim,)."""
+        exchange = self.system.exchange
+        return None if exchange is None or state.temperature is None else exchange.own(state.temperature).values
+
+    def at(self, state: RunState, load: float) -> RigState:
+        """Return where the time steps of a state are, with its own depths and temperatures."""
+        memory: Memory | None = state.memory
+        warm = self.temperature(state)
+        if memory is None:
+            at = self.rig.beginning(state.worn, load)
+            return replace(at, temperature=at.temperature if warm is None else warm)
+        at, steps = memory.at, self.rig.program.steps
+        if at.pressures is not None and len(at.pressures) != len(steps):
+            n, m = at.contact.trial.shape
+            none = np.full((len(steps), n), np.nan), np.full((len(steps), n, m), np.nan)
+            at = replace(at, next_step=0, pressures=none[0], trials=none[1])
+        heating = np.zeros(len(self.rig.weights)) if at.heating is None else at.heating
+        at = replace(at, worn=state.worn, load=load, temperature=warm, heating=None if warm is None else heating)
+        while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
+            at, _ = self.rig.half_cycle(at)
+        return replace(at, temperature=warm)
+
+    def half_cycle(
+        self,
+        number: int,
+        steps: Steps,
+        states: tuple[Worn, Totals],
+        adds: Totals,
+        load: float,
+    ) -> HalfCycle:
+        """Return the record of a half-cycle.
+
+        Args:
+            number: Its own.
+            steps: Its time steps.
+            states: Depths and totals at its end.
+            adds: What it adds to the totals.
+            load: Factor of all loads.
+        """
+        records, stroke = steps.records, (number - 1) % self.strokes
+        middle = self.middle(steps)
+        contact = _contact(records, middle)
+        rig, step = self.rig, self.rig.program.steps[steps.first + middle]
+        position = rig.interface.position(step.offset)
+        pressed = records.pressure[middle] > 0
+        f = np.concatenate([records.pressure[middle], records.traction[middle].T.ravel()])
+        force = position.in_space(f) - records.pressure[middle][:, None] * position.pair.normal
+        ratio = np.where(pressed[:, None], force, 0.0) / np.where(pressed, records.pressure[middle], 1.0)[:, None]
+        loaded = rig.interface.loaded(step.fraction)
+        equilibrium = replace(position.rigid, resultant=loaded.resultant)
+        before = None if np.isnan(steps.before[middle]).any() else steps.before[middle]
+        phase = PhaseRecord(stroke, contact, before, adds, ratio, equilibrium)
+        heat = None
+        if rig.heat is not None:
+            punch, strip = records.temperature[-1]
+            heat = HalfCycleHeat(punch, strip, records.heat.sum(axis=0), int(records.coupling.max()))
+        return HalfCycle(number, [phase], states[0], states[1], heat, load, steps)
+
+    def middle(self, steps: Steps) -> int:
+        """Return the time step of a half-cycle that ends nearest to its middle."""
+        fractions = np.cumsum(steps.records.duration)
+        return int(np.abs(fractions - fractions[-1] / 2).argmin())
+
+
+class HalfCycles(_Run):
+    """Steps of one half-cycle; its wear is taken off at its end."""
+
+    def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next half-cycle, and its record."""
+        rig, load = self.rig, self.loading(state.half_cycle + 0.5)
+        begin = self.at(state, load)
+        at, records = rig.half_cycle(begin)
+        first, number = begin.next_step, state.half_cycle + 1
+        own = slice(first, first + len(records))
+        before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
+        lost = rig.worn_in(records, first)
+        worn = state.worn + lost
+        adds = self.meter(records, first)
+        totals = state.totals + adds
+        stroke, n = state.half_cycle % self.strokes, len(rig.weights)
+        stuck = _known_stuck(state.memory, self.strokes, n)
+        stuck[stroke] = records.stuck
+        ratio = _energy_ratio(records, rig.weights)
+        steps = Steps(records, before, np.asarray(stuck.all(axis=0)), ratio, 0.0, first, lost)
+        record = self.half_cycle(number, steps, (worn, totals), adds, load)
+        contacts = list(state.contacts)
+        contacts[stroke] = record.phases[0].contact
+        warm, exchange = state.temperature, self.system.exchange
+        if exchange is not None and at.temperature is not None:
+            warm = exchange.at(at.temperature)
+        memory = Memory(replace(at, worn=worn, temperature=None), stuck=stuck.astype(float), meshes=self.setup.meshes)
+        return RunState(number, worn, tuple(contacts), warm, totals, memory=memory), [record]
+
+
+class Cycles(HalfCycles):
+    """Steps of one cycle whose wear is implicit, that of a jump over it; what is left of a cycle goes explicitly."""
+
+    def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
+        super().__init__(system, watch, loading)
+        self._jumps = Jumps(system, np.inf, watch, loading)
+
+    def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next cycle, and the record of its half-cycles."""
+        if state.half_cycle % self.strokes or until < state.half_cycle + self.strokes:
+            return super().__call__(state, until)
+        after, records = self._jumps(replace(state, jump_length=1), until)
+        return replace(after, jump_length=1), records
+
+
+class Jumps(_Run):
+    """Steps of as many cycles as the tolerance allows."""
+
+    def __init__(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> None:
+        super().__init__(system, watch, loading)
+        self.tolerance = tolerance
+
+    def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
+        """Return the state after the next jump that is accurate enough, and its last cycle."""
+        rig, strokes, exchange = self.rig, self.strokes, self.system.exchange
+        now = self._cycle(state)
+        load = self.loading(float(state.half_cycle))
+        ends = replace(now, length=state.jump_length, end=replace(now.end, load=load))
+        then = jumped(rig, ends, until // strokes, self.tolerance)
+        cycles = then.number - now.number
+        number = then.number * strokes
+        totals = state.totals + self._adds(now, then, cycles)
+        parts, old = _in_order(rig, then), _in_order(rig, now)
+        stuck = np.array([part[1].stuck for part in parts])
+        at_all = np.asarray(stuck.all(axis=0))
+        made, contacts = [], []
+        depths, sums = [then.worn], [totals]
+        adds = [self.meter(records, first) for first, records in parts]
+        lost = [rig.worn_in(records, first) for first, records in parts]
+        for k in reversed(range(1, strokes)):
+            depths.insert(0, depths[0] - lost[k])
+            sums.insert(0, sums[0] - adds[k])
+        for k, ((first, records), (_, earlier)) in enumerate(zip(parts, old, strict=True)):
+            before = records.pressure - (records.pressure - earlier.pressure) / cycles
+            steps = Steps(records, before, at_all, _energy_ratio(records, rig.weights), then.error, first, lost[k])
+            record = self.half_cycle(number - strokes + 1 + k, steps, (depths[k], sums[k]), adds[k], then.end.load)
+            contacts.append(record.phases[0].contact)
+            made.append(record)
+        warm = state.temperature
+        after: tuple[HeatState, ...] = ()
+        if exchange is not None and then.warm is not None and then.end.temperature is not None:
+            warm, after = exchange.at(then.warm), (exchange.at(then.end.temperature),)
+        kept = replace(then, end=replace(then.end, temperature=None), warm=None)
+        memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.meshes)
+        return RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory), made
+
+    def _cycle(self, state: RunState) -> Cycle:
+        """Return the cycle on the shape of a state."""
+        memory, exchange = state.memory, self.system.exchange
+        if memory is None or memory.cycle is None or memory.meshes != self.setup.meshes:
+            at = self.at(state, self.loading(float(state.half_cycle)))
+            return first_cycle(self.rig, at, state.worn, state.half_cycle // self.strokes, self.temperature(state))
+        cycle: Cycle = memory.cycle
+        if exchange is None:
+            return cycle
+        (after,) = memory.warm
+        end = replace(cycle.end, temperature=exchange.own(after).values)
+        return replace(cycle, end=end, warm=self.temperature(state))
+
+    def _adds(self, now: Cycle, then: Cycle, cycles: int) -> Totals:
+        """Return what a jump adds: by the trapezoidal rule, but for the wear, which is that of its depths."""
+        adds = [self.meter(one.records, one.first_step) for one in (now, then)]
+        found = (adds[0] + adds[1]).times(cycles / 2)
+        return self.meter.with_wear(found, then.worn - now.worn)
+
+
+def _contact(records: Records, step: int) -> ContactState:
+    own = slice(step, step + 1)
+    return ContactState(records.pressure[own], records.gap[own], records.rigid[own], int(records.iterations[step]))
+
+
+def _known_stuck(memory: Memory | None, strokes: int, nodes: int) -> Mask:
+    """Return which nodes stuck in each half-cycle before (strokes, n): all where nothing is known."""
+    if memory is None or memory.stuck is None:
+        return np.ones((strokes, nodes), dtype=bool)
+    return memory.stuck > 0
+
+
+def _energy_ratio(records: Records, weights: Array) -> float:
+    """Return friction's work of a half-cycle over twice its largest force times half the stroke."""
+    stroke, most = float(np.ptp(records.displacement)), float(np.abs(records.force).max())
+    return records.energy(weights) / max(most * stroke, 1e-300)
+
+
+def _in_order(rig: Rig, cycle: Cycle) -> list[tuple[int, Records]]:
+    """Return the first steps and the records of a cycle's half-cycles in the order of the motion."""
+    steps, first, found = rig.program.steps, cycle.first_step, []
+    for records in cycle.half_cycles:
+        found.append((first, records))
+        first = (first + len(records)) % len(steps)
+    return sorted(found, key=lambda one: one[0])
+
+
+class Meter:
+    """What time steps add to the totals: see `fenwear.cycle.totals`.
+
+    Args:
+        system: The bodies.
+        rig: What is done to them.
+    """
+
+    def __init__(self, system: Tribosystem, rig: Rig) -> None:
+        self.system, self.rig = system, rig
+        self.thickness = system.bodies.punch.thickness
+
+    def __call__(self, records: Records, first: int) -> Totals:
+        """Return what time steps add, the first of them that of this number in the cycle."""
+        rig, thick = self.rig, self.thickness
+        slid, pressure = records.slid, records.pressure
+        forces = pressure @ rig.weights
+        carried = np.where(forces > 0, forces, 1.0)
+        distance = (pressure * slid) @ rig.weights / carried
+        sums = dict.fromkeys(SUMS, 0.0)
+        sums["distance"] = float(distance.sum())
+        sums["load_path"] = thick * float(((pressure * slid) @ rig.weights).sum())
+        steps = rig.program.steps
+        for k, way in enumerate(distance):
+            position = rig.interface.position(steps[(first + k) % len(steps)].offset)
+            f = np.concatenate([pressure[k], records.traction[k].T.ravel()])
+            force = thick * position.in_space(f * position.weights)
+            normal = thick * (pressure[k] * position.pair.weights)[:, None] * position.pair.normal
+            sums["load_distance"] += float((force * approach(position.rigid)).sum()) * float(way)
+            sums["drag_distance"] += float(np.linalg.norm((force - normal).sum(axis=0))) * float(way)
+        sums["work"] = thick * records.energy(rig.weights)
+        energy = records.dissipated.sum(axis=0)
+        share = records.duration / records.duration.sum()
+        found = Totals(np.array([sums[name] for name in SUMS]), energy, share @ pressure)
+        return self.with_wear(found, rig.worn_in(records, first))
+
+    def with_wear(self, totals: Totals, worn: Worn) -> Totals:
+        """Return the totals with the volumes and masses of these depths."""
+        sums, pair = totals.sums.copy(), self.system.pair
+        for body, depth, weights, density in zip(
+            ("punch", "strip"),
+            (worn.punch, worn.strip),
+            (pair.weights, pair.strip.weights),
+            self.system.bodies.densities,
+            strict=True,
+        ):
+            area = self.thickness * weights
+            sums[SUMS.index(f"volume_{body}")] = area @ depth
+            mass = np.nan if density is None else float(MILLIGRAM * (area * density) @ depth)
+            sums[SUMS.index(f"mass_{body}")] = mass
+        return Totals(sums, totals.energy, totals.pressure)
+
+
+def parted(steps: Sequence[Steps]) -> Records:
+    """Return the records of half-cycles one after the other."""
+    return Records.joined([one.records for one in steps])

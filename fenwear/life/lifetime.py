@@ -227,7 +227,6 @@ def _run(
 ) -> tuple[Array, dict[int, str]]:
     """Compute what is not done yet; return lives and failures."""
     model = Model(case)
-    model.check_constant()
     lives = np.full(len(design), np.nan)
     failures: dict[int, str] = {}
 

@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, law_named, with_case
-from fenwear.case import Case, Dependence
+from fenwear.case import Case
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
@@ -142,20 +142,14 @@ class Model:
     _courses: dict[tuple[object, ...], Course] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        """Refuse a test program, and laws that change with the run.
+        """Refuse a test program.
 
         Raises:
-            CaseError: the case has one of them.
+            CaseError: the case has one.
         """
         if self.case.program is not None:
             message = "not followed here; expected a case of constant loads and motion, or `run`"
             raise CaseError(InputError("program", message))
-        laws = {"contact.friction": self.case.contact.friction}
-        for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
-            laws[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
-        for key, law in laws.items():
-            if isinstance(law, Dependence) and law.passes:
-                raise CaseError(InputError(key, "depends on the worn depth or the distance slid: not followed here"))
 
     @property
     def warming(self) -> bool:
@@ -165,6 +159,23 @@ class Model:
     def stick_left_out(self) -> list[str]:
         """Return what is to be said of stick that the case leaves out, with an estimate of it."""
         return [] if self.system().sticks else stroke_warnings(self.system())
+
+    def _check_stays(self) -> None:
+        """Refuse laws that change as long as a run goes on where a steady state is asked for.
+
+        Raises:
+            CaseError: there is one.
+        """
+        laws = {"contact.friction": self.case.contact.friction}
+        for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
+            laws[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
+        for key, law in laws.items():
+            if isinstance(law, Dependence) and law.passes:
+                message = (
+                    "depends on the worn depth or the distance slid: it changes as long as a run goes on, so that no "
+                    "steady state exists"
+                )
+                raise CaseError(InputError(key, message))
 
     def check_constant(self) -> None:
         """Refuse properties of the temperature where they are followed in steps.
@@ -240,7 +251,6 @@ class Model:
             CaseError: a value is not possible.
             ConvergenceError: a jump did not converge.
         """
-        self.check_constant()
         system = self.system(values, settings)
         self.evaluations += 1
         strokes, case = system.motion.half_cycles, system.case
@@ -295,6 +305,7 @@ class Model:
             CaseError: a value is not possible.
             ConvergenceError: there is none, or it was not found.
         """
+        self._check_stays()
         system = self.system(values, settings)
         self.evaluations += 1
         if system.sticks:
@@ -309,6 +320,7 @@ class Model:
             ConvergenceError: there is no steady state.
         """
         self.check_constant()
+        self._check_stays()
         system = self._sliding("run_in", values, settings)
         self.evaluations += 1
         state = steady(system)

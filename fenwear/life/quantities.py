@@ -337,7 +337,6 @@ def evaluate(
         state = model.steady(values, settings)
         of_nodes = quantity.name == "contact_width" and state.parts
         return quantity.of_snapshot(state), Path(rough=of_nodes, grain=_grain(quantity, state))
-    model.check_constant()
     distance, period = model.cycle_measures(values, settings)
     if quantity.kind == "whole":
         return _whole(model, quantity, values, settings, distance), Path()

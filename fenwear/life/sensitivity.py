@@ -144,6 +144,8 @@ def sensitivity(
     if not wanted or not found:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))
     model = Model(case)
+    if any(quantity.kind != "steady" for quantity in wanted):
+        model.check_constant()
     bases = everywhere(comm, lambda: [evaluate(model, quantity, {}) for quantity in wanted])
     for quantity, (value, _) in zip(wanted, bases, strict=True):
         if not np.isfinite(value):

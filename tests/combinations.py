@@ -1,0 +1,109 @@
+"""What goes with what: laws of contact, what a case may have, and all that can be asked of it; read by the docs, too.
+
+A cell is closed where physics, or the model, has nothing to say there; its reason is in `CLOSED`. All others are open
+and walked by `test_combinations.py`.
+"""
+
+from __future__ import annotations
+
+LAWS = {"gross sliding": "gross-sliding", "stick (Coulomb)": "coulomb"}
+
+SMALL = (
+    "geometry.parameters.elements_along_contact=8",
+    "geometry.parameters.overlap=0.05",
+    "geometry.follow_wear='never'",
+    "wear={punch={coefficient='1e-7 1/MPa'}}",
+    "run.integration='explicit'",
+    "run.half_cycles=4",
+    "output.report=false",
+)
+STICK = ("stick.steps=4", "stick.step_tolerance=1")
+STEEL = (
+    "poisson=0.3, conductivity='45 W/(m K)', heat_capacity='460 J/(kg K)', density='7800 kg/m^3', "
+    "expansion='1.2e-5 1/K'"
+)
+WARM = (
+    f"materials.steel={{young='200 GPa', {STEEL}}}",
+    "heat={convection='20 W/(m^2 K)', steps=2}",
+    "strip.temperatures=[{on='strip_bottom', temperature='0 K'}]",
+    "motion.period='0.001 s'",
+)
+ONE_WAY = "motion={kind='one-way', direction='rightward', speed='10 mm/s', duration='0.1 s'}"
+
+# What a case may have besides: base, settings.
+FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "in the plane": ("fretting-partial-slip", SMALL),
+    "heat, to and fro": ("fretting-partial-slip", (*SMALL, *WARM)),
+    "heat, one way": ("fretting-partial-slip", (*SMALL, *WARM[:3], ONE_WAY)),
+    "heat on a closed track": (
+        "brake-pad",
+        ("run.half_cycles=4", "output.report=false", "geometry.degree=2", "unset=program"),
+    ),
+    "properties of T": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            *WARM[1:],
+            f"materials.steel={{young={{table=[[0, 2e5], [1e-3, 1.5e5]], of='T'}}, {STEEL}}}",
+            "heat.property_tolerance=0.001",
+        ),
+    ),
+    "friction by p and v": (
+        "fretting-partial-slip",
+        (*SMALL, "contact.friction={expression='0.7 + 1e-5 * p + 0.1 * exp(-v)'}"),
+    ),
+    "wear by p, T and place": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            *WARM,
+            "wear={punch={coefficient={expression='1e-7 * (1 + p / 500 + T / 10 + x ** 2)', unit='1/MPa'}}}",
+        ),
+    ),
+    "wear by depth and distance": (
+        "fretting-partial-slip",
+        (*SMALL, "wear={punch={coefficient={expression='1e-7 * (1 + depth / 1e-6 + s / 0.1)', unit='1/MPa'}}}"),
+    ),
+    "meshes that follow": ("fretting-partial-slip", (*SMALL, "geometry.follow_wear=1e-6")),
+    "both bodies worn": (
+        "fretting-partial-slip",
+        (*SMALL, "wear.strip.coefficient='1e-7 1/MPa'", "motion.positions=3"),
+    ),
+    "in rings": (
+        "ring-on-ring",
+        ("geometry.parameters.across=4", "geometry.degree=2", "run.half_cycles=4", "run.integration='explicit'",
+         "geometry.follow_wear='never'", "output.report=false"),
+    ),
+    "in solids": (
+        "fretting-sphere",
+        ("geometry.parameters.across=4", "geometry.follow_wear='never'", "run.half_cycles=4", "output.report=false",
+         "run.integration='explicit'", "wear={punch={coefficient='1e-7 1/MPa'}}"),
+    ),
+}  # fmt: skip
+
+WAYS = ("march", "jump", "steady", "program", "resume", "ranks", "sweep", "sensitivity", "calibrate", "life")
+
+SLIDES = "what slides one way slips at every node after the first of it: gross sliding is the answer"
+AROUND = "the model of rings has no displacement around the axis, along which they slide"
+PASSES = "changes as long as a run goes on: a cyclic steady state does not exist"
+DEEPENS = "to and fro the track of a strip that wears deepens for ever, most where every position touches"
+STEPS = "taken anew in steps of a run: what comes of it is no smooth function of other keys"
+
+# Closed cells, by feature, law and way; None for all of them.
+CLOSED: dict[tuple[str, str | None, str | None], str] = {
+    ("heat, one way", "stick (Coulomb)", None): SLIDES,
+    ("heat on a closed track", "stick (Coulomb)", None): SLIDES,
+    ("in rings", "stick (Coulomb)", None): AROUND,
+    ("wear by depth and distance", "gross sliding", "steady"): PASSES,
+    ("both bodies worn", "gross sliding", "steady"): DEEPENS,
+    ("properties of T", None, "sensitivity"): STEPS,
+    ("properties of T", None, "calibrate"): STEPS,
+}
+
+
+def closed(feature: str, law: str, way: str) -> str:
+    """Return why a cell is closed; "" where it is open."""
+    for key in ((feature, law, way), (feature, law, None), (feature, None, way), (feature, None, None)):
+        if key in CLOSED:
+            return CLOSED[key]
+    return ""

@@ -1,0 +1,201 @@
+"""Everything goes with everything: each cell of `combinations`, on small cases, held against what must hold there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+import pytest
+from combinations import CLOSED, FEATURES, LAWS, STICK, WAYS, closed
+from mpi4py import MPI
+
+import fenwear
+from fenwear import Case, CaseError, ConvergenceError, assemble, load_case, march, steady
+from fenwear.cycle import Block, evolve
+from fenwear.life import (
+    DataSet,
+    Model,
+    Series,
+    calibrate,
+    evaluate,
+    lifetime,
+    parse_quantity,
+    parse_scatter,
+    sensitivity,
+)
+from fenwear.results.reading import load_history
+from fenwear.run import run_case
+
+KEY = "wear.punch.coefficient"
+
+
+def case_of(feature: str, law: str, *more: str) -> Case:
+    base, settings = FEATURES[feature]
+    stick = STICK if LAWS[law] == "coulomb" else ("stick={}",)
+    return load_case(base, [*settings, f"contact.law='{LAWS[law]}'", *stick, *more])
+
+
+def check(block: Block) -> None:
+    """What is metered is what is worn, nothing is pulled or overlaps, and the loads are carried."""
+    assert block.equilibrium_error.max() < 1e-9
+    assert block.complementarity_error.max() < 1e-5
+    system = block.system
+    if system.sliding.track is None:
+        volume = system.bodies.punch.thickness * float(system.pair.weights @ block.end.worn.punch)
+        followed = 1e-3 if system.bodies.followed is not None else 1e-9
+        assert float(block.totals.of("volume_punch")[-1]) == pytest.approx(volume, rel=followed)
+    if block.heat is not None:
+        assert block.heat.balance_error.max() < 1e-8
+
+
+def marched(feature: str, law: str, _: Path) -> None:
+    """And the work of friction is that of the tractions."""
+    check(list(evolve(assemble(case_of(feature, law)), integration="explicit"))[-1])
+
+
+def jumped(feature: str, law: str, _: Path) -> None:
+    """Jumps come to the depths of a march."""
+    case = case_of(feature, law, "run.half_cycles=12")
+    far = [list(evolve(assemble(case), integration=how, tolerance=1e-3))[-1] for how in ("explicit", "jump")]
+    for block in far:
+        check(block)
+    one, other = (block.end.worn.punch for block in far)
+    weights = far[0].system.pair.weights
+    assert weights @ np.abs(one - other) < 0.1 * float(weights @ one)
+
+
+def steadied(feature: str, law: str, _: Path) -> None:
+    """The end carries the load with pressures that are none of them negative."""
+    system = assemble(case_of(feature, law), heat="reduced")
+    found = steady(system)
+    pressure = getattr(found, "pressures", None)
+    pressure = found.pressure if pressure is None else pressure
+    assert (pressure >= 0).all()
+    forces = pressure @ system.pair.weights
+    assert forces == pytest.approx(np.full(len(pressure), forces[0]), rel=0.05)
+    assert forces[0] > 0
+
+
+def programmed(feature: str, law: str, _: Path) -> None:
+    """Loads are those of its steps."""
+    steps = "program={steps=[{cycles=1}, {cycles=1, load_factor=0.8}]}"
+    system = assemble(case_of(feature, law, steps))
+    block = list(evolve(system, 2 * system.motion.half_cycles))[-1]
+    check(block)
+    assert block.load_factor[-1] == pytest.approx(0.8)
+
+
+def resumed(feature: str, law: str, folder: Path) -> None:
+    """A run in parts ends where one in one piece does."""
+
+    def run(name: str, count: int, *, resume: bool = False) -> None:
+        case = case_of(feature, law, f"run.half_cycles={count}")
+        run_case(case, name, folder / name, lambda _: None, progress="none", resume=resume)
+
+    run("whole", 4)
+    run("parts", 2)
+    run("parts", 4, resume=True)
+    one, other = (load_history(folder / name) for name in ("whole", "parts"))
+    assert one.sizes == other.sizes
+    for name in ("pressure", "wear", "friction_work", "normal_force", "max_temperature"):
+        if name in one:
+            scale = np.abs(one[name].values).max()
+            assert np.abs(one[name].values - other[name].values).max() <= 1e-9 * scale, name
+
+
+def swept(feature: str, law: str, _: Path) -> None:
+    """Variants are what their cases give alone."""
+    case = case_of(feature, law)
+    found = fenwear.sweep(case, {"run.half_cycles": [2, 4]}, of="run")
+    alone = list(evolve(assemble(case, MPI.COMM_SELF)))[-1]
+    assert float(found["worn_volume"][1]) == pytest.approx(float(alone.totals.of("volume_punch")[-1]), rel=1e-9)
+    assert float(found["worn_volume"][0]) < float(found["worn_volume"][1])
+
+
+def unknown_of(case: Case) -> str:
+    """Return a key that the worn volume depends on smoothly."""
+    law = case.wear.punch
+    return KEY if law is not None and isinstance(law.coefficient, float) else "motion.amplitude"
+
+
+def differentiated(feature: str, law: str, _: Path) -> None:
+    """The volume goes with the coefficient, where so little is worn."""
+    case = case_of(feature, law)
+    (found,) = sensitivity(case, ["volume after 2 cycles"], [unknown_of(case)], spread=0, comm=MPI.COMM_SELF)
+    elasticity = found.derivatives[0].elasticity
+    if unknown_of(case) == KEY:
+        assert elasticity == pytest.approx(1.0, abs=0.02)
+    else:
+        assert elasticity > 0.9
+
+
+def fitted(feature: str, law: str, _: Path) -> None:
+    """Volumes of the model give the value that they were made with."""
+    case = case_of(feature, law)
+    key, model, cycles = unknown_of(case), Model(case), (2.0, 4.0)
+    made = float(model_value(case, key))
+    volumes = [evaluate(model, parse_quantity(f"volume after {n:g} cycles"), {key: made})[0] for n in cycles]
+    series = Series(
+        "volume", "punch", None, np.array(cycles), "cycles", np.array(volumes), 1e-3 * np.array(volumes), (1, 2)
+    )
+    start = case_of(feature, law, f"{key}={1.1 * made!r}")
+    assert calibrate(start, [DataSet("twin", (), (series,))], [key]).values[key] == pytest.approx(made, rel=1e-4)
+
+
+def model_value(case: Case, key: str) -> float:
+    return float(reduce(getattr, key.split("."), case))
+
+
+def lived(feature: str, law: str, _: Path) -> None:
+    """Lives to a volume scatter as what wears does."""
+    case = case_of(feature, law)
+    key = unknown_of(case)
+    made = model_value(case, key)
+    level = evaluate(Model(case), parse_quantity("volume after 4 cycles"), {key: made})[0]
+    found = lifetime(case, f"volume {level!r} mm^3", parse_scatter(case, f"{key}=lognormal({made!r}, 5 %)"), samples=4,
+                     comm=MPI.COMM_SELF)  # fmt: skip
+    assert not found.failures
+    assert found.lives == pytest.approx(np.full(4, 4.0), rel=0.4)
+    order = np.argsort(found.samples[:, 0])
+    assert (np.diff(found.lives[order]) < 0).all(), "what wears more lives less"
+
+
+WALKED: dict[str, Callable[[str, str, Path], None]] = {
+    "march": marched,
+    "jump": jumped,
+    "steady": steadied,
+    "program": programmed,
+    "resume": resumed,
+    "sweep": swept,
+    "sensitivity": differentiated,
+    "calibrate": fitted,
+    "life": lived,
+}
+CELLS = [(feature, law, way) for feature in FEATURES for law in LAWS for way in WAYS]
+OPEN = [cell for cell in CELLS if not closed(*cell)]
+
+
+@pytest.mark.parametrize(("feature", "law", "way"), [cell for cell in OPEN if cell[2] != "ranks"])
+def test_what_goes_with_what(feature: str, law: str, way: str, tmp_path: Path) -> None:
+    """Every open cell of the table."""
+    WALKED[way](feature, law, tmp_path)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("feature", "law"), [cell[:2] for cell in OPEN if cell[2] == "ranks"])
+def test_on_ranks(feature: str, law: str) -> None:
+    """All ranks come to what one comes to."""
+    case = case_of(feature, law)
+    together, alone = (list(march(assemble(case, comm), 2))[-1] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    assert np.abs(together.pressure - alone.pressure).max() < 1e-9 * alone.pressure.max()
+    assert np.abs(together.wear - alone.wear).max() < 1e-9 * alone.wear.max()
+
+
+@pytest.mark.parametrize("cell", list(CLOSED))
+def test_what_is_closed_is_refused_with_a_reason(cell: tuple[str, str | None, str | None], tmp_path: Path) -> None:
+    """No closed cell gives a number: an error says why."""
+    feature, law, way = cell
+    with pytest.raises((CaseError, ConvergenceError)):
+        WALKED[way or "march"](feature, law or "gross sliding", tmp_path)

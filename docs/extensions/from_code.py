@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from importlib import import_module
 from typing import Any, ClassVar
 
 import typer
@@ -173,6 +174,29 @@ class Geometries(Written):
                 yield from _table(("parameter", "default", "meaning"), ((_code(n), v, _plain(m)) for n, v, m in rows))
 
 
+class Combinations(Written):
+    """What goes with what, from the list that a test walks."""
+
+    def lines(self) -> Iterable[str]:
+        """Return one table, and the reasons of its closed cells below it."""
+        listed = import_module("combinations")
+        reasons: list[str] = []
+
+        def cell(feature: str, law: str, way: str) -> str:
+            reason = listed.closed(feature, law, way)
+            if reason and reason not in reasons:
+                reasons.append(reason)
+            return f"{reasons.index(reason) + 1}" if reason else "✓"
+
+        rows = [
+            [f"{_plain(feature)}; {law}", *(cell(feature, law, way) for way in listed.WAYS)]
+            for feature in listed.FEATURES
+            for law in listed.LAWS
+        ]
+        yield from _table(("", *listed.WAYS), rows)
+        yield from (f"{number}. {_plain(reason)}" for number, reason in enumerate(reasons, 1))
+
+
 class Verification(Written):
     """The problems that `fenwear verify` solves."""
 
@@ -229,6 +253,7 @@ def setup(app: Any) -> dict[str, bool]:
         ("commands", Commands),
         ("results", Results),
         ("cases", Cases),
+        ("combinations", Combinations),
         ("geometries", Geometries),
         ("verification", Verification),
     ):

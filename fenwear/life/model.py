@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, law_named, with_case
-from fenwear.case import Case
+from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined

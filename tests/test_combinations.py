@@ -81,7 +81,8 @@ def steadied(feature: str, law: str, _: Path) -> None:
 def programmed(feature: str, law: str, _: Path) -> None:
     """Loads are those of its steps."""
     steps = "program={steps=[{cycles=1}, {cycles=1, load_factor=0.8}]}"
-    system = assemble(case_of(feature, law, steps))
+    one_way = feature in ("heat, one way", "heat on a closed track", "in rings")
+    system = assemble(case_of(feature, law, f"run.half_cycles={2 if one_way else 4}", steps))
     block = list(evolve(system, 2 * system.motion.half_cycles))[-1]
     check(block)
     assert block.load_factor[-1] == pytest.approx(0.8)
@@ -123,7 +124,7 @@ def unknown_of(case: Case) -> str:
 def differentiated(feature: str, law: str, _: Path) -> None:
     """The volume goes with the coefficient, where so little is worn."""
     case = case_of(feature, law)
-    (found,) = sensitivity(case, ["volume after 2 cycles"], [unknown_of(case)], spread=0, comm=MPI.COMM_SELF)
+    (found,) = sensitivity(case, ["volume after 1 cycles"], [unknown_of(case)], spread=0, comm=MPI.COMM_SELF)
     elasticity = found.derivatives[0].elasticity
     if unknown_of(case) == KEY:
         assert elasticity == pytest.approx(1.0, abs=0.02)
@@ -132,16 +133,16 @@ def differentiated(feature: str, law: str, _: Path) -> None:
 
 
 def fitted(feature: str, law: str, _: Path) -> None:
-    """Volumes of the model give the value that they were made with."""
+    """Volumes of the model give the value that they were made with, to a few of their own errors."""
     case = case_of(feature, law)
-    key, model, cycles = unknown_of(case), Model(case), (2.0, 4.0)
+    key, model, cycles = unknown_of(case), Model(case), (1.0, 2.0)
     made = float(model_value(case, key))
     volumes = [evaluate(model, parse_quantity(f"volume after {n:g} cycles"), {key: made})[0] for n in cycles]
     series = Series(
         "volume", "punch", None, np.array(cycles), "cycles", np.array(volumes), 1e-3 * np.array(volumes), (1, 2)
     )
     start = case_of(feature, law, f"{key}={1.1 * made!r}")
-    assert calibrate(start, [DataSet("twin", (), (series,))], [key]).values[key] == pytest.approx(made, rel=1e-4)
+    assert calibrate(start, [DataSet("twin", (), (series,))], [key]).values[key] == pytest.approx(made, rel=5e-3)
 
 
 def model_value(case: Case, key: str) -> float:
@@ -153,11 +154,11 @@ def lived(feature: str, law: str, _: Path) -> None:
     case = case_of(feature, law)
     key = unknown_of(case)
     made = model_value(case, key)
-    level = evaluate(Model(case), parse_quantity("volume after 4 cycles"), {key: made})[0]
+    level = evaluate(Model(case), parse_quantity("volume after 2 cycles"), {key: made})[0]
     found = lifetime(case, f"volume {level!r} mm^3", parse_scatter(case, f"{key}=lognormal({made!r}, 5 %)"), samples=4,
                      comm=MPI.COMM_SELF)  # fmt: skip
     assert not found.failures
-    assert found.lives == pytest.approx(np.full(4, 4.0), rel=0.4)
+    assert found.lives == pytest.approx(np.full(4, 2.0), rel=0.4)
     order = np.argsort(found.samples[:, 0])
     assert (np.diff(found.lives[order]) < 0).all(), "what wears more lives less"
 
@@ -177,7 +178,16 @@ CELLS = [(feature, law, way) for feature in FEATURES for law in LAWS for way in 
 OPEN = [cell for cell in CELLS if not closed(*cell)]
 
 
-@pytest.mark.parametrize(("feature", "law", "way"), [cell for cell in OPEN if cell[2] != "ranks"])
+# A calibration is several runs and a run with heat many small steps: they are walked at length.
+LONG = {"calibrate", "sensitivity", "life"}
+WALKS = [
+    pytest.param(*cell, marks=pytest.mark.slow if cell[2] in LONG or cell[0] != "in the plane" else ())
+    for cell in OPEN
+    if cell[2] != "ranks"
+]
+
+
+@pytest.mark.parametrize(("feature", "law", "way"), WALKS)
 def test_what_goes_with_what(feature: str, law: str, way: str, tmp_path: Path) -> None:
     """Every open cell of the table."""
     WALKED[way](feature, law, tmp_path)

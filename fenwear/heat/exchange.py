@@ -21,7 +21,7 @@ which is the L-stable, singly diagonally implicit Runge-Kutta rule of second ord
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
@@ -43,6 +43,7 @@ T = TypeVar("T")
 STAGE = 1 - 1 / np.sqrt(2)  # gamma: of a time step, how long each of its two stages is
 EARLIER = (1 - STAGE) / STAGE  # r: how often the first one counts
 FEW = 300  # contact nodes up to which fluxes are worth a matrix
+AT_ONCE = 8  # columns of coordinates that are kept for the balance of heat
 LEAST = 12  # flux maps that are kept: of the steps of two phases and more
 MEMORY = 2 * 10**8  # bytes that kept flux maps may take
 # What elements and a small basis may add to the heat of a half-cycle, as shares of friction's and of what is there.
@@ -266,18 +267,28 @@ class HeatExchange:
             sources: Whether there is more than changes.
         """
         terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
-        before = self._balances(values, sources=sources)
-        surfaces = None
+        heated: Array = np.zeros_like(pressure)
+        entered: Array = np.zeros_like(pressure)
+        surfaces, spans = None, []
         for plan in self.plans[phase]:
             kinds = (plan.punch, plan.strip)
             heat = (self.friction[phase] * plan.speed * pressure.T).T
+            starts: Array = np.zeros_like(values)
+            reached: Array = np.zeros_like(values)
             for counts in self._stages:
                 ends, fluxes, _ = self._stage(kinds, values, heat, conductance, sources=sources)
-                after = self._balances(ends, sources=sources)
-                one = self._led(partial(self._account, kinds, heat, fluxes, before, after, sources=sources))
-                terms += counts * one
+                starts += counts * values
+                reached += counts * ends
+                heated += counts * heat
+                entered += counts * (fluxes[0] + fluxes[1])
                 values = values + counts * (ends - values)
-                before = [a + counts * (b - a) for a, b in zip(before, after, strict=True)]
+            spans.append((kinds, starts, reached))
+            if len(spans) * pressure[:1].size >= AT_ONCE:
+                terms += self._kept(spans, sources=sources)
+                spans = []
+        if spans:
+            terms += self._kept(spans, sources=sources)
+        terms += self._made(heated, entered)
         if sources and any(side.field.contact_responses is not None for side in self.sides):
             surfaces = self._read(phase, values, fluxes)
         return values, terms, surfaces
@@ -328,9 +339,8 @@ class HeatExchange:
             for side, kind, part in zip(self.sides, kinds, free, strict=True)
         ]
         ambient = self.heat.ambient if sources else 0.0
-        fluxes = self._led(
-            lambda: np.split(self._flux_map(kinds, conductance).of(np.concatenate(bare), heat, ambient), 2)
-        )
+        both = self._led(lambda: self._flux_map(kinds, conductance).of(np.concatenate(bare), heat, ambient))
+        fluxes = [both[: len(heat)], both[len(heat) :]]
         if further is not None:
             fluxes = [q + part for q, part in zip(fluxes, np.split(further, 2), strict=True)]
         ends = [
@@ -389,31 +399,69 @@ class HeatExchange:
                 values, changes = (a + counts * (b - a) for a, b in ((values, ends), (changes, after)))
         return changes
 
+    def _kept(self, spans: Sequence[tuple[tuple[int, int], Array, Array]], *, sources: bool) -> Array:
+        """Return the terms of what bodies have kept or lost in steps, per thickness; of a steady state a second.
+
+        Args:
+            spans: The steps: which prepared one each body takes, and the coordinates at the start and at the end of
+                its stages, summed as often as each counts.
+            sources: Whether there is more than changes.
+        """
+        starts, reached = (self._summed([span[k] for span in spans], sources=sources) for k in (1, 2))
+        counted = sources * sum(self._stages)
+        return self._led(partial(self._account, [span[0] for span in spans], starts, reached, counted))
+
+    def _summed(self, values: Sequence[Array], *, sources: bool) -> list[Array]:
+        """Return what enters the balance of both bodies (rows, steps) or (rows, steps, k), from sums over stages."""
+        found = []
+        for side, part in zip(self.sides, self._parts(np.stack(values, axis=1)), strict=True):
+            rows = side.balance.of_changes(part.reshape(len(part), -1))
+            rows = rows.reshape(len(rows), *part.shape[1:])
+            if sources:
+                rows = rows + sum(self._stages) * _down(rows.ndim - 1, side.balance.constant)
+            found.append(rows)
+        return found
+
     def _account(
-        self,
-        kinds: tuple[int, int],
-        heat: Array,
-        fluxes: list[Array],
-        before: list[Array],
-        after: list[Array],
-        *,
-        sources: bool,
+        self, taken: Sequence[tuple[int, int]], before: Sequence[Array], after: Sequence[Array], counted: float
     ) -> Array:
-        """Return the terms of a stage's heat, per thickness; of a steady state per second."""
-        friction = self.weights @ heat
-        debris = self.heat.debris * friction
-        # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
-        convected = friction - debris - self.weights @ (fluxes[0] + fluxes[1])
-        stored, held, carried = 0.0, 0.0, 0.0
-        for side, k, a, b in zip(self.sides, kinds, after, before, strict=True):
-            stored = stored + (a[0] - b[0]) / self.duration
-            convected = convected + a[1] - sources * side.ambient_loss
-            held = held - (a[2 + 3 * k] - b[3 + 3 * k] - sources * side.held_source[k])
-            carried = carried + a[4 + 3 * k] - sources * side.brought[k]
+        """Return these terms from the rows of the balances.
+
+        Args:
+            taken: Which prepared step each body takes in each step.
+            before, after: Of both bodies, at the start and at the end of the stages, of `_summed`.
+            counted: How often the constant parts of a stage count in a step; 0 for changes.
+        """
+        stored, convected, held, carried = (np.zeros(after[0].shape[2:]) for _ in range(4))
+        every = np.arange(len(taken))
+        for side, kinds, a, b in zip(self.sides, np.transpose(taken), after, before, strict=True):
+            stored = stored + (a[0] - b[0]).sum(axis=0) / self.duration
+            convected = convected + a[1].sum(axis=0) - counted * len(taken) * side.ambient_loss
+            held = held - (a[2 + 3 * kinds, every] - b[3 + 3 * kinds, every]).sum(axis=0)
+            held = held + counted * sum(side.held_source[k] for k in kinds)
+            carried = carried + a[4 + 3 * kinds, every].sum(axis=0) - counted * sum(side.brought[k] for k in kinds)
             if side.gives_back:
-                convected = convected - a[k - len(side.contacts)]
-        seconds = 1.0 if np.isinf(self.duration) else self.duration
-        return np.array([friction, debris, stored, convected, held, carried]) * seconds
+                convected = convected - a[kinds - len(side.contacts), every].sum(axis=0)
+        none = np.zeros_like(stored)
+        return np.array([none, none, stored, convected, held, carried]) * self._seconds
+
+    def _made(self, heat: Array, entered: Array) -> Array:
+        """Return the terms of the heat made at the contact, per thickness; of a steady state a second.
+
+        Args:
+            heat: Of friction, summed over all stages as often as each counts (n,) or (n, k), mW/mm².
+            entered: The fluxes into both bodies alike.
+        """
+        friction = self.weights @ heat
+        debris, none = self.heat.debris * friction, np.zeros_like(friction)
+        # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
+        lost = friction - debris - self.weights @ entered
+        return np.array([friction, debris, none, lost, none, none]) * self._seconds
+
+    @property
+    def _seconds(self) -> float:
+        """Of a stage; of a steady state one."""
+        return 1.0 if np.isinf(self.duration) else self.duration
 
     def step_map(self, kinds: tuple[int, int], conductance: Array) -> StepMap:
         """Return what a step does to the coordinates; for both on a small basis.
@@ -454,3 +502,8 @@ class HeatExchange:
         first, second = (responses[k] for responses, k in zip(self._contact_responses, kinds, strict=True))
         heat = self.heat
         return Exchanged((first, second), conductance, heat.convection, heat.partition, heat.debris)
+
+
+def _down(further: int, constants: Array) -> Array:
+    """Return constants (rows,) for arrays with so many further dimensions."""
+    return constants.reshape(-1, *(1,) * further)

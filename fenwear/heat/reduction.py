@@ -142,14 +142,26 @@ class _Growing:
         uniform: Array = np.ones((body.owned, 1))
         uniform[body.held] = 0.0
         stored = _gram(body, uniform)[0, 0]
-        self._uniform: Array = uniform / np.sqrt(stored) if stored > 0 else uniform[:, :0]
-        self._room, self._filled = np.array(self._uniform, order="F"), self._uniform.shape[1]
+        self._first = int(stored > 0)  # how many columns the uniform temperature has: none where it is held everywhere
+        column = uniform[:, : self._first] / np.sqrt(stored if stored > 0 else 1.0)
+        self._room = np.array(column, order="F")
+        self._stored_room = np.array(body.store(column), order="F")  # M V: so nothing else is multiplied by M
+        self._filled = self._first
         self._added: list[Array] = []  # in coordinates of the basis as it was then
 
     @property
     def columns(self) -> Array:
-        """The basis (owned, dim)."""
+        """The basis V (owned, dim)."""
         return self._room[:, : self._filled]
+
+    @property
+    def _stored(self) -> Array:
+        """M V (owned, dim)."""
+        return self._stored_room[:, : self._filled]
+
+    def _coordinates(self, fields: Array) -> Array:
+        """Return V^T M times fields (owned, k), (dim, k)."""
+        return total(self.body.body.mesh.comm, self._stored.T @ fields)
 
     def add(self, fields: Array, tolerance: float) -> bool:
         """Add the principal parts of fields (owned, k) beside the basis, down to a share of the largest ever.
@@ -162,7 +174,7 @@ class _Growing:
         self._largest = max(self._largest, largest)
         self._append(rest @ (parts / values))
         if self._later is None:
-            self._added.append(total(self.body.body.mesh.comm, self.columns.T @ self.body.store(fields)))
+            self._added.append(self._coordinates(fields))
         return len(values) > 0
 
     def follow(self, step: HeatStep, fluxes: Array, passes: int, tolerance: float) -> bool:
@@ -180,7 +192,7 @@ class _Growing:
 
     def compress(self, tolerance: float) -> None:
         """Keep the principal parts of all that was added, and the uniform temperature; of fields as they are."""
-        dim, first = self.columns.shape[1], self._uniform.shape[1]
+        dim, first = self._filled, self._first
         if dim == first:
             return
         added = np.hstack([np.pad(one, ((0, dim - len(one)), (0, 0))) for one in self._added])[first:]
@@ -210,8 +222,9 @@ class _Growing:
     def _beside(self, fields: Array) -> Array:
         """Return fields without what the basis has of them; first without the uniform one, which may be far larger."""
         comm = self.body.body.mesh.comm
-        for columns in (self._uniform, self.columns):
-            fields = fields - columns @ total(comm, columns.T @ self.body.store(fields))
+        for some in (slice(self._first), slice(self._filled)):
+            columns, stored = self._room[:, some], self._stored_room[:, some]
+            fields = fields - columns @ total(comm, stored.T @ fields)
         return fields
 
     def _append(self, fields: Array) -> None:
@@ -225,11 +238,19 @@ class _Growing:
                 return
             fields = self._beside(fields @ _orthogonal(self.body, fields))
         before, self._filled = self._filled, self._filled + fields.shape[1]
-        if self._filled > self._room.shape[1]:
-            room: Array = np.empty((len(fields), self._filled + before // 2), order="F")
-            room[:, :before] = self._room[:, :before]
-            self._room = room
-        self._room[:, before : self._filled] = fields
+        self._room = _with_room(self._room, before, fields)
+        self._stored_room = _with_room(self._stored_room, before, self.body.store(fields))
+
+
+def _with_room(columns: Array, filled: int, more: Array) -> Array:
+    """Return columns of which so many are filled, with more after these, and room for half as many again."""
+    after = filled + more.shape[1]
+    if after > columns.shape[1]:
+        larger: Array = np.empty((len(more), after + filled // 2), order="F")
+        larger[:, :filled] = columns[:, :filled]
+        columns = larger
+    columns[:, filled:after] = more
+    return columns
 
 
 def _lasting_fluxes(

@@ -36,8 +36,14 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "heat, to and fro": ("fretting-partial-slip", (*SMALL, *WARM)),
     "heat, one way": ("fretting-partial-slip", (*SMALL, *WARM[:3], ONE_WAY)),
     "heat on a closed track": (
-        "brake-pad",
-        ("run.half_cycles=4", "output.report=false", "geometry.degree=2"),
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            WARM[0],
+            "heat={convection='20 W/(m^2 K)', steps=2, track={heat_capacity='0.01 J/K', loss='0.001 W/K'}}",
+            WARM[2],
+            ONE_WAY,
+        ),
     ),
     "properties of T": (
         "fretting-partial-slip",

@@ -91,12 +91,16 @@ class TrackField:
         read = total(comm, section.leaving.T @ np.column_stack([columns, lift - reference]))
         lost = np.tile(np.append(np.zeros(modes), self.loss / CELLS * (reference - body.heat.ambient)), CELLS)
         self._couplings: list[_Coupling] = []
+        self._kept: list[Array] = []  # of what enters, where temperatures are held: it warms nothing (m + 1,), in steps
         self.responses: Sequence[Array] = []
         found = []
         for step, velocity, answers in zip(steps, speeds, inner.responses, strict=True):
             speed, stays, own = abs(velocity), self.capacity / CELLS / duration, answers[:, : -self._inlets]
             carried = total(comm, np.append(step.carried @ columns, step.carried @ lift))
             flow = float(total(comm, np.array(step.entering.sum())))
+            held = step.is_held
+            kept = np.append(speed * section.entering[held].sum(axis=0), step.entering[held].sum())
+            self._kept.append(total(comm, kept))
             leaves = np.vstack([speed * read[:, :-1], carried[:-1]])
             constant = -lost
             constant[: self._inlets] += np.append(speed * read[:, -1], carried[-1] - flow * reference)
@@ -129,6 +133,8 @@ class TrackField:
         for row, value in ((0, self.capacity), (1, self.loss)):
             rows[row, len(self.inner.basis) :].reshape(CELLS, -1)[:, -1] += value / CELLS
             constant[row] += value * reference
+        for step, kept in enumerate(self._kept):
+            rows[2 + 3 * step, -self._inlets :] -= kept
         rows[4::3], constant[4::3] = 0.0, 0.0
         return replace(
             side,

@@ -97,7 +97,7 @@ def growth_rate(
 
     Raises:
         CaseError: a coefficient is negative or not finite there.
-        ConvergenceError: friction and the temperatures that it depends on do not come together.
+        ConvergenceError: friction and the temperatures that it depends on do not come together, or numbers overflow.
     """
     if system.passing_laws:
         raise CaseError(
@@ -118,6 +118,10 @@ def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | Non
         state = states[phase] if states else None
         tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit)
         cycle = tangent @ cycle
+    if not np.isfinite(cycle).all():
+        raise ConvergenceError(
+            "what disturbances become in a cycle is beyond all numbers: wear, heat or load are too large"
+        )
     values = np.linalg.eigvals(cycle)
     counted = np.abs(values - 1.0) > NEUTRAL
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)

@@ -43,6 +43,7 @@ from fenwear.sliding.field import ALONG_X, SlidingField
 
 PREFIX = "fenwear_heat_"
 FREE, CONTACT, HELD = 1, 2, 3
+END = 0.3  # cosine of the angle between v and n: below, a boundary of what turns is a chord of its round side, no end
 CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
 LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made again with pivoting
 
@@ -313,6 +314,15 @@ class _Flow:
         body, w = self.body, ufl.TestFunction(self.body.space)
         return assembled_vector(body._dx(body.law.capacity * ufl.dot(self.velocity, ufl.grad(w))))
 
+    def entering(self, v: Any) -> Any:
+        """Return -v . n where material enters by an end of the mesh, else 0: of UFL, for v along `velocity`.
+
+        A round side turns in its place, though one half of each of its chords takes in what the other lets out.
+        """
+        through = ufl.dot(v, ufl.FacetNormal(self.body.body.mesh))
+        least = END * ufl.sqrt(ufl.dot(v, v)) if self.turns else 0.0
+        return ufl.conditional(ufl.lt(through, -least), -through, 0.0)
+
     @cached_property
     def forms(self) -> _StepForms:
         """The forms of a step."""
@@ -329,7 +339,7 @@ class _Flow:
         tau = self._supg_time(v)
         upwind = tau * ufl.dot(v, ufl.grad(w))
         advected = ufl.dot(v, ufl.grad(theta))
-        entering = rho_c * renewed * ufl.max_value(-ufl.dot(v, ufl.FacetNormal(domain)), 0)  # heat capacity a second
+        entering = rho_c * renewed * self.entering(v)  # heat capacity a second
         conducted = law.flux(theta)
         residual = rho_c * (rate * theta + advected) + _divergence(conducted, body.kind) + faces * theta
         a = r * (rho_c * (rate * theta + advected) * w - ufl.inner(conducted, ufl.grad(w))) * dx

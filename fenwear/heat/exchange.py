@@ -407,7 +407,8 @@ class HeatExchange:
                 its stages, summed as often as each counts.
             sources: Whether there is more than changes.
         """
-        starts, reached = (self._summed([span[k] for span in spans], sources=sources) for k in (1, 2))
+        starts = self._summed([start for _, start, _ in spans], sources=sources)
+        reached = self._summed([end for _, _, end in spans], sources=sources)
         counted = sources * sum(self._stages)
         return self._led(partial(self._account, [span[0] for span in spans], starts, reached, counted))
 

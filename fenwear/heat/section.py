@@ -28,7 +28,6 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import ZERO, in_space
 from fenwear.sliding.field import SlidingField
 
-STEEP = 0.7  # cosine of the angle between v and n: below, a free boundary is no end, but a chord of a round side
 ROUNDING = 1e-9  # of the largest capacity
 MOST = 100  # modes
 NOTED = 1e-2  # of the contact's rise
@@ -74,10 +73,7 @@ def section_modes(body: HeatBody, sliding: SlidingField, way: float, until_back:
     flow = body.flow(sliding)
     domain, law = body.body.mesh, body.law
     n, u, w = ufl.FacetNormal(domain), ufl.TrialFunction(body.space), ufl.TestFunction(body.space)
-    through = way * ufl.dot(flow.velocity, n)
-    size = ufl.sqrt(ufl.dot(flow.velocity, flow.velocity))
-    into = ufl.conditional(ufl.lt(through, -STEEP * size), -through, 0.0)
-    out = ufl.conditional(ufl.gt(through, STEEP * size), through, 0.0)
+    into, out = flow.entering(way * flow.velocity), flow.entering(-way * flow.velocity)
 
     def along(theta: object) -> object:
         return ufl.grad(theta) - n * ufl.dot(n, ufl.grad(theta))

@@ -19,7 +19,8 @@ from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.heat.field import ReducedField
 from fenwear.heat.material import ConductionLaw
 from fenwear.heat.reduction import reduced_basis
-from fenwear.heat.track import TrackField
+from fenwear.heat.section import section_modes
+from fenwear.heat.track import CELLS, TrackField
 from fenwear.sliding.field import SlidingField
 
 K, RHO_C = 3.0, 2.0
@@ -161,7 +162,7 @@ def test_a_turning_disc() -> None:
 
 
 def test_half_a_disc_and_the_rest_of_its_track() -> None:
-    """A spot heats a whole turning ring, or half of it whose other half is a bulk: the same, at a low Biot number.
+    """A spot heats a whole turning ring, or half of it whose other half is a bulk: the same.
 
     A turn lasts as long as heat takes through the section. What both have stored is the same, to rounding.
     """
@@ -174,11 +175,14 @@ def test_half_a_disc_and_the_rest_of_its_track() -> None:
     heating = turning.respond(loads[0][:, None])[:, 0]
     passing = Surroundings(renewed=True, sliding=TURNING)
     step = half.step(speed, duration, passing)
-    inflow = np.column_stack([loads[1], step.entering])
-    basis = reduced_basis(half, inflow, [speed], duration, 1e-7, passing)
     capacities = [comm.allreduce(body.storage.sum()) for body in (whole, half)]
     rest = Track(heat_capacity=capacities[0] - capacities[1])
-    track = TrackField(ReducedField([step], inflow, basis), [step], [1.0], duration, rest, 1.0)
+    section = section_modes(half, TURNING, 1.0, rest.heat_capacity / comm.allreduce(step.entering.sum()))
+    inflow = np.column_stack([loads[1], section.entering, step.entering / speed])
+    basis = reduced_basis(half, inflow, [speed], duration, 1e-7, passing)
+    kelvins = np.ones(inflow.shape[1] - 1)
+    reduced = ReducedField([step], inflow, basis)
+    track = TrackField(reduced, [step], [speed], kelvins, duration, rest, section, 1.0)
     theta, coordinates = whole.initial(), track.basis.coordinates(half.initial())
     for _ in range(count):
         theta = turning.advance(theta) + heating
@@ -186,11 +190,15 @@ def test_half_a_disc_and_the_rest_of_its_track() -> None:
     on_half = track.basis.temperature(coordinates)
     stored = comm.allreduce(whole.storage @ theta)
     of_half = comm.allreduce(half.storage @ on_half)
-    assert of_half + rest.heat_capacity * coordinates[-1] == pytest.approx(stored, rel=1e-9)
+    bulks = coordinates[len(reduced.basis) :].reshape(CELLS, -1)[:, -1]
+    assert of_half + rest.heat_capacity * bulks.mean() == pytest.approx(stored, rel=1e-9)
     mean = stored / capacities[0]
     found, exact = half.contact(on_half), whole.contact(theta)
     same = np.linalg.norm(whole.surface.x[None] - half.surface.x[:, None], axis=2).argmin(axis=1)
     spot = exact.max() - mean
     assert spot < 0.35 * mean
-    assert found.max() - mean == pytest.approx(spot, rel=0.02)
-    np.testing.assert_allclose(found, exact[same], rtol=0, atol=0.1 * spot)
+    assert found.max() - mean == pytest.approx(spot, rel=0.01)
+    off = np.abs(found - exact[same])
+    leaving = half.surface.x[:, 1] > 0.99 * np.hypot(*half.surface.x[:, :2].T)  # the whole ring conducts on beyond
+    assert off[~leaving].max() < 0.02 * spot
+    assert off.max() < 0.05 * spot

@@ -161,7 +161,7 @@ class _Growing:
 
     def _coordinates(self, fields: Array) -> Array:
         """Return V^T M times fields (owned, k), (dim, k)."""
-        return total(self.body.body.mesh.comm, self._stored.T @ fields)
+        return total(self.body.body.mesh.comm, self._stored.T @ np.asfortranarray(fields))
 
     def add(self, fields: Array, tolerance: float) -> bool:
         """Add the principal parts of fields (owned, k) beside the basis, down to a share of the largest ever.
@@ -222,6 +222,7 @@ class _Growing:
     def _beside(self, fields: Array) -> Array:
         """Return fields without what the basis has of them; first without the uniform one, which may be far larger."""
         comm = self.body.body.mesh.comm
+        fields = np.asfortranarray(fields)  # one layout, whoever has made them: the same bits on any number of ranks
         for some in (slice(self._first), slice(self._filled)):
             columns, stored = self._room[:, some], self._stored_room[:, some]
             fields = fields - columns @ total(comm, stored.T @ fields)

@@ -322,8 +322,6 @@ def test_refused(edited: Edited) -> None:
     warm = edited("example1-heat", softening, *SMALL)
     with pytest.raises(ConvergenceError, match=r"where materials.composite.young depends on the temperature"):
         monotonic(assemble(warm, heat="none"))
-    with pytest.raises(CaseError, match=r"materials.composite.young: depends on the temperature, and is taken anew"):
-        evaluate(Model(warm), parse_quantity("depth after 10 cycles"), {})
     sinking = edited("example1-heat", composite(conductivity={"expression": "5 - 0.5 * T"}), *SMALL)
     with pytest.raises(CaseError, match=r"composite.conductivity: expected more than zero, got -"):
         marched(assemble(sinking), 40)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fenwear import Case, CaseError, load_case
+from fenwear import Case, CaseError, load_case, make_case
+from fenwear.case.templates import fill_in, find_template
 from fenwear.life import (
     DataSet,
     LeastSquares,
@@ -67,6 +69,25 @@ def test_volumes_of_a_ring_give_the_coefficient_that_made_them(small: Callable[.
     data = volumes(list(after), list(exact), list(0.01 * exact))
     data = DataSet("ring", (), (Series(**{**vars(data.series[0]), "body": "strip"}),))
     assert calibrate(case, [data], [key]).values[key] == pytest.approx(made, rel=1e-3)  # the facets are chords
+
+
+@pytest.mark.slow
+def test_volumes_of_a_worn_bushing_give_the_coefficient() -> None:
+    """Of a stiff bushing, worn in to psi to each side of the load: k P s / (R D) = psi / cos psi - sin psi.
+
+    The worn area is 2 (tan psi - psi) R D, 1.03 to 1.06 k P s.
+    """
+    data = tomllib.loads(fill_in(find_template("bushing"), ["clearance=0.1 mm", "load=1000 N", "revolutions=6000"]))
+    data["contact"]["friction"], data["wear"]["punch"]["coefficient"] = 0.0, 2e-8
+    data["geometry"]["parameters"]["elements_along_contact"] = 30
+    for material in data["materials"].values():
+        material["young"] = 2e8
+    radius, clearance, load, length, made = 10.0, 0.05, 50.0, 20.0, 1e-8
+    psi = np.radians([30.0, 37.0, 44.0])
+    slid = (psi / np.cos(psi) - np.sin(psi)) * radius * clearance / (made * load)
+    exact = 2 * (np.tan(psi) - psi) * radius * clearance * length
+    found = calibrate(make_case(data), [volumes(slid / (2 * np.pi * radius), exact, 0.01 * exact)], [K])
+    assert found.values[K] == pytest.approx(made, rel=5e-4)
 
 
 @pytest.mark.slow

@@ -196,8 +196,12 @@ def test_what_goes_with_what(feature: str, law: str, way: str, tmp_path: Path) -
 @pytest.mark.mpi
 @pytest.mark.parametrize(("feature", "law"), [cell[:2] for cell in OPEN if cell[2] == "ranks"])
 def test_on_ranks(feature: str, law: str) -> None:
-    """All ranks come to what one comes to."""
-    case = case_of(feature, law)
+    """All ranks come to what one comes to.
+
+    What a reduced basis leaves out of material that moves one way depends on rounding: there every rank makes the same.
+    """
+    one_way = any("one-way" in setting for setting in FEATURES[feature][1])
+    case = case_of(feature, law, *(["setup.reproducible=true"] if one_way else []))
     together, alone = (list(march(assemble(case, comm), 2))[-1] for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
     assert np.abs(together.pressure - alone.pressure).max() < 1e-9 * alone.pressure.max()
     assert np.abs(together.wear - alone.wear).max() < 1e-9 * alone.wear.max()

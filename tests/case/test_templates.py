@@ -12,7 +12,10 @@ from fenwear import assemble, jump, load_case, make_case, steady
 from fenwear.case.templates import fill_in, find_template, template_names, write_case_of
 from fenwear.errors import CaseError
 
-USUAL = ["ball-on-flat", "block-on-ring", "brake-pad", "bushing", "cylinder-on-flat", "fretting", "pin-on-disc"]
+USUAL = [
+    *("ball-on-disc", "ball-on-flat", "block-on-ring", "brake-pad"),
+    *("bushing", "cylinder-on-flat", "fretting", "pin-on-disc"),
+]
 
 
 def case_of(name: str, *settings: str) -> object:
@@ -55,9 +58,10 @@ def test_usual_values() -> None:
     assert ball.punch.loads[0].force == (0.0, 0.0, -25.0)
     ring = case_of("block-on-ring")
     assert ring.geometry.parameters["radius"] == 17.495
-    pin = case_of("pin-on-disc")
-    distance = pin.run.half_cycles * pin.motion.duration * pin.motion.angular_speed * 16.0
-    assert distance == pytest.approx(1e6, rel=1e-4)
+    for name in ("pin-on-disc", "ball-on-disc"):
+        pin = case_of(name)
+        distance = pin.run.half_cycles * pin.motion.duration * pin.motion.angular_speed * 16.0
+        assert distance == pytest.approx(1e6, rel=1e-4)
 
 
 def test_the_pad_is_the_built_in_case() -> None:
@@ -71,7 +75,7 @@ def test_what_is_wrong(tmp_path: Path) -> None:
     """Names the nearest template and dimension, what was expected of a value, and a file that is there."""
     with pytest.raises(CaseError, match="did you mean 'block-on-ring'"):
         find_template("blok-on-ring")
-    with pytest.raises(CaseError, match=r"There are ball-on-flat, .*pin-on-disc"):
+    with pytest.raises(CaseError, match=r"There are ball-on-disc, .*pin-on-disc"):
         find_template("")
     template = find_template("fretting")
     with pytest.raises(CaseError) as error:
@@ -104,6 +108,17 @@ def test_bushing_steady_state() -> None:
     theta = np.arctan2(pair.normal[:, 0], pair.normal[:, 1])
     scale = 20e3 / (20.0 * radius * (alpha + np.sin(alpha) * np.cos(alpha)))
     np.testing.assert_allclose(state.pressure[0], scale * np.cos(theta), rtol=2e-3)
+
+
+@pytest.mark.slow
+def test_ball_on_disc_wears_to_a_flat() -> None:
+    """A cap of the volume k F s is worn off the ball: pi R h^2 deep, all over it alike but for what gives way."""
+    case = case_of("ball-on-disc", "distance=400 m")
+    system = assemble(case, heat="none")
+    *_, last = jump(system, case.run.half_cycles, tolerance=0.02)
+    volume = 1e-9 * 10.0 * 4e5
+    assert system.pair.weights @ last.wear[-1] == pytest.approx(volume, rel=1e-3)
+    assert last.wear[-1].max() == pytest.approx(np.sqrt(volume / (np.pi * 5.0)), rel=2e-3)
 
 
 def test_ring_wears_over_its_circumference() -> None:

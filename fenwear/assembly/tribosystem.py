@@ -427,6 +427,12 @@ def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, 
     return punch, strip
 
 
+def friction_power(system: Placed) -> float:
+    """Return the mean power of friction at the mean pressure and speed, per thickness, mW/mm."""
+    rate = float(system.pair.weights @ heating_friction(system))
+    return rate * system.rigid.mean_pressure * system.motion.mean_speed
+
+
 def heating_friction(system: Placed, mu: Array | None = None) -> Array:
     """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
 

@@ -30,6 +30,7 @@ from scipy.sparse import block_diag, csr_array, eye_array, hstack, vstack
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import (
     Tribosystem,
+    friction_power,
     law_named,
     property_change,
     taken_at,
@@ -162,11 +163,7 @@ def _of_these_bodies(system: Tribosystem) -> Steady:
     """Return the state of the bodies as they are, whatever its temperatures; collective."""
     _check_exists(system)
     prepared = with_reduced_heat(system)
-    sides = prepared.exchange.sides if prepared.exchange else ()
-    for body, side in zip(prepared.bodies.heat or (), sides, strict=True):
-        if not side.cooled:
-            raise CaseError(no_heat_sink(body.body.name))
-
+    _check_sinks(prepared)
     check_memory(system)
 
     def found() -> Steady:
@@ -175,6 +172,18 @@ def _of_these_bodies(system: Tribosystem) -> Steady:
 
     prepared.team.serve(prepared)
     return replace(prepared.led_whole(found), system=system)
+
+
+def _check_sinks(system: Tribosystem) -> None:
+    """Raise where a body loses heat nowhere; collective."""
+    if system.exchange is None or system.bodies.heat is None or system.heat is None:
+        return
+    heat = system.heat
+    shares = (heat.partition, 1 - heat.partition) if heat.conductance == 0 else (1.0, 1.0)
+    for body, side, share in zip(system.bodies.heat, system.exchange.sides, shares, strict=True):
+        if not side.cooled:
+            power = share * (1 - heat.debris) * friction_power(system)
+            raise CaseError(no_heat_sink(body.body.name, body.enough_convection(power)))
 
 
 def _warmed(state: Steady, share: float) -> Steady:

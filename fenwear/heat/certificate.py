@@ -7,7 +7,7 @@ at its nodes and the thermal gap beside a rigid motion, at the end of the cycle.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,7 +32,7 @@ class Trial:
         inflow: Loads of unit fluxes (owned, q).
         entering: Fluxes of each step of a cycle (q, m) under m pressures.
         contact: Temperature at the contact nodes at the end of the cycle (n, owned).
-        expansion: Gap opened by each kelvin there (n, owned), mm/K.
+        opened: Gap there (n, k), mm, by changes of the temperature of this rank's nodes (owned, k); collective.
         rigid: Gaps of rigid motions, orthonormal (n, r).
         through: What takes temperatures where the fluxes enter to the contact nodes (n, q); None where they are these.
     """
@@ -40,7 +40,7 @@ class Trial:
     inflow: csc_array
     entering: Sequence[Array]
     contact: csr_array
-    expansion: Array
+    opened: Callable[[Array], Array]
     rigid: Array
     through: csr_array | None = None
 
@@ -95,8 +95,8 @@ class _Comparison:
     """Readings of a body's whole and reduced temperature; collective to make."""
 
     def __init__(self, body: HeatBody, small: ReducedField, trial: Trial) -> None:
-        self._comm, self._trial = body.body.mesh.comm, trial
-        self._contact, self._gap = small.observe(trial.contact), small.observe(trial.expansion)
+        self._comm, self._trial, self._columns = body.body.mesh.comm, trial, small.basis.columns
+        self._contact = small.observe(trial.contact)
         self._beyond: Array | None = None  # what a flux adds at the contact beside the coordinates
         if small.contact_responses is not None:
             exact = small.contact_responses[0]
@@ -115,8 +115,8 @@ class _Comparison:
         contact = self._contact.of_changes(reduced)
         if self._beyond is not None:
             contact = contact + self._beyond @ flux
-        gap, rigid = total(self._comm, np.asarray(self._trial.expansion @ whole)), self._trial.rigid
-        missing = self._gap.of_changes(reduced) - gap
+        both = self._trial.opened(np.hstack([whole, self._columns @ reduced - whole]))
+        (gap, missing), rigid = np.hsplit(both, 2), self._trial.rigid
         size = np.abs(gap).max(axis=0)
         gap, missing = (one - rigid @ (rigid.T @ one) for one in (gap, missing))
         return max(

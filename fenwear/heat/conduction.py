@@ -44,6 +44,7 @@ from fenwear.sliding.field import ALONG_X, SlidingField
 PREFIX = "fenwear_heat_"
 FREE, CONTACT, HELD = 1, 2, 3
 END = 0.3  # cosine of the angle between v and n: below, a boundary of what turns is a chord of its round side, no end
+WARMER = 100.0  # K: the mean rise that a convection is proposed for
 CHECK_EVERY = 100  # steps between two looks at the residual of a factor without pivoting
 LARGEST_RESIDUAL = 1e-9  # over the right-hand side: above, the factor is made again with pivoting
 
@@ -67,9 +68,17 @@ class Surroundings:
 ALONE = Surroundings()
 
 
-def no_heat_sink(name: str) -> InputError:
-    """Return what is wrong where the body of this name has no steady temperature."""
-    return InputError("heat.convection", f"the {name} loses heat nowhere: expected convection or a held temperature")
+def no_heat_sink(name: str, enough: float | None = None) -> InputError:
+    """Return what is wrong where the body of this name has no steady temperature.
+
+    Args:
+        name: Of the body.
+        enough: Convection that would do, see `HeatBody.enough_convection`; None where it is not known.
+    """
+    message = f"the {name} loses heat nowhere: expected convection or a held temperature"
+    if enough is not None:
+        message += f"; with {enough:.3g} N/(mm*s*K) it would be about {WARMER:g} K warmer than the surroundings"
+    return InputError("heat.convection", message)
 
 
 class HeatBody:
@@ -103,7 +112,8 @@ class HeatBody:
         self.space = fem.functionspace(body.mesh, basix.ufl.element("Lagrange", body.mesh.basix_cell(), degree))
         self.surface, self.trace = elastic.surface, trace_of(elastic.trace, elastic.space, self.space)
         faces = heat.convecting_faces and self.kind in ("stress", "strain")  # rings and solids have none
-        self.face_loss = 2 * heat.convection / elastic.thickness if faces else 0.0
+        self._faces = 2 / elastic.thickness if faces else 0.0
+        self.face_loss = heat.convection * self._faces
         self._measure = measure(body.mesh, self.kind)
         self._flows: dict[SlidingField, _Flow] = {}
         self.shared_bases: dict[Any, Any] = {}  # of the stages of a program
@@ -210,6 +220,19 @@ class HeatBody:
             or self.body.mesh.comm.allreduce(len(self.held)) > 0
             or (surroundings.renewed and speed != 0 and self.flow(surroundings.sliding).is_open)
         )
+
+    def enough_convection(self, power: float) -> float:
+        """Return the convection by which all that convects loses a power at a rise of `WARMER`; collective.
+
+        Args:
+            power: Heat that enters a second, per thickness, mW/mm.
+
+        Returns:
+            h, N/(mm s K).
+        """
+        one = fem.Constant(self.body.mesh, PETSc.ScalarType(1))
+        area = fem.assemble_scalar(compiled(self.on_free_boundary(one) + self._dx(self._faces * one)))
+        return power / (WARMER * self.body.mesh.comm.allreduce(float(area)))
 
     def extremes(self, surroundings: Surroundings) -> tuple[float, float]:
         """Return the coldest and the hottest that the body is at first, is held at, or meets, K; collective."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -82,7 +82,7 @@ class PassingStrip:
         duration: float,
         transfers: Sequence[csr_array],
         plans: Sequence[Sequence[StepPlan]],
-        expansion: Array,
+        opened: Callable[[Array], Array],
         allowed: float,
     ) -> tuple[ModalField, float]:
         """Return the strip on its modes and its difference from the whole mesh, more of them where it is large.
@@ -94,15 +94,14 @@ class PassingStrip:
             duration: Of a stage, s.
             transfers: Of the places of each prepared step.
             plans: The steps of each phase.
-            expansion: Of the nodes of the passage (q, owned), mm/K.
+            opened: Gap at the end of the last phase by changes of temperature, see `Trial`.
             allowed: Difference that is let pass, relative.
         """
         pair, end = self.passage.middle, self.passage.ends[-1]
         forces = pressures(pair.punch.x) * pair.weights[:, None]
         entering = [transfers[plan.strip].T @ (forces * plan.speed) for row in plans for plan in row]
         rigid = rigid_gaps(self.body, pair.punch.x)
-        contact, gap = csr_array(end @ self.nodes), np.asarray(end @ expansion)
-        trial = Trial(self.loads, entering, contact, gap, rigid, through=end)
+        trial = Trial(self.loads, entering, csr_array(end @ self.nodes), opened, rigid, through=end)
         exact = contact_responses([step], self.loads, self.nodes) if self.lasting else None
         for tries in range(1, TRIES + 1):
             small = ModalField(step, self.loads, self.modes(duration), exact)

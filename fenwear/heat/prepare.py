@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -29,6 +29,9 @@ from fenwear.parallel import total
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
 
+Moved = Callable[[Array], Array]  # displacement of the trace nodes (N, d, k), mm, by temperatures (owned, k)
+Opened = Callable[[Array], Array]  # gap at the contact nodes (n, k), mm, by temperatures (owned, k)
+
 
 def prepare_exchange(
     heat: Heat,
@@ -42,6 +45,7 @@ def prepare_exchange(
     *,
     reduced: bool,
     passage: Passage | None = None,
+    moved: tuple[Moved, Moved] | None = None,
     others: Sequence[float] = (),
     keep: bool = False,
     fresh: bool = False,
@@ -60,6 +64,8 @@ def prepare_exchange(
         thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
         passage: Where the punch is on a strip that passes to and fro; None where it moves one way or not at all.
+        moved: What the bodies' temperatures move their surfaces by, for the certificates, where `expansions` are not to
+            open the contact.
         others: Speeds of all stages of a program one way, which share their bases.
         keep: Whether bases are kept on disk, and taken from there where they are.
         fresh: Make them whatever is kept.
@@ -84,9 +90,12 @@ def prepare_exchange(
             for row, own in zip(plans, kinds, strict=True)
         ]
     sides, differences = [], []
-    for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True):
+    for body, inflow, rows, own, by in zip(
+        bodies, inflows(bodies, pair), expansions, ([0.0], velocities), moved or (None, None), strict=True
+    ):
         if strip is not None and body is strip.body:
-            side, difference = _passing(heat, strip, transfers, plans, rows, duration, reduced=reduced)
+            opened = opened_gap(body, pair, rows, by, strip.passage)
+            side, difference = _passing(heat, strip, transfers, plans, rows, opened, duration, reduced=reduced)
         else:
             around = _surroundings(body, pair, sliding, renewed=one_way)
             steps = [body.step(velocity, duration, around, at_once=reduced) for velocity in own]
@@ -95,7 +104,7 @@ def prepare_exchange(
                 cycle = [step.of(body) for row in plans for step in row]
                 moving = [own[step] for step in cycle] + [v for v in others if body.body.name == "strip"]
                 wish = Wish(moving, duration, heat.reduction_tolerance, heat.reduction_difference, around, cycle, way)
-                rated = wish, _trial(body, pair, inflow, rows, friction, plans)
+                rated = wish, _trial(body, pair, inflow, opened_gap(body, pair, rows, by), friction, plans)
             side, difference = _in_place(heat, body, steps, own, pair, inflow, rows, plans, around, rated, thickness)
         sides.append(side)
         differences += [] if difference is None else [difference]
@@ -149,7 +158,7 @@ def _trial(
     body: HeatBody,
     pair: ContactPair,
     inflow: csc_array,
-    rows: Array,
+    opened: Opened,
     friction: Array,
     plans: Sequence[Sequence[StepPlan]],
 ) -> Trial:
@@ -157,7 +166,34 @@ def _trial(
     fluxes = pressures(pair.punch.x) * friction[:, None]
     speeds = [plan.speed for row in plans for plan in row]
     entering = [fluxes * (speed if any(speeds) else 1.0) for speed in speeds]
-    return Trial(inflow, entering, contact_rows(body, pair), rows, rigid_gaps(body, pair.punch.x))
+    return Trial(inflow, entering, contact_rows(body, pair), opened, rigid_gaps(body, pair.punch.x))
+
+
+def opened_gap(
+    body: HeatBody, pair: ContactPair, rows: Array, moved: Moved | None, passage: Passage | None = None
+) -> Opened:
+    """Return what gives the gap (n, k) of changes of a body's temperature (owned, k); collective to call.
+
+    Args:
+        body: The body.
+        pair: The contact.
+        rows: What each kelvin moves the surface along the normal at the contact nodes, or at those of the passage.
+        moved: What moves the surface in their place; None for the rows.
+        passage: Of a strip that passes under the punch: its end is looked at.
+    """
+    if moved is None:
+        at_nodes = rows if passage is None else np.asarray(passage.ends[-1] @ rows)
+        return lambda fields: total(body.body.mesh.comm, at_nodes @ fields)
+    onto = pair.transfer if body.body.name == "strip" else pair.punch.spread.T
+    picked = slice(None) if passage is None else passage.nodes
+    reading = onto if passage is None else passage.ends[-1]
+
+    def by_displacement(fields: Array) -> Array:
+        moves = moved(fields)[picked]
+        at_contact = np.asarray(reading @ moves.reshape(len(moves), -1)).reshape(-1, *moves.shape[1:])
+        return np.asarray(np.einsum("nd,ndk->nk", pair.normal, at_contact))
+
+    return by_displacement
 
 
 def _plans(motion: Motion, count: int, *, moves: bool) -> tuple[list[list[StepPlan]], list[float], float]:
@@ -215,6 +251,7 @@ def _passing(
     transfers: Sequence[csr_array],
     plans: Sequence[Sequence[StepPlan]],
     expansion: Array,
+    opened: Opened,
     duration: float,
     *,
     reduced: bool,
@@ -226,6 +263,7 @@ def _passing(
         transfers: Of the places of each step.
         plans: The steps of each phase.
         expansion: Of the nodes of the passage (q, owned), mm/K.
+        opened: Gap that changes of its temperature open.
         duration: Of a stage, s.
         reduced: Whether it is on its modes.
     """
@@ -234,7 +272,7 @@ def _passing(
     inner: FullField | ModalField
     difference = None
     if reduced:
-        inner, difference = strip.fitted(step, duration, transfers, plans, expansion, heat.reduction_difference)
+        inner, difference = strip.fitted(step, duration, transfers, plans, opened, heat.reduction_difference)
     else:
         inner = FullField(body, [step], strip.loads)
     field = PassingField(inner, strip.nodes, transfers, passage.middle.weights, heat.convection, heat.ambient)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -21,6 +22,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
+from fenwear.heat.conduction import HeatBody
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import ReducedBasis
 from fenwear.heat.passage import Passage
@@ -215,6 +217,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
     passage = None
     if case.stick.force is None and far_enough(case, middle.punch):
         passage = Passage(middle, interface.sliding.field, motion)
+    punch, strip = bodies.heat
     n = len(middle.weights)
     rows = n, n if passage is None else len(passage.nodes)
     nothing = tuple(np.zeros((count, body.owned)) for count, body in zip(rows, bodies.heat, strict=True))
@@ -229,6 +232,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
         case.model.thickness,
         reduced=True,
         passage=passage,
+        moved=(partial(free_expansion, bodies.punch, punch), partial(free_expansion, bodies.strip, strip)),
         keep=interface.keep,
         fresh=interface.fresh,
     )
@@ -283,15 +287,15 @@ def expansions(
         if not isinstance(basis, ReducedBasis):
             raise CaseError(InputError("heat.operator", "expected 'reduced' with contact.law = 'coulomb'"))
         fields = np.hstack([basis.columns, (basis.lift - initial)[:, None]])
-        picked = _free_expansion(elastic, basis, fields)
+        picked = free_expansion(elastic, basis.body, fields)
         at_patterns = np.einsum("qN,Ndk->qdk", condensed.patterns.T.toarray(), picked)
         found.append(Expansion(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
     return found[0], found[1]
 
 
-def _free_expansion(elastic: ElasticBody, basis: ReducedBasis, fields: Array) -> Array:
+def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array:
     """Return the displacement of the trace nodes (N, d, k) by temperatures (owned, k) without contact; collective."""
-    coupling = elastic.thermal_coupling(basis.body.space)
+    coupling = elastic.thermal_coupling(body.space)
     theta, force = coupling.createVecs()
     forces = []
     for field in fields.T:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -78,6 +79,22 @@ def test_isolated_body_has_no_steady_state(assembled: Callable[..., Tribosystem]
         steady_exchange(system, [9.5])
     (block,) = march(system, 4)
     assert block.heat.max_temperature[-1] > 0
+
+
+def test_the_convection_that_is_proposed_does(assembled: Callable[..., Tribosystem]) -> None:
+    """What the error proposes carries all heat off at a mean rise of 100 K of what convects."""
+    case = (*COARSE, "strip.temperatures=[]", "heat.conductance=0", "heat.partition=1", "heat.debris=0")
+    with pytest.raises(CaseError, match=r"100 K warmer than the surroundings") as refused:
+        steady(assembled("example1-heat", *case, "heat.convection=0"))
+    found = re.search(r"with (\S+) N", str(refused.value))
+    assert found is not None
+    system = assembled("example1-heat", *case, f"heat.convection={found[1]}")
+    state = steady(system)
+    assert system.bodies.heat is not None
+    assert state.heat is not None
+    punch, loss = system.bodies.heat[0], system.bodies.heat[0].convected
+    comm, theta = punch.body.mesh.comm, state.heat.end.temperatures()[0]
+    assert comm.allreduce(loss @ theta) / comm.allreduce(loss.sum()) == pytest.approx(100, rel=0.01)
 
 
 def test_isolated_body_on_the_command_line(fenwear: Callable[..., Any]) -> None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from fenwear import Tribosystem, assemble, load_case
-from fenwear.assembly import with_exchange, with_reduced_heat
+from fenwear.assembly import expansions, with_exchange, with_reduced_heat
+from fenwear.heat.certificate import rigid_gaps
 from fenwear.heat.exchange import HeatExchange
+from fenwear.heat.prepare import opened_gap
+from fenwear.stick.heat import free_expansion
 from fenwear.watch import fineness_text, fineness_warnings
 
 COARSE = ("geometry.degree=2", "geometry.parameters.strip_length=160", "geometry.parameters.strip_height=16")
@@ -67,6 +72,21 @@ def test_against_the_whole_mesh(way: str, seed: int) -> None:
     for one, other in zip(small, whole, strict=True):
         scale = np.abs(other).max(axis=1, keepdims=True)
         assert (np.abs(one - other) <= allowed * scale).all(), (np.abs(one - other) / scale).max(axis=1)
+
+
+def test_the_gap_by_rows_and_by_displacements() -> None:
+    """The certificate's gap is that of sliding, by a row for each node, where stick has displacements."""
+    system = assemble(load_case("example2-heat", COARSE))
+    elastic, warm = (system.bodies.punch, system.bodies.strip), system.bodies.heat
+    assert warm is not None
+    for body, other, rows in zip(elastic, warm, expansions(system, in_middle=True), strict=True):
+        x = other.space.tabulate_dof_coordinates()[: other.owned]
+        fields = np.column_stack([np.ones(len(x)), x[:, 0] ** 2, np.sin(x[:, 1])])
+        moved = partial(free_expansion, body, other)
+        by_row, by_displacement = (opened_gap(other, system.pair, rows, way)(fields) for way in (None, moved))
+        rigid = rigid_gaps(other, system.pair.punch.x)
+        apart = by_displacement - by_row
+        np.testing.assert_allclose(apart - rigid @ (rigid.T @ apart), 0, atol=1e-9 * np.abs(by_row).max())
 
 
 def test_a_basis_that_cannot_hold_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -288,7 +288,7 @@ class HeatExchange:
                 spans = []
         if spans:
             terms += self._kept(spans, sources=sources)
-        terms += self._made(heated, entered)
+        terms += self._led(partial(self._made, heated, entered))
         if sources and any(side.field.contact_responses is not None for side in self.sides):
             surfaces = self._read(phase, values, fluxes)
         return values, terms, surfaces

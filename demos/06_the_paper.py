@@ -24,7 +24,7 @@
 # **predicted**: that a reading meets a number it was fitted to says nothing, and that one of sixty comes close to some
 # number by chance says little.
 #
-# The computations live in `fenwear.paper`; they take some minutes altogether. `python3 -m fenwear verify --only paper`
+# The computations live in `fenwear_verify.paper`; they take some minutes altogether. `python3 -m fenwear verify --only paper`
 # writes the same comparison as a page.
 
 # %%
@@ -35,9 +35,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from IPython import display as show
 
-from fenwear.paper import READINGS, Scope, paper_figures, paper_rows, sensitivity_rows
-from fenwear.paper.section import map_text, markdown, readings_markdown
-from fenwear.paper.study import central_runs, heat_runs, stability_maps
+from fenwear_verify.paper import READINGS, Scope, paper_figures, paper_rows, sensitivity_rows
+from fenwear_verify.paper.section import map_text, markdown, readings_markdown
+from fenwear_verify.paper.study import central_runs, heat_runs, stability_maps
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: coarser meshes, fewer readings
 if COARSE:
@@ -171,5 +171,5 @@ plt.show()
 # ## Your turn
 #
 # - `Scope(settings=("model.plane=strain",))`: the whole table in plane strain.
-# - `Reading("mine", ("heat.partition=0.3", "heat.debris=0.2"))` from `fenwear.paper`: your own reading, in
+# - `Reading("mine", ("heat.partition=0.3", "heat.debris=0.2"))` from `fenwear_verify.paper`: your own reading, in
 #   `Scope(readings=(*READINGS, mine))`.

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The package as an index has it: its wheel, installed with fenwear[solver] into an environment of its own that sees
+# The package as an index has it: its wheels, installed with fenwear[solver,verify] into an environment of its own that sees
 # nothing of this system's packages, and tests/smoke.py with it, from an empty cache. Called by `docker/fenwear test
 # --wheel`; needs PyPI.
 set -eu
@@ -10,12 +10,14 @@ trap 'rm -rf "$folder"' EXIT
 trap 'exit 130' INT TERM
 
 python3 -m pip wheel --quiet --no-deps --no-build-isolation --no-index --wheel-dir "$folder" "$checkout"
+python3 -m pip wheel --quiet --no-deps --no-build-isolation --no-index --wheel-dir "$folder" "$checkout/tests/verification"
 wheel=$(echo "$folder"/fenwear-*.whl)
 echo "$(basename "$wheel"): $(($(stat -c %s "$wheel") / 1024)) KiB"
 
 python3 -m venv --without-pip "$folder/venv"
 begin=$(date +%s)
-if ! python3 -m pip --python "$folder/venv/bin/python" install --quiet --disable-pip-version-check "$wheel[solver]"; then
+if ! python3 -m pip --python "$folder/venv/bin/python" install --quiet --disable-pip-version-check \
+    --find-links "$folder" "$wheel[solver,verify]"; then
     echo "fenwear: fenwear[solver] cannot be installed: is PyPI reached from here?" >&2
     exit 1
 fi

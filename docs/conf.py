@@ -6,7 +6,11 @@ import sys
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE.parent), str(HERE / "extensions"), str(HERE.parent / "tests")]
+sys.path[:0] = [
+    str(HERE.parent),
+    str(HERE / "extensions"),
+    *(str(HERE.parent / "tests" / part) for part in ("", "verification")),
+]
 
 import fenwear  # noqa: E402
 

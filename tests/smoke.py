@@ -54,6 +54,12 @@ def steady(_: Path) -> None:
     assert "33.333 MPa" in call([*FENWEAR, "steady", "example1"])
 
 
+def verified(folder: Path) -> None:
+    """What is kept beside the package is found, and a problem of known answer agrees."""
+    assert "patch" in call([*FENWEAR, "verify", "--list"])
+    call([*FENWEAR, "verify", "--only", "patch", "-o", str(folder / "verified")])
+
+
 def solids(_: Path) -> None:
     """A ball on a flat and a ring on a ring: pressures in equilibrium with the load, wear that grows."""
     import numpy as np
@@ -103,7 +109,7 @@ def main() -> None:
     """Call each of the above and print its processor time."""
     (folder,) = map(Path, sys.argv[1:])
     print(importlib.import_module("fenwear").__file__)
-    for check in (imports, steady, solids, heat_and_restart, stick):
+    for check in (imports, steady, verified, solids, heat_and_restart, stick):
         before = os.times()
         check(folder)
         after = os.times()

@@ -13,7 +13,7 @@ import pytest
 from markupsafe import escape
 
 from fenwear import assemble, load_case, march, steady, vary
-from fenwear.paper import (
+from fenwear_verify.paper import (
     READINGS,
     Reading,
     Row,
@@ -24,10 +24,10 @@ from fenwear.paper import (
     sensitivity_rows,
     write_section,
 )
-from fenwear.paper.published import OPEN, VELOCITIES, last_digit
-from fenwear.paper.relaxed import run_relaxed
-from fenwear.paper.rows import _is_bell
-from fenwear.paper.section import (
+from fenwear_verify.paper.published import OPEN, VELOCITIES, last_digit
+from fenwear_verify.paper.relaxed import run_relaxed
+from fenwear_verify.paper.rows import _is_bell
+from fenwear_verify.paper.section import (
     COLUMNS,
     READING,
     as_json,
@@ -37,8 +37,8 @@ from fenwear.paper.section import (
     readings_markdown,
     summary,
 )
-from fenwear.paper.states import StabilityMap
-from fenwear.paper.study import central_runs, heat_runs, no_heat, stability_maps, steady_heat
+from fenwear_verify.paper.states import StabilityMap
+from fenwear_verify.paper.study import central_runs, heat_runs, no_heat, stability_maps, steady_heat
 
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")
 ROUND, LITERAL = (reading for reading in READINGS if reading.name in ("round values", "text literal"))
@@ -135,10 +135,10 @@ def test_numbers_are_those_of_the_public_functions() -> None:
 def test_a_published_number_that_differs_is_not_reproduced(monkeypatch: pytest.MonkeyPatch) -> None:
     """Verdicts follow from the numbers: were the paper's others, so were they."""
     wrong = tuple(row._replace(at_pin="0.0177") for row in VELOCITIES)
-    monkeypatch.setattr("fenwear.paper.rows.VELOCITIES", wrong)
-    monkeypatch.setattr("fenwear.paper.rows.LARGEST_PRESSURE", "33.35")
-    monkeypatch.setattr("fenwear.paper.rows.MONOTONIC_TEMPERATURE", "60.00")
-    monkeypatch.setattr("fenwear.paper.rows.PERIODIC_TEMPERATURE", f"{heat_runs(SCOPE)[0].at_centre(2200):.2f}")
+    monkeypatch.setattr("fenwear_verify.paper.rows.VELOCITIES", wrong)
+    monkeypatch.setattr("fenwear_verify.paper.rows.LARGEST_PRESSURE", "33.35")
+    monkeypatch.setattr("fenwear_verify.paper.rows.MONOTONIC_TEMPERATURE", "60.00")
+    monkeypatch.setattr("fenwear_verify.paper.rows.PERIODIC_TEMPERATURE", f"{heat_runs(SCOPE)[0].at_centre(2200):.2f}")
     rows = paper_rows(SCOPE)
     assert all(row.verdict == "not reproduced" for row in rows[:4])
     for words in ("no heat", "one-way motions"):
@@ -150,7 +150,7 @@ def test_a_published_number_that_differs_is_not_reproduced(monkeypatch: pytest.M
 def test_what_departs_from_the_paper_reproduces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """A number that only a reading against the paper's data meets is not reproduced; one that all meet is."""
     runs = [dataclasses.replace(run, reading=dataclasses.replace(run.reading, against="x")) for run in heat_runs(SCOPE)]
-    monkeypatch.setattr("fenwear.paper.rows.heat_runs", lambda scope: runs)
+    monkeypatch.setattr("fenwear_verify.paper.rows.heat_runs", lambda scope: runs)
     rows = paper_rows(SCOPE)
     assert by_quantity(rows, "one-way motions").verdict == "not reproduced"
     assert "against the paper's data" in by_quantity(rows, "one-way motions").why

@@ -13,7 +13,7 @@ from fenwear import CaseError, Tribosystem, load_case
 from fenwear.assembly import assemble, place_case
 from fenwear.case import Case
 from fenwear.cycle import march, steady
-from fenwear.verify.solid import describe
+from fenwear_verify.solid import describe
 
 COARSE = ("geometry.degree=1", "geometry.order=1")
 

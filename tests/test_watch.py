@@ -25,7 +25,6 @@ from fenwear.results.summary import net_of
 from fenwear.run import position_warnings, run_case
 from fenwear.stick.cycle import Records
 from fenwear.stick.setup import make_rig
-from fenwear.verify.solid import STEEL, describe
 from fenwear.watch import Watch, elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
 from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import contact_ends
@@ -33,6 +32,7 @@ from fenwear.watch.few import few_text
 from fenwear.watch.layer import heated_layer, layer_warnings
 from fenwear.watch.rim import contact_rim
 from fenwear.watch.thickness import thickness
+from fenwear_verify.solid import STEEL, describe
 
 Assembled = Callable[..., Tribosystem]
 FLAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")

@@ -17,7 +17,7 @@ from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
 from fenwear.results import history, sheet, steps, surfaces
-from fenwear.verify.suite import registered
+from fenwear_verify.suite import registered
 
 
 class Written(SphinxDirective):

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.results.fields import BodyFields, body_fields
-from fenwear.verify.bodies import two_blocks
+from fenwear_verify.bodies import two_blocks
 
 MATERIAL = {"young": 2e5, "poisson": 0.25}  # shear modulus 8e4 MPa
 SIZES = {"width": 2.0, "strip_height": 3.0, "across": 4, "strip_across": 6, "strip_layers": 2}

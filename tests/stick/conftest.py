@@ -11,7 +11,7 @@ import pytest
 from fenwear.assembly import build_bodies, make_sliding
 from fenwear.case import Case
 from fenwear.stick import StickInterface
-from fenwear.verify.bodies import two_block_case
+from fenwear_verify.bodies import two_block_case
 
 SOFT, STIFF = {"young": 7e4, "poisson": 0.1}, {"young": 2e5, "poisson": 0.35}
 LOAD = 100.0  # N/mm

@@ -22,13 +22,13 @@ from fenwear.heat.exchange import TERMS, HeatExchange
 from fenwear.interface import ContactPair, Interface, RigidEquilibrium, interpolation
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.wear import Wear
-from fenwear.verify import registered, run_cases
-from fenwear.verify import wear as wear_cases
-from fenwear.verify.bodies import builtin, rigid_punch
-from fenwear.verify.conduction import conducting_square
-from fenwear.verify.contact import half_planes
-from fenwear.verify.solid_instability import sliding_blocks
-from fenwear.verify.thermal import conductor
+from fenwear_verify import registered, run_cases
+from fenwear_verify import wear as wear_cases
+from fenwear_verify.bodies import builtin, rigid_punch
+from fenwear_verify.conduction import conducting_square
+from fenwear_verify.contact import half_planes
+from fenwear_verify.solid_instability import sliding_blocks
+from fenwear_verify.thermal import conductor
 
 Patch = pytest.MonkeyPatch
 CACHES = (builtin, rigid_punch, half_planes, conducting_square, conductor, sliding_blocks)

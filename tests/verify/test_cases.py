@@ -6,7 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import CaseError
-from fenwear.verify import VerificationCase, registered, run_cases
+from fenwear_verify import VerificationCase, registered, run_cases
 
 # What these find, they find in the small matrices of the contact, which every rank holds; bodies and heat go the ways
 # of others, which run on several ranks.

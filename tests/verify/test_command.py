@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 from fenwear import CaseError
-from fenwear.paper import BRIEF, FULL, READINGS, Scope
-from fenwear.verify import registered
-from fenwear.verify.command import choose, verify
+from fenwear_verify import registered
+from fenwear_verify.command import choose, verify
+from fenwear_verify.paper import BRIEF, FULL, READINGS, Scope
 
 Run = Callable[..., Any]
 COARSE = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fenwear.verify.half_space_stick import Elastic, half_spaces, influence
+from fenwear_verify.half_space_stick import Elastic, half_spaces, influence
 
 SOFT = Elastic(1.0, 0.3)
 

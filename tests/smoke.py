@@ -98,9 +98,9 @@ def stick(folder: Path) -> None:
 
     run("fretting-partial-slip", folder / "stick", *STICK)
     history = load_history(folder / "stick")
-    down = history.normal_z * history.pressure - history.normal_x * history.traction
+    down = history.normal_z * history.step_pressure - history.normal_x * history.traction
     assert np.abs((down * history.weight).sum("x") - 120).max() < 1e-8 * 120
-    assert (np.abs(history.traction) <= 0.9 * history.pressure * (1 + 1e-12)).all()
+    assert (np.abs(history.traction) <= 0.9 * history.step_pressure * (1 + 1e-12)).all()
     assert float(history.energy_balance_error.max()) < 1e-8
     assert (folder / "stick" / "report.html").stat().st_size > 0
 

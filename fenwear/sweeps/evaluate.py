@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.assembly import Preparation, Tribosystem, assemble, law_named, set_up_by, with_case
 from fenwear.case import Case
-from fenwear.cycle import Block, at_step, follow, jump, march, steady
-from fenwear.cycle.state import RunState, joined
+from fenwear.cycle import at_step, evolve, steady
+from fenwear.cycle.state import joined
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.law import check_decided
 from fenwear.results.steps import numbers
@@ -186,7 +186,7 @@ def _optimum(system: Tribosystem) -> Values:
 
 def _run(system: Tribosystem) -> Values:
     """Return the last cycle of the case's run."""
-    ends = deque(_blocks(system), maxlen=1)
+    ends = deque(evolve(system), maxlen=1)
     if not ends:
         raise ConvergenceError("no half-cycle was done: expected run.half_cycles of one cycle at least")
     last = ends[0]
@@ -197,7 +197,7 @@ def _run(system: Tribosystem) -> Values:
         "direction": np.array(motion.stroke_directions[: len(pressure)], dtype=float),
         "pressure": pressure,
         "largest_pressure": pressure.max(axis=1),
-        "mean_pressure": np.array(system.rigid.mean_pressure),
+        "mean_pressure": np.array(last.system.rigid.mean_pressure * last.load_factor[-1]),
         "contact_size": (pressure > 0) @ last.system.pair.weights,
         "wear": last.wear[-1],
         "largest_wear": last.wear[-1].max(),
@@ -218,24 +218,6 @@ def _run(system: Tribosystem) -> Values:
         surfaces = [last.heat.temperature_punch, last.heat.temperature_strip]
         found |= _temperatures(*(_by_half_cycle(rows, last.half_cycle, motion.half_cycles) for rows in surfaces))
     return {name: np.asarray(values, dtype=float) for name, values in found.items()}
-
-
-def _blocks(system: Tribosystem) -> Iterator[Block]:
-    run, strokes = system.case.run, system.motion.half_cycles
-    jumps = run.integration == "jump"
-    wanted = run.half_cycles // strokes * strokes if jumps else run.half_cycles
-
-    def integrate(on: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool]) -> Iterator[Block]:
-        if jumps:
-            return jump(on, run.half_cycles, tolerance=run.jump_tolerance, periodic_within=run.periodic_within,
-                        start=start, leave=leave)  # fmt: skip
-        return march(on, run.half_cycles, implicit=run.integration == "implicit", start=start, leave=leave,
-                     periodic_within=run.periodic_within)  # fmt: skip
-
-    for block in follow(system, integrate):
-        yield block
-        if block.end.half_cycle >= wanted:
-            return
 
 
 def _by_half_cycle(rows: Array, numbers: NDArray[np.int64], count: int) -> Array:

@@ -74,6 +74,18 @@ def test_runs_and_optima(assembled: Callable[..., Tribosystem]) -> None:
     assert best["lambda_F"].attrs["units"] == "mm/s"
 
 
+def test_a_program_is_run_and_its_end_is_what_lasts() -> None:
+    """Volumes are k times all that the loads have slid; steady states and optima are those of the last load."""
+    steps = "program.steps=[{cycles=2}, {cycles=2, load='20 kN'}]"
+    over = {"wear.punch.coefficient": [1e-7, 2e-7]}
+    for of in ("run", "steady", "optimum"):
+        found = package.sweep(load_case("example1", [*SMALL, "run.half_cycles=8", steps]), over, of=of).squeeze()
+        np.testing.assert_allclose(found["mean_pressure"], 20e3 / 600, rtol=1e-9)
+        if of == "run":
+            slid = 4 * 1.5 * 2 * (10e3 + 20e3)
+            np.testing.assert_allclose(found["worn_volume"], np.array([1e-7, 2e-7]) * slid, rtol=1e-9)
+
+
 def test_meshes_of_other_nodes() -> None:
     """Where the nodes are not the same, each variant has its own, and arrays end with NaN."""
     found = package.sweep(CASE, {"geometry.parameters.elements_along_contact": [4, 8]})

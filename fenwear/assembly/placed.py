@@ -247,7 +247,7 @@ class Placed:
     def _regions(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Shares of the regions of punch and strip at the contact nodes (n,); none where there is one region alone."""
         punch, strip = self.bodies.regions
-        onto = self.pair.material
+        onto = self.pair.wear_interpolation
         return punch, {name: onto @ share for name, share in strip.items()}
 
     def slid_after(self, half_cycles: float) -> float:
@@ -285,7 +285,7 @@ class Placed:
             speed,
             (initial, initial) if temperatures is None else temperatures,
             self._places[-1 if phase is None else phase],
-            (none, none) if worn is None else (worn.punch, pair.material @ worn.strip),
+            (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
         )
@@ -348,7 +348,7 @@ class Placed:
 
         def recession(pressure: Array) -> Array:
             worn = wear.worn(np.tile(pressure, (len(self.motion.phases), 1)))
-            return np.asarray(self.pair.material @ worn.strip / self.motion.period)
+            return np.asarray(self.pair.wear_interpolation @ worn.strip / self.motion.period)
 
         if wear.punch is not None:
             return optimum_on_track(self.rigid, ratio, WearRates(rates[:1], laws[:1]), laws[1], recession, zone)

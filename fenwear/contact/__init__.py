@@ -1,6 +1,6 @@
 """Contact as variational inequalities: on the condensed interface, and on the full bodies."""
 
-from fenwear.contact.condensed import CondensedContact, ContactSolver, ContactState, Layer, SlidingContact
+from fenwear.contact.condensed import CondensedContact, ContactSolver, ContactState, SlidingContact, WearCompliance
 from fenwear.contact.full import FullContact
 
-__all__ = ["CondensedContact", "ContactSolver", "ContactState", "FullContact", "Layer", "SlidingContact"]
+__all__ = ["CondensedContact", "ContactSolver", "ContactState", "FullContact", "SlidingContact", "WearCompliance"]

@@ -6,7 +6,7 @@ For every phase of the motion (a sliding direction d) and every contact node:
     sum of w_i p_i (e_n + tau)_i . m_i + F = 0   for the rigid modes a and their motions m,
 
 tau the traction of friction over the pressure, g the gap of the unloaded bodies with their
-loads' effect and the worn depth. A `Layer` adds to the gaps of all phases what their own pressures
+loads' effect and the worn depth. A `WearCompliance` adds to the gaps of all phases what their own pressures
 open, such as the wear of the step they belong to.
 """
 
@@ -70,7 +70,7 @@ class SlidingContact:
     friction_ratio: Array
 
 
-class Layer(Protocol):
+class WearCompliance(Protocol):
     """What the phases' own pressures add to every phase's gap."""
 
     def opening(self, pressure: Array) -> Array:
@@ -90,7 +90,7 @@ class ContactSolver(Protocol):
         self,
         gap: Array,
         start: ContactState | None = None,
-        layer: Layer | None = None,
+        wearing: WearCompliance | None = None,
         coupling: Array | None = None,
     ) -> ContactState:
         """Return the contact for the unloaded gap (n,) or (m, n), mm."""
@@ -100,7 +100,7 @@ class CondensedContact:
     """The inequality on the condensed interface, with unknown (p, a) for each phase.
 
     Pressure is scaled by the mean pressure, gap by the elastic length that belongs to it, so that
-    PETSc's absolute tolerances mean the same for every case. Phases meet in the layer only: where
+    PETSc's absolute tolerances mean the same for every case. Phases meet in what wears in the step only: where
     there are many, one small elimination for each of them takes the place of one of all. Where nodes are
     many, no matrix of all of them is made: see `fenwear.contact.blocks`. On several ranks rank 0 solves it; where
     they share the rows of the interface, all help: see `fenwear.contact.spread`.
@@ -141,8 +141,8 @@ class CondensedContact:
         self._spread: SpreadPhases | None = None
         self._slide(range(m))
         self._coupling: Array | None = None
-        self._layer: Layer | None = None
-        self._slope: Array | None = None  # of the layer
+        self._wearing: WearCompliance | None = None
+        self._slope: Array | None = None  # of what wears in the step
         self._elastic: Operator | None = None
         self._operator: Operator | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
@@ -203,15 +203,15 @@ class CondensedContact:
     def _residual(self, x: Array) -> Array:
         f = self._linear.multiply(x)
         f += self._offset.ravel()
-        if self._layer is not None:
+        if self._wearing is not None:
             m, n = self.shape
             pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
-            f.reshape(m, -1)[:, :n] += self._layer.opening(pressure) / self._gap_scale
+            f.reshape(m, -1)[:, :n] += self._wearing.opening(pressure) / self._gap_scale
         return f
 
     @property
     def _linear(self) -> Operator:
-        """The derivative of the residual without the layer."""
+        """The derivative of the residual without what wears in the step."""
         if self._elastic is None:
             self._elastic = self._of_nodes() if self._many and self._coupling is None else self._as_phases()
         return self._elastic
@@ -230,13 +230,13 @@ class CondensedContact:
         return Phases(dense, None if self._coupling is None else self._coupling * scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
-        if self._layer is None:
+        if self._wearing is None:
             return self._linear
         m, n = self.shape
         pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._pressure_scale / self._gap_scale
-        left, slope = None, self._layer.local(pressure)
+        left, slope = None, self._wearing.local(pressure)
         if slope is None:
-            left, slope = self._layer.border(pressure)
+            left, slope = self._wearing.border(pressure)
         last = self._operator
         if last is None or self._slope is None or not np.array_equal(slope, self._slope):
             self._slope = slope
@@ -252,7 +252,7 @@ class CondensedContact:
         self,
         gap: Array,
         start: ContactState | None = None,
-        layer: Layer | None = None,
+        wearing: WearCompliance | None = None,
         coupling: Array | None = None,
     ) -> ContactState:
         """Return the contact of all phases; collective.
@@ -260,17 +260,17 @@ class CondensedContact:
         Args:
             gap: Gap of the undeformed bodies, initial gap and worn depth together, (n,) or (m, n), mm.
             start: Where Newton starts, such as the same phases one cycle ago; by default full contact.
-            layer: Adds what the pressures themselves open.
+            wearing: What the step wears: adds what the pressures themselves open.
             coupling: Gap of each phase's nodes from each phase's pressures (m, n, m, n), mm/MPa, on
                 top of the elastic compliance: what the heat of these pressures opens.
 
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        return self._team.lead(partial(self._solved, gap, start, layer, coupling))
+        return self._team.lead(partial(self._solved, gap, start, wearing, coupling))
 
     def _solved(
-        self, gap: Array, start: ContactState | None, layer: Layer | None, coupling: Array | None
+        self, gap: Array, start: ContactState | None, wearing: WearCompliance | None, coupling: Array | None
     ) -> ContactState:
         m, n = self.shape
         # From the rigid motions of the start: they take up a worn depth that may be thousands of times what the bodies
@@ -280,7 +280,7 @@ class CondensedContact:
         self._offset[:, :n] = (gap + self._loads + np.array(opened)) / self._gap_scale
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
-        self._layer = layer
+        self._wearing = wearing
         x, f, iterations = self._solve(start)
         x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.contact.condensed import ContactState, Layer
+from fenwear.contact.condensed import ContactState, WearCompliance
 from fenwear.contact.inequality import check, configure
 from fenwear.interface import Interface
 from fenwear.parallel import lasting
@@ -113,7 +113,7 @@ class FullContact:
         self,
         gap: Array,
         start: ContactState | None = None,
-        layer: Layer | None = None,
+        wearing: WearCompliance | None = None,
         coupling: Array | None = None,
     ) -> ContactState:
         """Return the contact for the undeformed gap (n,), mm; collective.
@@ -122,10 +122,10 @@ class FullContact:
 
         Raises:
             ConvergenceError: SNES did not converge.
-            NotImplementedError: a layer or a coupling is given; only the condensed inequality takes them.
+            NotImplementedError: wear of the step or a coupling is given; only the condensed inequality takes them.
         """
-        if layer is not None or coupling is not None:
-            raise NotImplementedError("the full inequality has no layer and no coupling")
+        if wearing is not None or coupling is not None:
+            raise NotImplementedError("the full inequality has no wear of the step and no coupling")
         n, _ = self._size
         contact = slice(self._free, self._free + n)
         self._offset.array[:] = self._constant

@@ -49,7 +49,7 @@ from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import Worn, WornLayer
+from fenwear.sliding.wear import StepWear, Worn
 
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
@@ -260,7 +260,7 @@ class Stepper:
         self, gap: Array, start: ContactState | None, cycles: float, coupling: Array | None = None
     ) -> ContactState:
         self.watch()
-        return self.contact.solve(gap, start, WornLayer(self.wear, cycles), coupling)
+        return self.contact.solve(gap, start, StepWear(self.wear, cycles), coupling)
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""

@@ -16,7 +16,7 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.sliding.wear import PhasesWear, Worn, WornLayer
+from fenwear.sliding.wear import PhasesWear, StepWear, Worn
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
 COEFFICIENTS_FAIL = (
@@ -130,10 +130,10 @@ class PhaseStep:
     def _solve(
         self, temperature: HeatState | None, gap: Array, start: ContactState | None, wear: PhasesWear
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
-        layer = WornLayer(wear) if self.implicit else None
+        wearing = StepWear(wear) if self.implicit else None
         if self._thermal is None or temperature is None:
-            return self._contact.solve(gap, start, layer), None, None
-        return self._thermal.solve(temperature, gap, start, layer)
+            return self._contact.solve(gap, start, wearing), None, None
+        return self._thermal.solve(temperature, gap, start, wearing)
 
     def _end(
         self,

@@ -15,7 +15,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.contact import ContactSolver, ContactState, Layer
+from fenwear.contact import ContactSolver, ContactState, WearCompliance
 from fenwear.cycle.block import HalfCycleHeat
 from fenwear.errors import ConvergenceError
 from fenwear.heat.exchange import HeatExchange
@@ -62,7 +62,7 @@ class ThermalContact:
             self.exchange, self._response = self.exchange.with_friction(friction), None
 
     def solve(
-        self, temperature: HeatState, gap: Array, start: ContactState | None, layer: Layer | None
+        self, temperature: HeatState, gap: Array, start: ContactState | None, wearing: WearCompliance | None
     ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
         """Return contact, temperature at the end of the half-cycle, and its heat.
 
@@ -70,20 +70,20 @@ class ThermalContact:
             temperature: At the start.
             gap: Of the unloaded bodies at the initial temperature, worn depth included (n,), mm.
             start: The same phase one cycle ago.
-            layer: Wear of this half-cycle where its step is implicit.
+            wearing: Wear of this half-cycle where its step is implicit.
 
         Raises:
             ConvergenceError: contact and heat do not come together.
         """
         if start is None:
-            start = self._contact.solve(gap + self.exchange.gap(temperature, self.phase - 1), None, layer)
+            start = self._contact.solve(gap + self.exchange.gap(temperature, self.phase - 1), None, wearing)
         heat = self.system.heat
         if heat is not None and heat.coupling == "split":
-            return self._split(temperature, gap, start, layer)
-        return self._implicit(temperature, gap, start, layer)
+            return self._split(temperature, gap, start, wearing)
+        return self._implicit(temperature, gap, start, wearing)
 
     def _implicit(
-        self, temperature: HeatState, gap: Array, start: ContactState, layer: Layer | None
+        self, temperature: HeatState, gap: Array, start: ContactState, wearing: WearCompliance | None
     ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
         exchange, contact = self.exchange, start
         mean = self.system.rigid.mean_pressure
@@ -95,7 +95,7 @@ class ThermalContact:
             response = self._respond(conductance)
             exact = np.array_equal(response.conductance, conductance, equal_nan=True)
             free = gap + exchange.gap(after, self.phase) - response.gap @ pressure
-            contact = self._contact.solve(free, contact, layer, response.gap[None, :, None, :])
+            contact = self._contact.solve(free, contact, wearing, response.gap[None, :, None, :])
             change = contact.pressure[0] - pressure
             if agreed(self.system.comm, bool(np.abs(change).max() < CLOSE * mean)):
                 return contact, after, self._heat(after, terms, iteration)
@@ -126,7 +126,7 @@ class ThermalContact:
         return self._response
 
     def _split(
-        self, temperature: HeatState, gap: Array, start: ContactState, layer: Layer | None
+        self, temperature: HeatState, gap: Array, start: ContactState, wearing: WearCompliance | None
     ) -> tuple[ContactState, HeatState, HalfCycleHeat]:
         exchange, heat = self.exchange, self.system.heat
         relaxation, tolerance = (heat.relaxation, heat.split_tolerance) if heat else (1.0, 1e-4)
@@ -136,7 +136,7 @@ class ThermalContact:
             after, terms = exchange.half_cycle(temperature, self.phase, pressure, exchange.conductance(closed))
             free = gap + exchange.gap(after, self.phase)
             try:
-                contact = self._contact.solve(free, contact, layer)
+                contact = self._contact.solve(free, contact, wearing)
             except ConvergenceError as error:  # the heat of a pressure too far off opens all nodes
                 raise ConvergenceError(f"{error}; in iteration {iteration} of the split: {SPLIT_ADVICE}") from error
             before, volume = volume, gap_volume(self.system, free)

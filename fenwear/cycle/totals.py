@@ -168,4 +168,4 @@ def opposite_densities(system: Placed, phase: int) -> tuple[Array | None, Array 
     nodes = pair.strip.weights
     if system.sliding.track is not None:
         return punch, np.full(len(pair.weights), float(nodes @ strip) / float(nodes.sum()))
-    return punch, (pair.deposit.T @ (nodes * strip)) / pair.weights
+    return punch, (pair.wear_projection.T @ (nodes * strip)) / pair.weights

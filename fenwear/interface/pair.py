@@ -37,10 +37,10 @@ class ContactPair:
         normal: e_n (n, d), unit normals into the punch.
         weights: Areas of the nodes seen along e_n (n,), mm in the plane, mm² in a solid.
         transfer: Takes displacements and temperatures at the strip's trace nodes to the punch's nodes (n, N_strip).
-        material: Takes worn depths on the strip's material to the punch's nodes (n, n_strip), as `transfer` takes
-            the place of its nodes: a depth opens the gap as if the mesh had been made with it.
-        deposit: Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, and no
-            entry negative, so that no surface ever grows.
+        wear_interpolation: Takes worn depths on the strip's material to the punch's nodes (n, n_strip), as `transfer`
+            takes the place of its nodes: a depth opens the gap as if the mesh had been made with it.
+        wear_projection: Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, and
+            no entry negative, so that no surface ever grows.
         initial_gap: Distance along e_n before any deformation and wear (n,), mm.
     """
 
@@ -50,8 +50,8 @@ class ContactPair:
     normal: Array
     weights: Array
     transfer: csr_array
-    material: csr_array
-    deposit: csr_array
+    wear_interpolation: csr_array
+    wear_projection: csr_array
     initial_gap: Array
 
     @property
@@ -75,7 +75,7 @@ class ContactPair:
 
     def opening(self, punch: Array, strip: Array) -> Array:
         """Return the gap opened by depths worn off both bodies (n,), mm."""
-        return punch + self.material @ strip
+        return punch + self.wear_interpolation @ strip
 
     def interpolate(self, values: Array, x: Array) -> Array:
         """Return the finite-element function of nodal `values` (n,) of a plane contact at abscissae `x`, mm."""
@@ -122,8 +122,8 @@ def pair(
     gap += _profiles(punch, strip, material)
     # Forces act along the common normal: a node's weight is its area seen along it.
     weights = punch.weights * facing
-    deposit = _deposit(first, second, weights, strip.weights)
-    return ContactPair(punch, strip, placement, normal, weights, transfer, material, deposit, gap)
+    wear_projection = _wear_projection(first, second, weights, strip.weights)
+    return ContactPair(punch, strip, placement, normal, weights, transfer, material, wear_projection, gap)
 
 
 def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
@@ -140,11 +140,13 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     common = overlap(first, second)
     _check_covered(common, first, second, placement)
     material = _material(first, second, dual_transfer(first, second, common))
-    deposit = _deposit(first, second, middle.weights, middle.strip.weights)
+    wear_projection = _wear_projection(first, second, middle.weights, middle.strip.weights)
     # The profile of the strip's surface goes with its material.
     gap = middle.initial_gap + _profiles(middle.punch, middle.strip, material)
-    gap -= _profiles(middle.punch, middle.strip, middle.material)
-    return replace(middle, placement=placement, material=material, deposit=deposit, initial_gap=gap)
+    gap -= _profiles(middle.punch, middle.strip, middle.wear_interpolation)
+    return replace(
+        middle, placement=placement, wear_interpolation=material, wear_projection=wear_projection, initial_gap=gap
+    )
 
 
 def _profiles(punch: ContactSurface, strip: ContactSurface, material: csr_array) -> Array:
@@ -183,7 +185,7 @@ def _material(first: ChartedSurface, second: ChartedSurface, transfer: csr_array
     return dual_transfer(first, linear)
 
 
-def _deposit(first: ChartedSurface, second: ChartedSurface, weights: Array, strip_weights: Array) -> csr_array:
+def _wear_projection(first: ChartedSurface, second: ChartedSurface, weights: Array, strip_weights: Array) -> csr_array:
     """Return what puts depths of the punch's nodes on the strip's by the areas that their own areas share."""
     return csr_array(wear_transfer(first, second).multiply(weights[:, None]).T / strip_weights[:, None])
 

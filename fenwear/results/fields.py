@@ -297,7 +297,7 @@ def _contact_surfaces(system: Tribosystem, worn: Worn, pressure: Array) -> dict[
     rest = worn if system.bodies.moved is None else worn - system.bodies.moved
     pair = system.pair
     data: dict[str, Any] = {}
-    force = pair.material.T @ (pair.weights * pressure)
+    force = pair.wear_interpolation.T @ (pair.weights * pressure)
     surfaces = (
         ("punch", pair.punch, rest.punch, worn.punch, pressure),
         ("strip", pair.strip, rest.strip, worn.strip, force / pair.strip.weights),

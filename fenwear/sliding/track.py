@@ -31,7 +31,7 @@ LEVEL = 0.7  # cosine between a surface and the plane of rotation, above which s
 
 
 def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> ContactPair:
-    """Return the pair whose deposit spreads what is worn off the strip along a closed track.
+    """Return the pair whose wear_projection spreads what is worn off the strip along a closed track.
 
     Args:
         pair: The surfaces opposite each other.
@@ -41,7 +41,7 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
     rate = field.rate(pair.strip.x, pair.strip.outward)
     if pair.punch.dim == 2:
         spread = np.broadcast_to(pair.weights / (track * rate.mean()), (len(pair.strip.weights), len(pair.weights)))
-        return replace(pair, deposit=csr_array(spread))
+        return replace(pair, wear_projection=csr_array(spread))
     across = _across(field, pair.strip)
     punch, strip = _Crossing.of(pair.punch, across), _Crossing.of(pair.strip, across)
     count = int(np.clip(np.ceil(FINER * punch.span / punch.width), 1, RINGS))
@@ -55,7 +55,7 @@ def on_closed_track(pair: ContactPair, field: SlidingField, track: float) -> Con
     shares = strip.shares(edges)
     inside = shares.sum(axis=1)  # of the areas on the track's edge a part alone is worn, as deep as beside it
     means = diags_array(1 / np.where(inside > 0, inside, 1.0)) @ shares
-    return replace(pair, deposit=csr_array(means @ depths))
+    return replace(pair, wear_projection=csr_array(means @ depths))
 
 
 @dataclass(frozen=True)

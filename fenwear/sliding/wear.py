@@ -1,4 +1,4 @@
-"""The wear rule: depths worn in a phase on both bodies, and the wear of a step as a layer of the contact.
+"""The wear rule: depths worn in a phase on both bodies, and the wear of a step as a compliance of the contact.
 
 The punch's worn depth belongs to its contact nodes, the strip's to the strip's nodes, whose material
 moves under the punch: what is worn in a phase is put on the strip at its offset, so that its
@@ -105,7 +105,7 @@ class PhasesWear:
         strip = np.zeros(len(first.strip.weights))
         if self.strip is not None:
             for pair, depth in zip(self.pairs, self.strip.depth(pressure), strict=True):
-                strip += pair.deposit @ depth
+                strip += pair.wear_projection @ depth
         return Worn(self.depth(pressure).sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
@@ -128,7 +128,7 @@ class PhasesWear:
             right[:, nodes, nodes] = self.punch.slope(pressure)
         if self.strip is not None:
             for k, slope in enumerate(self.strip.slope(pressure)):
-                right[k, strip:] = self.pairs[k].deposit.toarray() * slope
+                right[k, strip:] = self.pairs[k].wear_projection.toarray() * slope
         return self._left, right
 
     def local(self, pressure: Array) -> Array | None:
@@ -144,9 +144,9 @@ class PhasesWear:
         if self.punch is not None:
             found = [csr_array(diags_array(slope)) for slope in self.punch.slope(pressure)]
         if self.strip is not None:
-            material = self.pairs[0].material
+            material = self.pairs[0].wear_interpolation
             for k, slope in enumerate(self.strip.slope(pressure)):
-                found[k] = csr_array(found[k] + material @ (self.pairs[k].deposit @ diags_array(slope)))
+                found[k] = csr_array(found[k] + material @ (self.pairs[k].wear_projection @ diags_array(slope)))
         return found
 
     @cached_property
@@ -156,13 +156,13 @@ class PhasesWear:
             n = len(self.pairs[0].weights)
             parts.append(np.broadcast_to(np.eye(n), (len(self.pairs), n, n)))
         if self.strip is not None:
-            parts.append(np.array([pair.material.toarray() for pair in self.pairs]))
+            parts.append(np.array([pair.wear_interpolation.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
 
 
 @dataclass(frozen=True)
-class WornLayer:
-    """The wear of `repeats` cycles at the pressures of their phases, as a layer of the contact.
+class StepWear:
+    """The wear of `repeats` cycles at the pressures of their phases, as a compliance of the contact.
 
     Put into the inequality it makes the step implicit: pressure and wear belong to its end, so that
     it is stable for any number of repeats.

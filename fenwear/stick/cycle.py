@@ -391,7 +391,7 @@ class Rig:
             places = [steps[(first + k) % len(steps)].offset for k in range(len(records))]
             for place in sorted(set(places)):
                 depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
-                strip += self.interface.position(place).pair.deposit @ depth
+                strip += self.interface.position(place).pair.wear_projection @ depth
         return Worn(records.punch_depth.sum(axis=0), strip)
 
     def _record(self, at: RigState, after: RigState, step: TimeStep) -> Records:

@@ -31,8 +31,8 @@ from fenwear.stick.state import Imposed, StickState
 ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
 
 
-class Guess(NamedTuple):
-    """The piece that a Newton step takes: closed (n,), slipping (n,), their trial (n, m) and mu p there (n,)."""
+class ContactStatus(NamedTuple):
+    """What a Newton step takes each node for: closed (n,), slipping (n,), their trial (n, m) and mu p there (n,)."""
 
     closed: Mask
     slipping: Mask
@@ -49,7 +49,7 @@ class Moved(NamedTuple):
 
 
 class Found(NamedTuple):
-    """The solution of a piece: all tractions (d n,), a, delta, the sign of its determinant, what moves if known."""
+    """What solves the equations of a contact status: f (d n,), a, delta, the sign of the determinant, what moves."""
 
     f: Array
     rigid: Array
@@ -104,18 +104,18 @@ class Step:
         j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
-    def solve(self, guess: Guess) -> Found:
-        """Return the solution of a piece.
+    def solve(self, status: ContactStatus) -> Found:
+        """Return the solution of a contact status.
 
         Raises:
-            ConvergenceError: the piece is singular.
+            ConvergenceError: its equations are singular.
         """
         n, m, r, mu = self.n, self.m, self.position.modes.shape[1], self.mu
-        closed = np.flatnonzero(guess.closed)
-        tied = guess.slipping[closed] if m == 1 else np.zeros(len(closed), dtype=bool)  # t = +-mu p
+        closed = np.flatnonzero(status.closed)
+        tied = status.slipping[closed] if m == 1 else np.zeros(len(closed), dtype=bool)  # t = +-mu p
         own = closed[~tied]
         columns = np.concatenate([closed, (n * (1 + np.arange(m)) + own[:, None]).ravel()])
-        ratio = np.sign(guess.trial[closed[tied], 0]) * mu[closed[tied]]
+        ratio = np.sign(status.trial[closed[tied], 0]) * mu[closed[tied]]
         k, loose = len(columns), self.imposed.force is not None
         A, b = np.zeros((k + r + loose, k + r + loose)), np.zeros(k + r + loose)
 
@@ -135,7 +135,7 @@ class Step:
         else:
             b[:k] += self.position.drive[columns] * unit[:, 0] * (self.imposed.displacement or 0.0)
         if m > 1:
-            self._slide(A, b, guess, own, len(closed))
+            self._slide(A, b, status, own, len(closed))
         balance = self.units / (self.length * self.area)
         fill(slice(k, k + r), self.position.balance * balance[:, None])
         b[k : k + r] = -self.imposed.loaded.resultant * balance
@@ -146,20 +146,20 @@ class Step:
         moved = float(x[-1] * self.length) if loose else float(self.imposed.displacement or 0.0)
         return Found(f, x[k : k + r] * self.units, moved, sign * (-1) ** r)
 
-    def _slide(self, A: Array, b: Array, guess: Guess, own: NDArray[np.int64], k: int) -> None:
+    def _slide(self, A: Array, b: Array, status: ContactStatus, own: NDArray[np.int64], k: int) -> None:
         """Turn the rows c s = 0 of nodes that slip in two directions into t - P(t - c s) = 0, linearised."""
-        m, places = self.m, np.flatnonzero(guess.slipping[own])
+        m, places = self.m, np.flatnonzero(status.slipping[own])
         nodes = own[places]
-        K, direction = derivative(guess.trial[nodes], guess.radius[nodes])
+        K, direction = derivative(status.trial[nodes], status.radius[nodes])
         rows = k + m * places[:, None] + np.arange(m)
         A[rows] = K @ A[rows]
         b[rows] = (K @ b[rows][:, :, None])[:, :, 0]
         A[rows[:, :, None], rows[:, None, :]] += np.eye(m) - K
-        pressures = np.searchsorted(np.flatnonzero(guess.closed), nodes)
+        pressures = np.searchsorted(np.flatnonzero(status.closed), nodes)
         A[rows, pressures[:, None]] -= self.mu[nodes, None] * direction
 
-    def look(self, found: Found) -> tuple[Guess, float]:
-        """Return the piece that a solution lies in, and the residual of the laws there over the largest pressure."""
+    def status_of(self, found: Found) -> tuple[ContactStatus, float]:
+        """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
         n = self.n
         gap, slip = self.jumps(found)
         pressure, traction = found.f[:n], found.f[n:].reshape(self.m, n).T
@@ -169,18 +169,18 @@ class Step:
         radius = self.mu * kept
         wrong = max(np.abs(pressure - kept).max(), np.abs(traction - project(trial, radius)).max())
         slipping = (np.linalg.norm(trial, axis=1) > radius) & (pushed > 0)
-        return Guess(pushed > 0, slipping, trial, radius), float(wrong / max(pressure.max(), 1e-300))
+        return ContactStatus(pushed > 0, slipping, trial, radius), float(wrong / max(pressure.max(), 1e-300))
 
     def state(self, found: Found, iterations: int, *, unique: bool) -> StickState:
         """Return the state at the end of the step, free of what rounding leaves in the laws."""
         n, position = self.n, self.position
-        guess, _ = self.look(found)
+        status, _ = self.status_of(found)
         gap, slip = self.jumps(found)
-        pressure = np.where(guess.closed, np.maximum(found.f[:n], 0.0), 0.0)
+        pressure = np.where(status.closed, np.maximum(found.f[:n], 0.0), 0.0)
         traction = project(found.f[n:].reshape(self.m, n).T, self.mu * pressure)
-        gap = np.where(guess.closed, 0.0, gap)
+        gap = np.where(status.closed, 0.0, gap)
         rounding = ROUNDING * pressure.max() * self.scale[1:].T
-        stuck = guess.closed & (~guess.slipping | (np.abs(slip) <= rounding).all(axis=1))
+        stuck = status.closed & (~status.slipping | (np.abs(slip) <= rounding).all(axis=1))
         slip = np.where(stuck[:, None], 0.0, slip)
         f = np.concatenate([pressure, traction.T.ravel()])
         moved = found.moved or self._moved(f)
@@ -195,7 +195,7 @@ class Step:
             float(position.pull @ f),
             self.free_punch + moved.on_punch,
             self.free_strip + moved.on_strip,
-            guess.trial,
+            status.trial,
             iterations,
             unique,
         )

@@ -282,6 +282,6 @@ def _shape(rig: Rig, zone: Mask, carried: tuple[Array, Array], size: float) -> F
     depth = np.maximum(-gap, 0.0)
     rates = [0.0 if law is None else float(law.rate.mean()) for law in (rig.wear.punch, rig.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
-    strip = rig.interface.middle.pair.deposit @ ((1 - share) * depth)
+    strip = rig.interface.middle.pair.wear_projection @ ((1 - share) * depth)
     worn = Worn(share * depth, strip)
     return FinalShape(zone, pressures[-1], depth, np.maximum(gap, 0.0), worn, pressures, size)

@@ -22,7 +22,7 @@ from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.parallel import on_root
 from fenwear.stick.cone import derivative
-from fenwear.stick.equations import Found, Guess, Moved, Step
+from fenwear.stick.equations import ContactStatus, Found, Moved, Step
 from fenwear.stick.interface import meshed
 from fenwear.stick.whole import WholeBodies
 
@@ -30,20 +30,20 @@ from fenwear.stick.whole import WholeBodies
 class FullStep(Step):
     """The equations of one time step on all displacements; arguments as of `Step`."""
 
-    def solve(self, guess: Guess) -> Found:
-        """Return the solution of a piece; collective.
+    def solve(self, status: ContactStatus) -> Found:
+        """Return the solution of a contact status; collective.
 
         Raises:
-            ConvergenceError: the piece is singular.
+            ConvergenceError: its equations are singular.
         """
         bodies = meshed(self.interface)
         whole = bodies.whole(self.position)
-        return on_root(bodies.bodies.comm, lambda: self._solve(whole, guess))
+        return on_root(bodies.bodies.comm, lambda: self._solve(whole, status))
 
-    def _solve(self, whole: WholeBodies, guess: Guess) -> Found:
+    def _solve(self, whole: WholeBodies, status: ContactStatus) -> Found:
         position, r, loose = self.position, self.position.modes.shape[1], self.imposed.force is not None
         count, size = self.d * self.n, whole.stiffness.shape[0]
-        A, B = self._piece(guess)
+        A, B = self._laws_of(status)
         rigid = csr_array(position.modes * self.units)
         drive = csr_array(-position.drive[:, None] * self.length)
         none = csr_array((size, 1))
@@ -69,16 +69,16 @@ class FullStep(Step):
         moved = Moved(whole.seen @ u, on_punch, on_strip)
         return Found(f, a * self.units, displacement, sign * (-1) ** r, moved)
 
-    def _piece(self, guess: Guess) -> tuple[csr_array, csr_array]:
-        """Return A and B (d n, d n) of the laws A f + B j = 0 of a piece."""
-        n, m, closed, slips = self.n, self.m, guess.closed, guess.closed & guess.slipping
+    def _laws_of(self, status: ContactStatus) -> tuple[csr_array, csr_array]:
+        """Return A and B (d n, d n) of the laws A f + B j = 0 of a contact status."""
+        n, m, closed, slips = self.n, self.m, status.closed, status.closed & status.slipping
         A = np.zeros((self.d, self.d, n))
         B = np.zeros((self.d, self.d, n))
         unit = 1 / self.scale
         A[0, 0], B[0, 0] = ~closed, closed * unit[0]
         K, direction = np.zeros((n, m, m)), np.zeros((n, m))
         if slips.any():
-            K[slips], direction[slips] = derivative(guess.trial[slips], guess.radius[slips])
+            K[slips], direction[slips] = derivative(status.trial[slips], status.radius[slips])
         for k in range(m):
             for j in range(m):
                 same = float(k == j)

@@ -9,7 +9,7 @@ import scipy.optimize
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
-from fenwear.stick.equations import Found, Guess, Step
+from fenwear.stick.equations import ContactStatus, Found, Step
 from fenwear.stick.full import FullStep
 from fenwear.stick.interface import OppositeBodies, Position, along_tangents
 from fenwear.stick.state import Imposed, StickState
@@ -36,8 +36,8 @@ def advance(
 ) -> StickState:
     """Return the state after a time step.
 
-    Newton starts from the piece of a state that is near, from that of the step before, then from full stick; where
-    all fail the step is halved.
+    Newton starts from the contact status of a state that is near, from that of the step before, then from full stick;
+    where all fail the step is halved.
 
     Args:
         interface: The bodies.
@@ -54,7 +54,7 @@ def advance(
     if near is not None:
         step = _step(interface, position, before, end, friction)
         try:
-            return _from(step, _piece(*near, friction), FEW)
+            return _from(step, _status(*near, friction), FEW)
         except ConvergenceError:
             pass
     try:
@@ -134,41 +134,41 @@ def _newton(step: Step) -> StickState:
     Raises:
         ConvergenceError: none does.
     """
-    first = _piece(step.before.pressure, step.before.trial, step.mu)
+    first = _status(step.before.pressure, step.before.trial, step.mu)
     none = np.zeros_like(first.closed)
     starts = [first, first._replace(slipping=none), first._replace(closed=~none, slipping=none)]
     failure = ConvergenceError("the contact with stick did not converge")
-    for guess in starts:
+    for status in starts:
         try:
-            found = _from(step, guess)
+            found = _from(step, status)
             return replace(found, unique=found.unique and not isinstance(failure, ManyAnswersError))
         except ConvergenceError as error:
             failure = failure if isinstance(failure, ManyAnswersError) else error
     if step.imposed.force is not None:
-        piece = _by_displacement(step, starts[1], step.imposed.force)
-        if piece is not None:
-            return _from(step, piece)
+        held = _by_displacement(step, starts[1], step.imposed.force)
+        if held is not None:
+            return _from(step, held)
     raise failure
 
 
-def _piece(pressure: Array, trial: Array, friction: Array) -> Guess:
-    """Return the piece that a state of this pressure (n,) and trial (n, m) lies in."""
+def _status(pressure: Array, trial: Array, friction: Array) -> ContactStatus:
+    """Return the contact status of a state of this pressure (n,) and trial (n, m)."""
     closed = pressure > 0
     closed = closed if closed.any() else ~closed
     limit = friction * pressure
-    return Guess(closed, closed & (np.linalg.norm(trial, axis=1) > limit), trial, limit)
+    return ContactStatus(closed, closed & (np.linalg.norm(trial, axis=1) > limit), trial, limit)
 
 
-def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
-    """Return the piece in which the rig's displacement gives an imposed force, found by bisection; None for none."""
+def _by_displacement(step: Step, status: ContactStatus, force: float) -> ContactStatus | None:
+    """Return the status in which the rig's displacement gives an imposed force, found by bisection; None for none."""
     held = _step(step.interface, step.position, step.before, replace(step.imposed, force=None), step.mu)
-    last = guess
+    last = status
 
     def missing(displacement: float) -> float:
         nonlocal last
         held.imposed = replace(held.imposed, displacement=displacement)
         found = _iterate(held, last)[0]
-        last = held.look(found)[0]
+        last = held.status_of(found)[0]
         return float(step.position.pull @ found.f) - force
 
     begin = step.before.displacement
@@ -186,26 +186,26 @@ def _by_displacement(step: Step, guess: Guess, force: float) -> Guess | None:
     return None
 
 
-def _from(step: Step, guess: Guess, most: int = MOST) -> StickState:
-    """Return the state after a step, by Newton's method from a piece, in at most so many steps.
+def _from(step: Step, status: ContactStatus, most: int = MOST) -> StickState:
+    """Return the state after a step, by Newton's method from a contact status, in at most so many steps.
 
     Raises:
         ConvergenceError: it does not converge.
     """
-    found, iterations, unique = _iterate(step, guess, most)
+    found, iterations, unique = _iterate(step, status, most)
     return step.state(found, iterations, unique=unique)
 
 
-def _iterate(step: Step, guess: Guess, most: int = MOST) -> tuple[Found, int, bool]:
+def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[Found, int, bool]:
     wrong, signs = np.inf, set[int]()
     for iteration in range(1, most + 1):
-        found = _solve(step, guess)
+        found = _solve(step, status)
         signs.add(found.sign)
-        guess, wrong = step.look(found)
+        status, wrong = step.status_of(found)
         if wrong < CLOSE:
             return found, iteration, min(signs) > 0
-        if not guess.closed.any():
-            guess = guess._replace(closed=np.ones_like(guess.closed))
+        if not status.closed.any():
+            status = status._replace(closed=np.ones_like(status.closed))
     failed = (
         f"the contact with stick did not converge in {most} Newton steps, residual {wrong:.3g} of the largest pressure"
     )
@@ -214,28 +214,28 @@ def _iterate(step: Step, guess: Guess, most: int = MOST) -> tuple[Found, int, bo
     raise ConvergenceError(f"{failed}: take more steps, or less friction")
 
 
-def _solve(step: Step, guess: Guess) -> Found:
-    """Return the solution of a piece; with a node stuck where an imposed force is held by nothing else.
+def _solve(step: Step, status: ContactStatus) -> Found:
+    """Return the solution of a contact status; with a node stuck where an imposed force is held by nothing else.
 
     In two directions nodes that all slip hold a force: their slips turn with it, where bodies spread unlike each other.
 
     Raises:
-        ConvergenceError: the piece is singular.
+        ConvergenceError: its equations are singular.
     """
-    if step.imposed.force is None or (guess.closed & ~guess.slipping).any():
-        return step.solve(guess)
+    if step.imposed.force is None or (status.closed & ~status.slipping).any():
+        return step.solve(status)
     if step.m == 1:
-        return step.solve(_one_stuck(guess))
+        return step.solve(_one_stuck(status))
     try:
-        return step.solve(guess)
+        return step.solve(status)
     except ConvergenceError:
-        return step.solve(_one_stuck(guess))
+        return step.solve(_one_stuck(status))
 
 
-def _one_stuck(guess: Guess) -> Guess:
-    """Return the piece with the node stuck that is nearest to it: under an imposed force something must hold."""
-    excess = np.linalg.norm(guess.trial, axis=1) - guess.radius
-    nearest = np.argmin(np.where(guess.closed, excess, np.inf))
-    slipping = guess.slipping.copy()
+def _one_stuck(status: ContactStatus) -> ContactStatus:
+    """Return the status with the node stuck that is nearest to it: under an imposed force something must hold."""
+    excess = np.linalg.norm(status.trial, axis=1) - status.radius
+    nearest = np.argmin(np.where(status.closed, excess, np.inf))
+    slipping = status.slipping.copy()
     slipping[nearest] = False
-    return guess._replace(slipping=slipping)
+    return status._replace(slipping=slipping)

@@ -252,8 +252,8 @@ def _derivative(rig: Rig, now: Cycle) -> Array:
                     step = steps[(now.first_step + k) % len(steps)]
                     slopes[row] += law.slope(records.pressure[k], slid[k], step.duration)
         left[closed, np.arange(len(closed))] = slopes[0, closed]
-        left[n:] = position.pair.deposit[:, closed].toarray() * slopes[1, closed]
-        right = np.concatenate([np.eye(n)[closed], position.pair.material[closed].toarray()], axis=1)
+        left[n:] = position.pair.wear_projection[:, closed].toarray() * slopes[1, closed]
+        right = np.concatenate([np.eye(n)[closed], position.pair.wear_interpolation[closed].toarray()], axis=1)
         A -= left @ (answer @ right)
     return A
 

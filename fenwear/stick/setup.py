@@ -69,7 +69,7 @@ def unheated_rig(
     )
     middle = interface.middle
     of_punch, of_strip = bodies.regions
-    regions = of_punch, {name: middle.pair.material @ share for name, share in of_strip.items()}
+    regions = of_punch, {name: middle.pair.wear_interpolation @ share for name, share in of_strip.items()}
     initial = 0.0 if case.heat is None else case.heat.initial
     laws = LocalLaws(sliding.friction, sliding.wear, regions, initial)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)

@@ -115,7 +115,7 @@ class LocalLaws:
             speed,
             (initial, initial) if temperatures is None else temperatures,
             (in_space(x), in_space(pair.placement.points_back(x))),
-            (none, none) if worn is None else (worn.punch, pair.material @ worn.strip),
+            (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             none if slid is None else slid,
             self.regions,
         )

@@ -137,7 +137,7 @@ def grid(side: int) -> Interface:
 
 @dataclass(frozen=True)
 class Wearing:
-    """What a step wears, as `fenwear.sliding.wear.WornLayer` has it."""
+    """What a step wears, as `fenwear.sliding.wear.StepWear` has it."""
 
     def opening(self, pressure: Array) -> Array:
         """Return the depth."""

@@ -13,7 +13,7 @@ from fenwear.arrays import Array
 from fenwear.contact import ContactState
 from fenwear.cycle import Block
 from fenwear.cycle.jump_error import force_difference
-from fenwear.sliding.wear import WornLayer
+from fenwear.sliding.wear import StepWear
 
 MEAN = 1e4 / 600
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")
@@ -44,9 +44,9 @@ def test_error_follows_the_tolerance(assembled: Callable[..., Tribosystem]) -> N
     contact = system.contact((1, -1))
     wear, state = np.zeros_like(system.pair.x), None
     for _ in range(2 * cycles):  # steps of half a cycle, as accurate as the shortest jump
-        layer = WornLayer(system.phases_wear, 0.5)
-        state = contact.solve(system.pair.initial_gap + wear, state, layer)
-        wear = wear + layer.opening(state.pressure)[0]
+        wearing = StepWear(system.phases_wear, 0.5)
+        state = contact.solve(system.pair.initial_gap + wear, state, wearing)
+        wear = wear + wearing.opening(state.pressure)[0]
     assert isinstance(state, ContactState)
     errors = [np.abs(end(system, 2 * cycles, t)[0] - state.pressure).max() / MEAN for t in (1e-2, 1e-3, 1e-4)]
     assert errors[2] < errors[1] < errors[0] < 0.1

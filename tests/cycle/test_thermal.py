@@ -145,9 +145,9 @@ def test_heat_may_be_lagged(assembled: Assemble, monkeypatch: pytest.MonkeyPatch
     solved: list[bool] = []
     solve = CondensedContact.solve
 
-    def noted(self: CondensedContact, gap: Array, start: Any = None, layer: Any = None, coupling: Any = None) -> Any:
+    def noted(self: CondensedContact, gap: Array, start: Any = None, wearing: Any = None, coupling: Any = None) -> Any:
         solved.append(coupling is not None)
-        return solve(self, gap, start, layer, coupling)
+        return solve(self, gap, start, wearing, coupling)
 
     monkeypatch.setattr(CondensedContact, "solve", noted)
     fresh = replace(system, exchange=system.exchange.varied(system.heat, system.exchange.friction))

@@ -28,10 +28,10 @@ def test_wear_never_makes_a_surface_grow(unmatched: Tribosystem) -> None:
     for node in range(len(pair.weights)):
         depth = np.zeros(len(pair.weights))
         depth[node] = 1.0
-        on_strip = pair.deposit @ depth
+        on_strip = pair.wear_projection @ depth
         assert on_strip.min() >= 0
         assert pair.strip.weights @ on_strip == pytest.approx(pair.weights[node], rel=1e-13)
-    np.testing.assert_allclose(pair.deposit @ np.ones(len(pair.weights)), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(pair.wear_projection @ np.ones(len(pair.weights)), 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["ball-on-flat", "ring-on-ring"])

@@ -16,7 +16,7 @@ from fenwear.case.dependence import evaluate_law
 from fenwear.cycle.stability import growth_rate
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.life.model import Model
-from fenwear.sliding.wear import WornLayer
+from fenwear.sliding.wear import StepWear
 
 Assemble = Callable[..., Tribosystem]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
@@ -141,7 +141,7 @@ def test_threshold_and_cap(assembled: Assemble) -> None:
     p = np.resize(np.array([0.0, 4.0, 6.0, 15.0, 25.0]), (1, len(system.pair.x)))
     depths = 1e-8 * 100 * np.resize(np.array([0.0, 0.0, 1.0, 100.0, 225.0]), p.shape)
     np.testing.assert_allclose(wear.depth(p), depths, rtol=1e-12)
-    layer, change = WornLayer(wear, 3.0), np.full_like(p, 1e-6)
+    layer, change = StepWear(wear, 3.0), np.full_like(p, 1e-6)
     left, right = layer.border(p)
     derivative = np.einsum("knq,jqi,ji->kn", left, right, change)
     differences = (layer.opening(p + change) - layer.opening(p - change)) / 2

@@ -44,7 +44,7 @@ def line(**motion: Any) -> dict[str, Any]:
 def test_uniform_wear_along_a_line(along: list[float], cells: dict[str, float]) -> None:
     """A block of 1 mm that loses a depth of 1 everywhere lowers a track of 50 mm by 1 / 50 over its own width."""
     placed = blocks(line(along=along), **cells)
-    depth = placed.pair.deposit @ np.ones(len(placed.pair.weights))
+    depth = placed.pair.wear_projection @ np.ones(len(placed.pair.weights))
     across = np.abs(placed.pair.strip.x[:, along.index(0)])
     np.testing.assert_allclose(depth[across < 0.5 + 1e-9], 0.02, rtol=1e-9)
     assert depth[across > 0.75 - 1e-9].max() == 0
@@ -58,7 +58,7 @@ def test_a_turn_about_a_far_axis_is_a_line() -> None:
     for name, motion in (("turn", turn), ("line", line(track=2000 * np.pi))):
         placed = blocks(motion)
         pressure = 1 + placed.pair.punch.x[:, 1] ** 2
-        depth[name] = placed.pair.deposit @ pressure
+        depth[name] = placed.pair.wear_projection @ pressure
     np.testing.assert_allclose(depth["turn"], depth["line"], rtol=1e-6)
 
 
@@ -67,11 +67,11 @@ def test_pin_on_a_disc(assembled: Callable[..., Tribosystem]) -> None:
     system = assembled("pin-on-disc", *DISC)
     x = system.pair.strip.x
     r, a, d = np.hypot(x[:, 0], x[:, 1]), 3.0, 15.0
-    found = system.pair.deposit @ np.ones(len(system.pair.weights))
+    found = system.pair.wear_projection @ np.ones(len(system.pair.weights))
     chord = np.arccos(np.clip((r**2 + d**2 - a**2) / (2 * r * d), -1, 1)) / np.pi
     inside = np.abs(r - d) < 0.7 * a
     np.testing.assert_allclose(found[inside], chord[inside], rtol=0.03)
-    assert system.pair.deposit.min() >= 0
+    assert system.pair.wear_projection.min() >= 0
     # All around: the volume of the profile is that of the layer worn off under the pin, 9 pi.
     order = np.argsort(r)
     volume = np.trapezoid(2 * np.pi * r[order] * found[order], r[order])

@@ -11,7 +11,7 @@ from fenwear import CaseError, Tribosystem, load_case
 from fenwear.arrays import Array
 from fenwear.case import Contact, Dependence, WearLaw
 from fenwear.sliding.friction import ContactConditions, Friction
-from fenwear.sliding.wear import WornLayer, coefficient
+from fenwear.sliding.wear import StepWear, coefficient
 
 BOTH = (
     "geometry.parameters.elements_along_contact=8",
@@ -39,7 +39,7 @@ def test_depth(assembled: Callable[..., Tribosystem], b: float) -> None:
 def test_layer_and_its_border(assembled: Callable[..., Tribosystem]) -> None:
     """The layer opens the gap by N cycles' wear of both bodies; L_k R_j is its derivative (central differences)."""
     system = assembled("example1", *BOTH)
-    layer = WornLayer(system.phases_wear, repeats=50)
+    layer = StepWear(system.phases_wear, repeats=50)
     shape = (len(system.motion.phases), len(system.pair.x))
     random = np.random.default_rng(1)
     p, change = random.uniform(1, 20, shape), random.uniform(-1, 1, shape)

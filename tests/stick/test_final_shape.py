@@ -104,7 +104,7 @@ def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.
     zone = stick_zone(driven)
     end = final_shape(driven, zone)
     last = list(jump(driven, 2_000_000, 0.02))[-1]
-    depth = last.worn.punch + interface.middle.pair.material @ last.worn.strip
+    depth = last.worn.punch + interface.middle.pair.wear_interpolation @ last.worn.strip
     pressure = last.records.pressure[-1]
     assert driven.weights @ np.where(zone, pressure, 0) == pytest.approx(LOAD, rel=1e-5)
     assert np.abs(pressure - end.pressure)[zone].max() < 2e-3 * pressure.max()

@@ -97,7 +97,7 @@ def strip_wears_where_it_meets(patch: Patch) -> None:
     """Depths put on the strip's nodes by interpolation, which keeps no area."""
     _pairs_with(
         patch,
-        lambda pair: {"deposit": csr_array(interpolation(pair.x, pair.punch.degree, pair.strip.x[:, 0]))},
+        lambda pair: {"wear_projection": csr_array(interpolation(pair.x, pair.punch.degree, pair.strip.x[:, 0]))},
     )
 
 

@@ -30,6 +30,7 @@ from sphinx.errors import ExtensionError
 from sphinx.util import logging
 
 ROOT = Path(__file__).parents[2]
+VERIFICATION = ROOT / "tests" / "verification"
 DEMOS, PAGES = ROOT / "demos", ROOT / "docs" / "notebooks"
 SECONDS = 1800  # ends what hangs, however busy the machine
 # Those that take minutes, as their tests run them: a coarse mesh, fewer variants. A note on the page says so.
@@ -68,7 +69,7 @@ class _Manager(AsyncKernelManager):  # type: ignore[misc]
 def _code() -> bytes:
     """Return a checksum of what any notebook may use."""
     found = hashlib.sha256(Path(__file__).read_bytes())
-    for path in sorted([*(ROOT / "fenwear").rglob("*"), *(ROOT / "meshes").glob("*")]):
+    for path in sorted([*(ROOT / "fenwear").rglob("*"), *VERIFICATION.rglob("*.py"), *(ROOT / "meshes").glob("*")]):
         if path.is_file() and "__pycache__" not in path.parts:
             found.update(path.relative_to(ROOT).as_posix().encode() + path.read_bytes())
     return found.digest()
@@ -122,7 +123,7 @@ def execute(path: Path, key: str) -> None:
         ExtensionError: a cell failed or wrote to standard error, a figure is missing, or a file was left behind.
     """
     notebook = nbformat.read(path, as_version=4)
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": f"{ROOT}:{VERIFICATION}"}
     if path.stem in LONG:
         environment["FENWEAR_DEMO_COARSE"] = "1"
         notebook.cells.insert(1, nbformat.v4.new_markdown_cell(NOTE))

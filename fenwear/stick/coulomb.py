@@ -37,7 +37,7 @@ from fenwear.sliding.motion import make_motion
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig, RigState
 from fenwear.stick.final import FinalShape, final_shape
-from fenwear.stick.fineness import Ends, Fineness, fine_enough, with_ends
+from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
 from fenwear.stick.interface import meshed
 from fenwear.stick.jump import Cycle, first_cycle, jumped
 from fenwear.stick.setup import heated, unheated_rig
@@ -183,7 +183,8 @@ class Coulomb:
             bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
         moves = unheated_rig(case, bodies, condensed=condensed).interface.moves
         same = condensed if moves == system.condensed.strip_moves else None
-        return system_of(case, bodies, condensed=same, ends=system.lawful.ends)
+        ends = system.lawful.ends if same_steps(before, case) else None
+        return system_of(case, bodies, condensed=same, ends=ends)
 
     def end(self, system: Tribosystem) -> FinalShape:
         """Return the shape to which partial slip wears; collective."""

@@ -83,6 +83,11 @@ def with_ends(rig: Rig, case: Case, ends: Ends) -> Rig:
     return _driven(rig, case, _finest(case), ends)
 
 
+def same_steps(one: Case, other: Case) -> bool:
+    """Return whether time steps chosen for one case are steps of the other: both ask for as many, as fine."""
+    return one.stick == other.stick and len(_finest(one).steps) == len(_finest(other).steps)
+
+
 def _finest(case: Case) -> Program:
     return make_program(case, case.stick.steps * WHOLE)
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import xarray
 
-from fenwear import CaseError, load_case
+from fenwear import CaseError, assemble, load_case, march, vary
 from fenwear.cycle.totals import Totals
 from fenwear.errors import InterruptedRunError
 from fenwear.report.compare import compare, comparison_figure
@@ -174,3 +174,16 @@ def test_runs_are_compared(ran: tuple[dict, Path], tmp_path: Path) -> None:
     titles = [ax.get_title(loc="left") for ax in comparison_figure(found).axes]
     assert titles[0] == "Loop of the last cycle"
     assert "Work of friction in a cycle" in titles
+
+
+def test_time_steps_are_chosen_anew_where_others_are_asked_for() -> None:
+    """Steps that end at numbers of finer ones than there are would never end a half-cycle."""
+    small = ("geometry.parameters.elements_along_contact=12", "motion.positions=1", "contact.law=coulomb")
+    system = assemble(load_case("fretting-partial-slip", [*small, "stick.steps=4"]))
+    for settings in (["stick.steps=8"], ["motion.amplitude=2 um"], ["stick.step_tolerance=1", "stick.steps=3"]):
+        varied = vary(system, *settings)
+        (block,) = march(varied, 2)
+        assert block.end.half_cycle == 2
+        again = assemble(varied.case)
+        if "stick.steps" in " ".join(settings):
+            np.testing.assert_allclose(block.pressure, next(march(again, 2)).pressure, rtol=1e-9, atol=1e-9)

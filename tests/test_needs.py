@@ -87,7 +87,7 @@ def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refused before anything is factored, with the mesh that would fit."""
     placed = place_case(load_case("ball-on-flat", COARSE))
     monkeypatch.setattr(ways, "SMALL", 0.0)
-    monkeypatch.setattr(tribosystem, "condense_together", lambda *_, **__: pytest.fail("condensed all the same"))
+    monkeypatch.setattr(tribosystem, "operators_for", lambda *_, **__: pytest.fail("condensed all the same"))
     expected = (
         r"geometry: .* unknowns, .* are free, and no setup\.way would fit: .*; elements \d\.\d times as large would"
     )

@@ -63,7 +63,7 @@ def test_a_distributed_system_is_the_same_system(assembled: Callable[..., Tribos
 def test_all_ranks_hold_the_same_bits(assembled: Callable[..., Tribosystem]) -> None:
     """The replicated interface is equal to the last bit, so that no rank takes another Newton step."""
     system = assembled("example1")
-    mine = (system.interface.gap_by_force, steady(system).pressure)
+    mine = (system.interface.dense(), steady(system).pressure)
     for array in mine:
         for other in COMM.allgather(array):
             np.testing.assert_array_equal(array, other)

@@ -14,6 +14,7 @@ from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic, nodal_function
 from fenwear.bodies.mesh import BodyMesh, build_meshes
+from fenwear.bodies.operators import check_operators
 from fenwear.bodies.regions import contact_regions
 from fenwear.bodies.shape import follow_wear, movable_surface
 from fenwear.case import Body, Case
@@ -132,6 +133,7 @@ def build_bodies(
         CaseError: what only the geometry can tell is wrong, such as a missing group.
         MeshQualityError: an element does not survive the motion.
     """
+    check_operators(case)
     release(comm)  # what earlier systems have left
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, _owners(case, comm), case.diffusion)
     moved = None if followed is None else _moved(case, meshes, followed)

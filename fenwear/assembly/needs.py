@@ -15,9 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.placed import Placed
 from fenwear.bodies.elasticity import ElasticBody, Solver
 from fenwear.bodies.response import BLOCK, SURFACE_SHARE, Request
+from fenwear.case import CONDENSED
 from fenwear.heat.passing_strip import MANY
 from fenwear.memory import GIB, memory_size
 
@@ -157,6 +159,7 @@ class Needs:
         interfaces: Positions of the strip, and loads, that differ.
         phases: Of the motion.
         copies: Of the contact: one on each rank, unless ranks share it.
+        numbers: Whether the contact is matrices of numbers.
     """
 
     punch: BodyNeeds
@@ -165,12 +168,13 @@ class Needs:
     interfaces: int
     phases: int
     copies: int = 1
+    numbers: bool = True
 
     def coarser(self, times: float) -> Needs:
         """Return the same of elements so many times as large."""
         nodes = self.nodes * times ** (1 - self.punch.dim)
         parts = (self.punch.coarser(times), self.strip.coarser(times))
-        return Needs(*parts, nodes, self.interfaces, self.phases, self.copies)
+        return replace(self, punch=parts[0], strip=parts[1], nodes=nodes)
 
     @property
     def memory(self) -> float:
@@ -180,7 +184,7 @@ class Needs:
     @property
     def contact(self) -> float:
         """Bytes of the whole contact, once."""
-        return _contact(self.nodes, self.interfaces, self.punch.dim, self.phases)
+        return _contact(self.nodes, self.interfaces, self.punch.dim, self.phases) if self.numbers else 0.0
 
     @property
     def seconds(self) -> float:
@@ -239,7 +243,13 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = Fal
     of_punch = body_needs(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
     one = not moves or (fixed and flat)
     of_strip = body_needs(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
-    return Needs(of_punch, of_strip, n, _interfaces(placed), len(placed.pairs), 1 if shared else placed.comm.size)
+    copies, numbers = 1 if shared else placed.comm.size, condensed(bodies)
+    return Needs(of_punch, of_strip, n, _interfaces(placed), len(placed.pairs), copies, numbers)
+
+
+def condensed(bodies: Bodies) -> bool:
+    """Return whether a body is condensed, so that the contact is matrices of numbers."""
+    return CONDENSED in (bodies.punch.operator, bodies.strip.operator)
 
 
 def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool = False) -> BodyNeeds:
@@ -251,6 +261,8 @@ def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool 
         columns: Solutions.
         heat: Whether its answer to temperatures is asked for, too.
     """
+    if elastic.operator != CONDENSED:
+        return BodyNeeds(elastic.dim, elastic.size, 0, 0, 0, 0, 0, way=elastic.setup.way, made=True)
     size, surface = elastic.size, elastic.surface_dofs.size
     temperatures = size / elastic.dim if heat else 0.0
     entries, solver = elastic.matrix_entries(), elastic.solver

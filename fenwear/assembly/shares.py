@@ -12,6 +12,7 @@ from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.condensation import deal
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.schur import available
+from fenwear.case import CONDENSED
 from fenwear.memory import memory_size
 
 DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular solutions of dense matrices
@@ -42,7 +43,10 @@ def body_lines(bodies: Bodies, wanted: Needs) -> list[str]:
     own = (wanted.punch, wanted.strip)
     dealt = reversed(deal([need.holders for need in reversed(own)], bodies.comm.size))
     return [
-        _text(body, need, ranks) for body, need, ranks in zip((bodies.punch, bodies.strip), own, dealt, strict=True)
+        _text(body, need, ranks)
+        if body.operator == CONDENSED
+        else f"{body.body.name}: operator '{body.operator}', nothing is factored"
+        for body, need, ranks in zip((bodies.punch, bodies.strip), own, dealt, strict=True)
     ]
 
 

@@ -17,9 +17,11 @@ from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.needs import Needs, contact_memory, needs
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.ways import chosen, free_on_ranks, settle
-from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
+from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.response import Request
+from fenwear.bodies.operators import SurfaceOperator, operators_for
+from fenwear.bodies.response import Request, identity
+from fenwear.case import CONDENSED
 from fenwear.case.program import speeds_of
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
 from fenwear.contact.full import FullContact
@@ -52,8 +54,8 @@ class Condensed:
             its passage (q, owned), mm/K, where it conducts and passes under the punch.
     """
 
-    punch: CondensedBody
-    strip: CondensedBody
+    punch: SurfaceOperator
+    strip: SurfaceOperator
     strip_moves: bool
     rows: Rows | None = None
     passed: Array | None = None
@@ -64,11 +66,7 @@ class Condensed:
 
     def under_loads(self, bodies: Bodies) -> Condensed:
         """Return the same under the loads of these bodies; collective."""
-        punch, strip = (
-            replace(condensed, by_load=respond_to_load(elastic, condensed.patterns))
-            for condensed, elastic in ((self.punch, bodies.punch), (self.strip, bodies.strip))
-        )
-        return replace(self, punch=punch, strip=strip)
+        return replace(self, punch=self.punch.under(bodies.punch), strip=self.strip.under(bodies.strip))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -238,17 +236,17 @@ def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None =
     if moves:
         trace = middle.strip.trace
         along = np.broadcast_to(middle.normal_on_strip[0], trace.shape) if fixed and flat else None
-        onto_strip = Request(bodies.strip, _identity(len(trace)), along, couplings[1], of_strip)
+        onto_strip = Request(bodies.strip, identity(len(trace)), along, couplings[1], of_strip)
     else:
         opposite = csr_array(middle.transfer.T)
         onto_strip = Request(bodies.strip, opposite, middle.normal_on_strip, couplings[1], of_strip)
     if placed.passage is not None:
         onto_strip = _with_passage(onto_strip, placed.pair.strip, placed.passage)
-    punch, strip = condense_together([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
+    punch, strip = operators_for([onto_punch, onto_strip], keep=bodies.warmed is None, fresh=fresh)
     for coupling in couplings:
         if coupling is not None:
             coupling.destroy()
-    if placed.passage is None or strip.by_temperature is None:
+    if placed.passage is None or strip.by_temperature is None or not isinstance(strip, CondensedBody):
         return Condensed(punch, strip, moves, rows)
     n = len(middle.weights)
     return Condensed(punch, strip.first(n), moves, rows, strip.by_temperature[n:])
@@ -272,6 +270,7 @@ def shared_rows(placed: Placed) -> Rows | None:
     """
     comm, taken = placed.comm, contact_memory(placed)
     alone = comm.size == 1 or placed.bodies.punch.setup.reproducible
+    alone = alone or any(body.operator != CONDENSED for body in (placed.bodies.punch, placed.bodies.strip))
     if alone or placed.heat is not None or placed.solver != "condensed":
         return None
     if taken < SHARED and taken * comm.size < COPIES * SHARED:
@@ -288,11 +287,6 @@ def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np
         return nodes, nodes
     below = [csr_array(pair.transfer[rows.own]).indices for pair in (placed.pair, *placed.pairs)]
     return nodes, np.unique(np.concatenate(below)).astype(np.int64)
-
-
-def _identity(size: int) -> csr_array:
-    every = np.arange(size)
-    return csr_array((np.ones(size), (every, every)), shape=(size, size))
 
 
 def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:

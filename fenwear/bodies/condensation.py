@@ -11,7 +11,7 @@ Where the contact frame changes from place to place every pattern is solved for 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Nodes
 from fenwear.bodies import kept
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import entries, make_together, solve_together
 from fenwear.bodies.response import Request, respond_together
 from fenwear.bodies.substructure import make_substructures
 
-EVERY = slice(None)
 LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
 
 
@@ -65,33 +64,39 @@ class CondensedBody:
         answers = self.response[:count, :, :count]
         return CondensedBody(self.patterns[:, :count], self.directions[:count], answers, self.by_load[:count], warm)
 
-    def normal_response(self, normal: Array, reading: csr_array | None = None, own: slice = EVERY) -> Array:
-        """Return the displacement along e_n at contact nodes from unit forces along the axes at each (rows, n, d).
+    @property
+    def cost(self) -> float | None:
+        """None: its numbers are in memory."""
+        return None
 
-        By Maxwell and Betti the displacement at a node is the work of a force there, so that rows need the columns
-        of their own patterns alone.
+    def apply(self, forces: Array) -> Array:
+        """Return the displacements (q, a, ...) of forces (q, d, ...): of the patterns that it has the columns of.
 
-        Args:
-            normal: e_n of the contact nodes (n, d), in the body's own frame.
-            reading: Share of each pattern in what a contact node sees, and in the force that it gives
-                back (n, q); by default the patterns are the contact nodes'.
-            own: Which rows; by default all.
+        By Maxwell and Betti the displacement at a pattern is the work of a force there.
         """
-        q, d = self.by_load.shape
-        kept = np.arange(q) if self.kept is None else self.kept
-        fixed = self.directions.shape[2] == 1
-        if reading is None:
-            first, last = np.searchsorted(kept, own.indices(q)[:2])
-            answers = self.response[:, :, first:last]
-            if fixed:
-                return answers[:, :, :, 0].transpose(2, 0, 1)
-            return np.einsum("ic,jbic->ijb", normal[own], answers)
-        rows, found = csr_array(reading[own])[:, kept], np.zeros((len(normal[own]), len(normal), d))
-        for axis in range(d):
-            for across in range(1 if fixed else d):  # along e_l, or each axis, from a force along `axis`
-                seen = (reading @ (rows @ self.response[:, axis, :, across].T).T).T
-                found[:, :, axis] += seen if fixed else normal[own, across, None] * seen
-        return found
+        loaded = np.flatnonzero(forces.reshape(len(forces), -1).any(axis=1))
+        return product(self.entries(slice(None), loaded), forces[loaded])
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the displacements at patterns from unit forces at others (rows, a, columns, d); views of slices."""
+        if isinstance(rows, slice) or isinstance(columns, slice):
+            return self.response[columns][:, :, rows].transpose(2, 3, 0, 1)
+        return self.response[columns, :, rows[:, None]].transpose(0, 3, 1, 2)
+
+    def diagonal(self) -> Array:
+        """Return the displacements at each pattern from unit forces at itself (q, a, d)."""
+        every = np.arange(len(self.response))
+        return self.response[every, :, every].transpose(0, 2, 1)
+
+    def under(self, elastic: ElasticBody) -> CondensedBody:
+        """Return the same under the loads of a body that differs by them alone; collective."""
+        return replace(self, by_load=self.patterns.T @ _under_loads([elastic])[0])
+
+
+def product(numbers: Array, forces: Array) -> Array:
+    """Return numbers of an operator (rows, a, columns, d) times forces (columns, d, ...): (rows, a, ...)."""
+    found = np.tensordot(forces, numbers, ((0, 1), (2, 3)))
+    return np.moveaxis(np.asarray(found, dtype=np.float64), (-2, -1), (0, 1))
 
 
 def condense(
@@ -209,11 +214,6 @@ def _symmetric(response: Array, along: Array) -> Array:
     part = np.einsum("kca,kclb->kalb", along, response).reshape(q * count, q * count)
     change = ((part.T - part) / 2).reshape(q, count, q, count)
     return response + np.einsum("kca,kalb->kclb", along, change)
-
-
-def respond_to_load(elastic: ElasticBody, patterns: csr_array) -> Array:
-    """Return the displacement at each pattern under the body's loads (q, d), mm; collective."""
-    return np.asarray(patterns.T @ _under_loads([elastic])[0])
 
 
 def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:

@@ -53,6 +53,7 @@ class ElasticBody:
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         given: Resultant of the loads (d,), N.
         swallowed: What of it acts where supports hold that very component (d,), N: it reaches nothing else.
+        operator: Name of how its contact surface answers to forces.
         setup: How it is condensed.
         solver: What solves for its columns; set before the first solution, by the memory that there is.
         holders: How many ranks have its factor at once and share its columns; set likewise.
@@ -81,6 +82,7 @@ class ElasticBody:
             CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
         """
         self.body, self.law, self.thickness, self.setup = body, law, thickness, setup
+        self.operator = description.operator
         self.solver: Solver = "factor"
         self.holders = 1
         if setup.way == "low-rank" or setup.way == "multigrid":  # noqa: PLR1714  (mypy does not narrow by "in")

@@ -105,6 +105,12 @@ class Request:
         return elastic.boundary.largest**3 <= BOUNDARY_SHARE * operations(elastic.size, elastic.dim)
 
 
+def identity(size: int) -> csr_array:
+    """Return patterns that are the nodes themselves (size, size)."""
+    every = np.arange(size)
+    return csr_array((np.ones(size), (every, every)), shape=(size, size))
+
+
 def respond_together(requests: Sequence[Request]) -> list[tuple[Array, Array | None]]:
     """Return the response (q, d, q a) and that to temperature (q, owned), or None, of each body; collective.
 

@@ -1,6 +1,6 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
-from fenwear.case.bodies import Body, Geometry, Load, Model, Prescribed, Support
+from fenwear.case.bodies import CONDENSED, Body, Geometry, Load, Model, Prescribed, Support
 from fenwear.case.course import Output, Run
 from fenwear.case.dependence import register_law
 from fenwear.case.laws import Contact, Dependence, Stick, Wear, WearLaw
@@ -14,6 +14,7 @@ from fenwear.case.setup import Setup, Way
 from fenwear.case.thermal import Heat, Track
 
 __all__ = [
+    "CONDENSED",
     "Body",
     "Case",
     "Contact",

@@ -22,6 +22,8 @@ from fenwear.case.quantities import (
 )
 from fenwear.case.units import convert, shown
 
+CONDENSED = "condensed"  # operator of a body whose mesh is eliminated down to its contact surface
+
 
 def _parameter(value: object) -> float:
     """Convert a geometry parameter: a plain number, or a length with its unit."""
@@ -183,6 +185,11 @@ class Body(Part):
     temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
     pivot: Point | None = Field(
         default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
+    )
+    operator: str = Field(
+        default=CONDENSED,
+        description="how its contact surface answers to forces: condensed: as its mesh does; half-space: as one of its "
+        "material, or half-plane, without supports and other boundaries, fast for many nodes; or one made in Python",
     )
     profile: Profile | None = Field(
         default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import Body, Geometry, Model
+from fenwear.case.bodies import CONDENSED, Body, Geometry, Model
 from fenwear.case.course import Output, Program, Run
 from fenwear.case.diffusion import diffusion_of
 from fenwear.case.laws import Contact, Dependence, Stick, Wear
@@ -89,7 +89,7 @@ class Case(Part):
         if self.contact.solver == "full" and self.run.integration != "explicit":
             problems.append("contact.solver: expected 'condensed' for implicit integration and cycle jumps")
         problems += self.setup.problems(None if self.heat is None else self.heat.operator, self.contact.solver)
-        problems += [*self._kind_problems(), *self._sliding_problems()]
+        problems += [*self._kind_problems(), *self._sliding_problems(), *self._operator_problems()]
         problems += [*self._program_problems(), *self._stick_problems()]
         problems += [
             f"{body}.regions: missing, but required"
@@ -104,6 +104,17 @@ class Case(Part):
         if problems:
             raise ValueError("\n".join(problems))
         return self
+
+    def _operator_problems(self) -> list[str]:
+        """Return what does not go with bodies whose meshes are not what answers to forces."""
+        others = [name for name, body in (("punch", self.punch), ("strip", self.strip)) if body.operator != CONDENSED]
+        against = {
+            "with heat: temperatures expand the bodies' meshes": self.heat is not None,
+            "with contact.solver = 'full', on the bodies' meshes": self.contact.solver == "full",
+        }
+        return [
+            f"{name}.operator: expected '{CONDENSED}' {why}" for name in others for why, so in against.items() if so
+        ]
 
     def _kind_problems(self) -> list[str]:
         """Return what does not go with a plane, an axisymmetric or a solid model."""

@@ -65,7 +65,9 @@ class Columns:
         self._place[new] = np.arange(self.made, count)
         self._numbers = np.concatenate([self._numbers, new])
 
-    def multiply(self, x: Array) -> Array:
+    cost: float | None = None  # its numbers are in memory
+
+    def apply(self, x: Array) -> Array:
         """Return the matrix times x (size,)."""
         self._have(np.flatnonzero(x))
         return np.asarray(self._made[:, : self.made] @ x[self._numbers])
@@ -79,7 +81,11 @@ class Columns:
 class Compliance(Protocol):
     """A square matrix that gives products and some of its numbers."""
 
-    def multiply(self, x: Array) -> Array:
+    @property
+    def cost(self) -> float | None:
+        """Of a product, in numbers that memory could give meanwhile; None for a matrix of numbers."""
+
+    def apply(self, x: Array) -> Array:
         """Return the matrix times x (size,)."""
 
     def entries(self, rows: Indices, columns: Indices) -> Array:
@@ -90,7 +96,7 @@ class PhaseBlock:
     """[S, H; E, 0] of one phase, with n pressures and r rigid modes.
 
     Args:
-        compliance: S, column by column.
+        compliance: S.
         diagonal: Of S (n,).
         modes: H (n, r).
         balance: E (r, n).
@@ -114,7 +120,7 @@ class PhaseBlock:
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x (n + r,)."""
         p, a = x[: self.nodes], x[self.nodes :]
-        return np.concatenate([self.compliance.multiply(p) + self.modes @ a, self.balance @ p])
+        return np.concatenate([self.compliance.apply(p) + self.modes @ a, self.balance @ p])
 
     def entries(self, rows: Indices, columns: Indices) -> Array:
         """Return the numbers of some rows and columns, ascending or of pressures alone."""
@@ -131,9 +137,17 @@ class PhaseBlock:
         every = np.arange(self.size, dtype=np.int32)
         return self.entries(every, every)
 
-    def factors(self, entries: Callable[[Indices, Indices], Array], diagonal: Array | None, _wear: Array) -> Updating:
+    def factors(self, entries: Callable[[Indices, Indices], Array], diagonal: Array | None, wear: Array) -> Updating:
         """Return the factors of its sets, with wear (n,) on the diagonal that is in the entries already."""
-        return Updating(entries, diagonal)
+        if self.compliance.cost is None:
+            return Updating(entries, diagonal)
+
+        def multiply(x: Array) -> Array:
+            found = self.multiply(x)
+            found[: self.nodes] += wear * x[: self.nodes]
+            return found
+
+        return Updating(entries, diagonal, multiply, self.compliance.cost)
 
     def worn(self, wear: Array) -> Updating:
         """Return factors of the same with wear (n,) on the diagonal; those of the last are kept."""

@@ -42,8 +42,8 @@ class SpreadPhases:
     def __init__(self, interfaces: Sequence[Interface], ratios: Sequence[Array], scale: float) -> None:
         rows = interfaces[0].rows or Rows.equal(MPI.COMM_SELF, len(interfaces[0].pair.weights))
         self.team = Team.of(rows.comm)
-        places = list({id(own.gap_by_force): own.gap_by_force for own in interfaces}.values())
-        which = [np.flatnonzero([own.gap_by_force is place for own in interfaces]) for place in places]
+        places = list({id(own): own for own in interfaces}.values())
+        which = [np.flatnonzero([own is place for own in interfaces]) for place in places]
         traction = [
             (own.pair.normal + ratio) * own.pair.weights[:, None] * scale
             for own, ratio in zip(interfaces, ratios, strict=True)

@@ -19,7 +19,6 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
@@ -159,7 +158,7 @@ class CondensedContact:
             if self._many:
                 blocks[k] = self._block(k, scale, modes, balance)
             else:
-                self._dense[k, :n, :n] = interface.compliance(ratio) * scale
+                self._dense[k, :n, :n] = interface.compliance(ratio, scale).matrix()
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
         if len(self.phases) > 1 and (n >= LARGE or self._shared):
@@ -167,15 +166,16 @@ class CondensedContact:
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
         """Return the block of a phase of many nodes."""
-        interface, ratio = self.phases[k].interface, self._ratios[k]
-        make, diagonal = partial(_scaled_columns, interface, ratio, scale), interface.own_compliance(ratio) * scale
-        alone, rows = len(self.phases) == 1, interface.rows
+        interface, alone = self.phases[k].interface, len(self.phases) == 1
+        compliance, rows = interface.compliance(self._ratios[k], scale), interface.rows
+        diagonal = compliance.diagonal()
         if rows is None:
-            return PhaseBlock(Columns(len(modes), make), diagonal, modes, balance, iterated=alone)
-        compliance = SpreadCompliance(self._team, OwnRows(rows, make))
+            known = Columns(len(modes), compliance.columns) if compliance.cost is None else compliance
+            return PhaseBlock(known, diagonal, modes, balance, iterated=alone)
+        spread = SpreadCompliance(self._team, OwnRows(rows, compliance.columns))
         if alone:
-            return SpreadBlock(compliance, diagonal, modes, balance)
-        return PhaseBlock(compliance, diagonal, modes, balance, iterated=False)
+            return SpreadBlock(spread, diagonal, modes, balance)
+        return PhaseBlock(spread, diagonal, modes, balance, iterated=False)
 
     def press(self, factor: float) -> None:
         """Take all loads times a factor."""
@@ -329,7 +329,3 @@ class CondensedContact:
         full[:, : self.shape[1]] = 1.0
         yield full, False, FULL_START
         yield full, True, FULL_START_SEARCH
-
-
-def _scaled_columns(interface: Interface, ratio: Array, scale: float, nodes: NDArray[np.int64]) -> Array:
-    return interface.compliance_of(ratio, nodes) * scale

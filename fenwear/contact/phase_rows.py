@@ -9,16 +9,44 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array, Mask
+from fenwear.arrays import Array, Mask, Nodes
+from fenwear.bodies.condensation import product
 from fenwear.contact.operators import Solve, eliminate
 from fenwear.contact.worn_shape import WornShape
 
+EVERY = slice(None)
 RUN = 1000  # pressures of neighbouring nodes that are eliminated together
 FEW = 0.5  # of all nodes: where no more touch in any phase, what they open at each other is copied
+
+
+class Place(Protocol):
+    """What forces on nodes open at this rank's own, as `fenwear.interface.Interface` has it in a place of the strip."""
+
+    def apply(self, forces: Array) -> Array:
+        """Return the gaps (own, 1, k), mm, by forces (n, d, k)."""
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the gaps at some nodes from unit forces along the axes at others (rows, 1, columns, d)."""
+
+
+@dataclass(frozen=True)
+class SomeNodes:
+    """The same of some nodes, by numbers (own, 1, n, d)."""
+
+    numbers: Array
+
+    def apply(self, forces: Array) -> Array:
+        """Return the gaps (own, 1, k), mm, by forces (n, d, k)."""
+        return product(self.numbers, forces)
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return those of some rows and columns."""
+        return self.numbers[rows][:, :, columns]
 
 
 @dataclass(frozen=True)
@@ -26,13 +54,12 @@ class PhaseRows:
     """What the pressures of some phases at some nodes open at some of this rank's nodes.
 
     Attributes:
-        by_force: Gap at this rank's nodes from a unit force along each axis at each node (own, n, d), one for each
-            place of the strip.
+        places: What forces open, one for each place of the strip.
         traction: Of unit pressures with their friction, times the nodes' weights and the scale, (phases, n, d) each.
         phases: Which have each place.
     """
 
-    by_force: Sequence[Array]
+    places: Sequence[Place]
     traction: Sequence[Array]
     phases: Sequence[NDArray[np.int64]]
 
@@ -41,26 +68,33 @@ class PhaseRows:
         """How many phases there are."""
         return sum(map(len, self.phases))
 
+    @property
+    def nodes(self) -> int:
+        """How many nodes have pressures."""
+        return int(self.traction[0].shape[1])
+
     def multiply(self, pressure: Array) -> Array:
         """Return the gaps (m, own) from pressures (m, n)."""
-        found: Array = np.empty((self.count, len(self.by_force[0])))
-        for by_force, traction, which in zip(self.by_force, self.traction, self.phases, strict=True):
-            forces = (traction * pressure[which][:, :, None]).reshape(len(which), -1)
-            found[which] = forces @ by_force.reshape(len(by_force), -1).T
-        return found
+        found: list[Array] = [np.zeros(0)] * self.count
+        for place, traction, which in zip(self.places, self.traction, self.phases, strict=True):
+            gaps = place.apply((traction * pressure[which][:, :, None]).transpose(1, 2, 0))[:, 0]
+            for column, k in enumerate(which):
+                found[k] = gaps[:, column]
+        return np.array(found)
 
     def of(self, rows: NDArray[np.int64], nodes: NDArray[np.int64]) -> PhaseRows:
         """Return the same of some rows, given by their place among this rank's, and of some nodes."""
-        cut = np.ix_(rows, nodes)
-        return PhaseRows([one[cut] for one in self.by_force], [one[:, nodes] for one in self.traction], self.phases)
+        places = [SomeNodes(place.entries(rows, nodes)) for place in self.places]
+        return PhaseRows(places, [one[:, nodes] for one in self.traction], self.phases)
 
     def matrices(self) -> Array:
         """Return the matrix of each phase (m, own, n)."""
-        found: Array = np.empty((self.count, *self.by_force[0].shape[:2]))
-        for by_force, traction, which in zip(self.by_force, self.traction, self.phases, strict=True):
+        found: list[Array] = [np.zeros((0, 0))] * self.count
+        for place, traction, which in zip(self.places, self.traction, self.phases, strict=True):
+            numbers = place.entries(EVERY, EVERY)[:, 0]
             for k, own in zip(which, traction, strict=True):
-                found[k] = np.einsum("ijd,jd->ij", by_force, own)
-        return found
+                found[k] = np.einsum("ijd,jd->ij", numbers, own)
+        return np.array(found)
 
 
 class OwnPhases:
@@ -94,7 +128,7 @@ class OwnPhases:
         """Return the same at those of the prepared nodes that are own, from pressures there alone."""
         if self._within is not None:
             return self._within.multiply(pressure)
-        whole = np.zeros((len(pressure), self._rows.by_force[0].shape[1]))
+        whole = np.zeros((len(pressure), self._rows.nodes))
         whole[:, self._nodes] = pressure
         return self._rows.multiply(whole)[:, self._own]
 
@@ -110,7 +144,7 @@ class OwnPhases:
         begin, end = np.searchsorted(nodes, [self._first, self._last])
         if not np.array_equal(nodes, self._nodes):
             self._nodes, self._own = nodes, nodes[begin:end] - self._first
-            few = len(nodes) <= FEW * self._rows.by_force[0].shape[1]
+            few = len(nodes) <= FEW * self._rows.nodes
             self._within = self._rows.of(self._own, nodes) if few else None
         return self._eliminate(nodes, int(begin), free[:, begin:end], wear[:, begin:end], held[begin:end])
 

@@ -45,7 +45,7 @@ class OwnRows:
 
     def multiply(self, x: Array) -> Array:
         """Return own rows of S x (own,)."""
-        return self._columns.multiply(x)
+        return self._columns.apply(x)
 
     def entries(self, rows: Indices, columns: Indices) -> Array:
         """Return the numbers of those of the rows, ascending, that are own, in some columns."""
@@ -93,7 +93,9 @@ class SpreadCompliance:
     def __init__(self, team: Team, own: OwnRows) -> None:
         self.team, self.own = team, team.serve(own)
 
-    def multiply(self, x: Array) -> Array:
+    cost: float | None = None  # its numbers are in the ranks' memory
+
+    def apply(self, x: Array) -> Array:
         """Return S x (n,)."""
         return np.concatenate(self.team.call(self.own, "multiply", x))
 

@@ -21,6 +21,7 @@ from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
+from fenwear.interface import PressureCompliance
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import PhasesWear
@@ -315,7 +316,7 @@ def phase_tangent(
     laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
     dim = laws.mu_s.shape[1]
     friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
-    by_mu = interface.compliance(further) - interface.compliance(friction_ratio)  # all are linear in mu
+    by_mu = PressureCompliance(interface, further - friction_ratio).matrix()  # all are linear in mu
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
     gap_rows: Array = np.zeros((n, dim))
@@ -328,7 +329,7 @@ def phase_tangent(
         state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
-    opened = interface.compliance(friction_ratio) + by_mu * traction_p + gap_rows @ state_p
+    opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_rows @ state_p
     by_state = by_mu @ traction_s + gap_rows @ state_s
     if implicit:
         opened, by_state = opened + laws.worn_p, by_state + laws.worn_s
@@ -444,7 +445,7 @@ def critical_speed(system: Tribosystem, direction: int) -> float:
     n = len(system.pair.weights)
     everywhere = np.ones(n, dtype=bool)
     friction_ratio = system.friction_ratio(direction)
-    compliance = system.interface.compliance(friction_ratio)
+    compliance = system.interface.compliance(friction_ratio).matrix()
     stiffness = _restricted_stiffness(system, friction_ratio, compliance, everywhere)
     speed = system.motion.mean_speed
     for _ in range(50):  # the strip's temperature depends on its speed

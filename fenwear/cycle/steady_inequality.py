@@ -81,10 +81,10 @@ class SteadyInequality:
             self.equations = SpreadShape(SpreadPhases(interfaces, ratios, scale), modes, balances)
         else:
             made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
-            keys = [(id(own.gap_by_force), np.asarray(ratio + own.pair.normal).tobytes()) for own, ratio in pairs]
+            keys = [(id(own), np.asarray(ratio + own.pair.normal).tobytes()) for own, ratio in pairs]
             for key, (own, ratio) in zip(keys, pairs, strict=True):
                 if key not in made:
-                    made[key] = own.compliance(ratio) * scale
+                    made[key] = own.compliance(ratio, scale).matrix()
             self.equations = ShapeEquations([made[key] for key in keys], modes, balances)
         self._known: tuple[list[csr_array], Array, Operator] | None = None  # the last derivative, and what it is of
 

@@ -1,14 +1,16 @@
 """Two surfaces in contact: opposite each other, in equilibrium, and elastic."""
 
-from fenwear.interface.compliance import Interface, join
+from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance, join
 from fenwear.interface.equilibrium import RigidEquilibrium, rigid_equilibrium
 from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
 
 __all__ = [
     "ContactPair",
+    "FrameCompliance",
     "Interface",
     "Placement",
+    "PressureCompliance",
     "RigidEquilibrium",
     "check_distance",
     "interpolation",

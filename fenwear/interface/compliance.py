@@ -1,4 +1,13 @@
-"""Two condensed bodies joined: the gap that pressure, friction, rigid motion and loads open."""
+"""Two bodies joined: how their surfaces move against each other by forces on the contact, rigid motion and loads.
+
+Forces f on the punch's nodes, and their reactions on the strip, move the punch's surface against the strip's by
+
+    j_i = sum over k of G_ik f_k,    G = G_punch + R^T (X G_strip X^T) R,
+
+with the transfer X of a strip that passes under the punch and the turn R of its place. What is asked for are components
+of j: along e_n alone in gross sliding, along e_n and the tangents where nodes stick. A square matrix comes of it by the
+tractions that go with the unknowns: a pressure with its friction, or one along each axis of the contact frame.
+"""
 
 from __future__ import annotations
 
@@ -7,139 +16,322 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
-from fenwear.bodies.condensation import CondensedBody
+from fenwear.arrays import Array, Nodes
+from fenwear.bodies.condensation import product
+from fenwear.bodies.operators import SurfaceOperator
 from fenwear.interface.equilibrium import RigidEquilibrium
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
-from fenwear.parallel import Rows, total
+from fenwear.parallel import Rows
 
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
 
 
 @dataclass(frozen=True)
 class Interface:
-    """Two condensed bodies in contact: gap = S(tau) p + H a + g_load + g_0 + w.
+    """Two bodies in contact, an operator from nodal forces to the relative displacement of their surfaces.
 
-    What the bodies answer along e_n is made when it is first asked for, and kept.
+    In gross sliding gap = S(tau) p + H a + g_load + g_0 + w. What bodies answer by numbers is made when it is first
+    asked for, and kept; others are asked each time.
 
     Attributes:
         rigid: H, F, the nodes and the transfer.
-        punch: Condensed onto its pressure nodes.
-        strip: Condensed onto its trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        punch: How it answers at its pressure nodes.
+        strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
         strip_moves: Which of the two.
         rows: Of the contact nodes on each rank; None where every rank has all.
+        frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.
     """
 
     rigid: RigidEquilibrium
-    punch: CondensedBody
-    strip: CondensedBody
+    punch: SurfaceOperator
+    strip: SurfaceOperator
     strip_moves: bool
     rows: Rows | None = None
-
-    @property
-    def _own(self) -> slice:
-        """This rank's own rows."""
-        return slice(0, len(self.pair.weights)) if self.rows is None else self.rows.own
-
-    @cached_property
-    def gap_by_force(self) -> Array:
-        """Gap at node i from a unit force along each axis at node j, on the punch and its reaction on the strip.
-
-        (n, n, d), mm per N/mm in the plane; this rank's own rows where ranks share them.
-        """
-        pair = self.pair
-        reading = pair.transfer if self.strip_moves else None
-        on_strip = self.strip.normal_response(pair.normal_on_strip, reading, self._own)
-        if pair.placement.turn != ZERO:
-            on_strip = pair.placement.vectors(on_strip.reshape(-1, on_strip.shape[2])).reshape(on_strip.shape)
-        return self.punch.normal_response(pair.normal, None, self._own) + on_strip
-
-    @cached_property
-    def load_gap(self) -> Array:
-        """g_load (n,), mm."""
-        pair, strip = self.pair, self.strip.by_load
-        by_load = pair.transfer @ strip if self.strip_moves else strip
-        return _along(pair.normal, self.punch.by_load) - _along(pair.normal_on_strip, by_load)
-
-    @cached_property
-    def own_by_force(self) -> Array:
-        """Gap at each node from a unit force along each axis at itself (n, d); collective where ranks share rows."""
-        own, by_force = self._own, self.gap_by_force
-        diagonal = by_force[np.arange(len(by_force)), np.arange(own.start, own.stop)]
-        return diagonal if self.rows is None else self.rows.gathered(diagonal)
-
-    @cached_property
-    def by_even(self) -> Array:
-        """Gap that an even unit pressure opens without friction (n,), mm/MPa; collective where ranks share rows."""
-        even = np.einsum("ijd,jd->i", self.gap_by_force, self.pair.normal * self.pair.weights[:, None])
-        return even if self.rows is None else self.rows.gathered(even)
-
-    def compliance(self, friction_ratio: Array | float) -> Array:
-        """Return S (n, n), mm/MPa: the gap from unit pressures with their friction; collective where ranks share it.
-
-        Args:
-            friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; 0.0 for none.
-        """
-        own = self._own_rows(friction_ratio)
-        return own if self.rows is None else self.rows.gathered(own)
-
-    def _own_rows(self, friction_ratio: Array | float, run: slice = EVERY) -> Array:
-        traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
-        return np.einsum("ijd,jd->ij", self.gap_by_force[run], traction)
-
-    def compliance_of(self, friction_ratio: Array, nodes: NDArray[np.int64]) -> Array:
-        """Return the columns of S of some nodes (n, k), mm/MPa; this rank's own rows where ranks share them."""
-        traction = (self.pair.normal[nodes] + friction_ratio[nodes]) * self.pair.weights[nodes, None]
-        return np.einsum("ijd,jd->ij", self.gap_by_force[:, nodes], traction)
-
-    def own_compliance(self, friction_ratio: Array) -> Array:
-        """Return the diagonal of S (n,), mm/MPa."""
-        traction = (self.pair.normal + friction_ratio) * self.pair.weights[:, None]
-        return np.einsum("id,id->i", self.own_by_force, traction)
-
-    @cached_property
-    def elastic_length(self) -> float:
-        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps."""
-        modes = self.rigid.rigid_normal
-        here = EVERY if self.rows is None else self.rows.own
-        own, inverse = modes[here], np.linalg.pinv(modes)[:, here]
-        runs = [slice(start, start + RUN) for start in range(0, len(own), RUN)]
-        elastic = (self._own_rows(0.0, run) for run in runs)
-        rigid: Array = np.zeros((modes.shape[1], len(modes)))
-        for run, part in zip(runs, elastic, strict=True):
-            rigid += inverse[:, run] @ part
-        if self.rows is not None:
-            rigid = total(self.rows.comm, rigid)
-        elastic = (self._own_rows(0.0, run) for run in runs)
-        parts = [np.abs(part - own[run] @ rigid).sum(axis=1) for run, part in zip(runs, elastic, strict=True)]
-        lengths = np.concatenate([np.zeros(0), *parts])
-        return float((lengths if self.rows is None else self.rows.gathered(lengths)).mean())
+    frame: Array | None = None
 
     @property
     def pair(self) -> ContactPair:
         """The nodes and the transfer."""
         return self.rigid.pair
 
+    @cached_property
+    def axes(self) -> Array:
+        """Along which displacements are asked for (n, a, d)."""
+        return self.pair.normal[:, None] if self.frame is None else self.frame
+
+    @cached_property
+    def _axes_on_strip(self) -> Array:
+        """The same in the strip's own, unmoved frame."""
+        return self.pair.placement.back(self.axes.reshape(-1, self.axes.shape[2])).reshape(self.axes.shape)
+
+    @property
+    def _own(self) -> slice:
+        """This rank's own rows."""
+        return slice(0, len(self.pair.weights)) if self.rows is None else self.rows.own
+
+    @property
+    def cost(self) -> float | None:
+        """Of a product, in numbers that memory could give meanwhile; None where the bodies answer by numbers."""
+        if self.punch.cost is None or self.strip.cost is None:
+            return None
+        return self.punch.cost + self.strip.cost
+
+    def apply(self, forces: Array) -> Array:
+        """Return the relative displacements (own rows, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
+        if self.cost is None:
+            return product(self.dense(), forces)
+        on_punch = _along(self.axes, self.punch.apply(forces))
+        n, d, *rest = forces.shape
+        back = self.pair.placement.back(np.moveaxis(forces, 1, -1).reshape(-1, d)).reshape(n, *rest, d)
+        back = np.moveaxis(back, -1, 1)
+        if not self.strip_moves:
+            return on_punch + _along(self._axes_on_strip, self.strip.apply(back))
+        read = self.pair.transfer
+        seen = self.strip.apply((read.T @ back.reshape(n, -1)).reshape(-1, *back.shape[1:]))
+        return on_punch + _along(self._axes_on_strip, (read @ seen.reshape(len(seen), -1)).reshape(n, *seen.shape[1:]))
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return displacements at some nodes from unit forces along the axes of space at others (rows, a, columns, d).
+
+        Args:
+            rows: Their numbers; where ranks share rows, among this one's own.
+            columns: Their numbers.
+        """
+        if self.cost is None:
+            kept = self.dense()
+            if isinstance(rows, slice) or isinstance(columns, slice):
+                return kept[rows][:, :, columns]
+            return kept[rows[:, None], :, columns].transpose(0, 2, 1, 3)
+        return self.asked(rows, columns)
+
+    def diagonal(self) -> Array:
+        """Return displacements at each node from unit forces at itself (n, a, d); collective where ranks share rows."""
+        return self._diagonal
+
+    @cached_property
+    def _diagonal(self) -> Array:
+        own = self._own
+        if self.cost is None:
+            kept = self.dense()
+            found = kept[np.arange(len(kept)), :, np.arange(own.start, own.stop)]
+            return found if self.rows is None else self.rows.gathered(found)
+        if not self.strip_moves and self.pair.placement.turn == ZERO:
+            both = zip((self.axes, self._axes_on_strip), (self.punch, self.strip), strict=True)
+            return np.asarray(sum(_along(axes, body.diagonal()) for axes, body in both))
+        each = (np.array([node]) for node in range(own.stop))
+        return np.concatenate([self.asked(node, node)[:, :, 0] for node in each])
+
+    def dense(self) -> Array:
+        """Return all entries (own rows, a, n, d), which are kept."""
+        return self._dense
+
+    @cached_property
+    def _dense(self) -> Array:
+        return self.asked(EVERY, EVERY)
+
+    def asked(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the same as `entries`, from the bodies: for who keeps what it makes of them."""
+        own = np.arange(self._own.start, self._own.stop)[rows]
+        on_punch = _along(self.axes[own], self.punch.entries(rows, columns))
+        on_strip = self._on_strip(own, rows, columns)
+        if self.pair.placement.turn != ZERO:
+            d = on_strip.shape[-1]
+            on_strip = self.pair.placement.vectors(on_strip.reshape(-1, d)).reshape(on_strip.shape)
+        return on_punch + on_strip
+
+    def _on_strip(self, own: NDArray[np.int64], rows: Nodes, columns: Nodes) -> Array:
+        """Return what forces in the strip's own frame do to it, as contact nodes see it."""
+        axes, strip = self._axes_on_strip[own], self.strip
+        if not self.strip_moves:
+            return _along(axes, strip.entries(rows, columns))
+        whole = csr_array(self.pair.transfer)
+        seen, read = _used(csr_array(whole[own])[:, EVERY if strip.kept is None else strip.kept], rows)
+        pushed, push = _used(csr_array(whole[columns]), columns)
+        block = strip.entries(seen, pushed)
+        found: Array = np.zeros((len(own), axes.shape[1], push.shape[0], axes.shape[2]))
+        for axis in range(axes.shape[2]):
+            for across in range(block.shape[1]):  # along e_n, or each axis, from a force along `axis`
+                part = (push @ (read @ block[:, across, :, axis]).T).T
+                if block.shape[1] == 1:
+                    found[:, 0, :, axis] = part
+                    continue
+                for k in range(axes.shape[1]):
+                    found[:, k, :, axis] += axes[:, k, across, None] * part
+        return found
+
+    @cached_property
+    def load_gap(self) -> Array:
+        """g_load (n,), mm."""
+        pair, strip = self.pair, self.strip.by_load
+        by_load = pair.transfer @ strip if self.strip_moves else strip
+        return np.einsum("id,id->i", pair.normal, self.punch.by_load) - np.einsum(
+            "id,id->i", pair.normal_on_strip, by_load
+        )
+
+    @cached_property
+    def by_even(self) -> Array:
+        """Gap that an even unit pressure opens without friction (n,), mm/MPa; collective where ranks share rows."""
+        even = self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
+        return even if self.rows is None else self.rows.gathered(even)
+
+    def compliance(self, friction_ratio: Array | float, scale: float = 1.0) -> PressureCompliance:
+        """Return S, mm/MPa: the gap from unit pressures with their friction.
+
+        Args:
+            friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; 0.0 for none.
+            scale: A factor of S.
+        """
+        return PressureCompliance(self, scale * (self.pair.normal + friction_ratio))
+
+    @cached_property
+    def elastic_length(self) -> float:
+        """Gap that unit pressures open on average without any rigid motion, mm/MPa: the scale of gaps.
+
+        Over all nodes; where no numbers are in memory, over some of them.
+        """
+        pair, modes, own = self.pair, self.rigid.rigid_normal, self._own
+        inverse = np.linalg.pinv(modes)
+        opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]
+        opened = opened if self.rows is None else self.rows.gathered(opened)
+        rigid = opened.T * pair.weights  # what modes take up of S, which is symmetric but for the weights
+        count, compliance = own.stop - own.start, self.compliance(0.0)
+        step = 1 if self.cost is None else max(count // RUN, 1)
+        runs = [slice(start, start + RUN * step, step) for start in range(0, count, RUN * step)]
+        parts = [np.abs(compliance.columns(EVERY, run) - modes[own][run] @ rigid).sum(axis=1) for run in runs]
+        lengths = np.concatenate([np.zeros(0), *parts])
+        return float((lengths if self.rows is None else self.rows.gathered(lengths)).mean())
+
+
+@dataclass(frozen=True)
+class PressureCompliance:
+    """S (n, n): the gap from unit pressures, each with the traction that goes with it, mm/MPa.
+
+    Attributes:
+        interface: The surfaces.
+        traction: On the punch by a unit pressure (n, d).
+    """
+
+    interface: Interface
+    traction: Array
+
+    @cached_property
+    def _force(self) -> Array:
+        return self.traction * self.interface.pair.weights[:, None]
+
+    @property
+    def cost(self) -> float | None:
+        """Of a product; see `Interface`."""
+        return self.interface.cost
+
+    def apply(self, pressure: Array) -> Array:
+        """Return the gaps (n,) of pressures (n,); collective where ranks share rows."""
+        own, rows = self.interface.apply(self._force * pressure[:, None])[:, 0], self.interface.rows
+        return own if rows is None else rows.gathered(own)
+
+    def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
+        """Return the columns of some nodes (n, k), or some rows of them; own rows where ranks share them."""
+        return np.einsum("ijd,jd->ij", self.interface.entries(rows, nodes)[:, 0], self._force[nodes])
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the numbers of some rows and columns."""
+        return self.columns(columns, rows)
+
+    def diagonal(self) -> Array:
+        """Return the diagonal (n,); collective where ranks share rows."""
+        return np.einsum("id,id->i", self.interface.diagonal()[:, 0], self._force)
+
+    def matrix(self) -> Array:
+        """Return all of it (n, n); collective where ranks share rows."""
+        own, rows = self.columns(EVERY), self.interface.rows
+        return own if rows is None else rows.gathered(own)
+
+
+class FrameCompliance:
+    """C (d n, d n): displacements along the contact frame from unit tractions along it, mm/MPa.
+
+    Of all components, one after the other: those along e_n of all nodes first. What bodies answer by numbers is one
+    matrix, which is kept.
+
+    Args:
+        interface: The surfaces, with a frame.
+    """
+
+    def __init__(self, interface: Interface) -> None:
+        self.interface = interface
+        self._n = len(interface.pair.weights)
+        self._force = interface.axes.transpose(0, 2, 1) * interface.pair.weights[:, None, None]
+
+    def _block(self, rows: Nodes, nodes: Nodes) -> Array:
+        """Return what components of some nodes do to those of others (components, nodes, components, rows)."""
+        return np.einsum("iajc,jcb->bjai", self.interface.asked(rows, nodes), self._force[nodes], optimize=True)
+
+    @cached_property
+    def _columns(self) -> Array:
+        """C^T, so that what a component moves lies together in memory."""
+        size = self._n * self._force.shape[2]
+        return self._block(EVERY, EVERY).reshape(size, size)
+
+    @cached_property
+    def _diagonal(self) -> Array:
+        if self.interface.cost is None:
+            return self._columns.diagonal().copy()
+        return np.einsum("iac,ica->ai", self.interface.diagonal(), self._force).ravel()
+
+    def apply(self, traction: Array) -> Array:
+        """Return the displacements (d n,) of tractions (d n,)."""
+        if self.interface.cost is None:
+            loaded = np.flatnonzero(traction)
+            return traction[loaded] @ self._columns[loaded]
+        force = np.einsum("jcb,bj->jc", self._force, traction.reshape(-1, self._n))
+        return self.interface.apply(force).T.ravel()
+
+    def entries(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
+        """Return the numbers of some rows and columns."""
+        if self.interface.cost is None:
+            return self._columns[columns, rows[:, None]]
+        (to, at), (of, by) = (np.divmod(one, self._n) for one in (rows, columns))
+        (seen, i), (pushed, j) = (np.unique(one, return_inverse=True) for one in (at, by))
+        return self._block(seen, pushed)[of, j, to[:, None], i[:, None]]
+
+    def diagonal(self) -> Array:
+        """Return the diagonal (d n,)."""
+        return self._diagonal
+
 
 def join(
-    rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, *, strip_moves: bool, rows: Rows | None = None
+    rigid: RigidEquilibrium,
+    punch: SurfaceOperator,
+    strip: SurfaceOperator,
+    *,
+    strip_moves: bool,
+    rows: Rows | None = None,
 ) -> Interface:
-    """Join two condensed bodies at the place of a pair; collective where ranks share the rows.
+    """Join two bodies at the place of a pair; collective where ranks share the rows.
 
     Args:
         rigid: The equilibrium there.
-        punch: Condensed onto its pressure nodes.
-        strip: Condensed onto its trace nodes where it moves as a whole, else onto the contact nodes opposite.
+        punch: How it answers at its pressure nodes.
+        strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
         strip_moves: Which of the two.
         rows: Of the contact nodes on each rank; None where every rank has all.
     """
     interface = Interface(rigid, punch, strip, strip_moves, rows)
     if rows is not None:  # now, while all ranks are here
-        _ = interface.own_by_force, interface.by_even, interface.elastic_length
+        _ = interface.diagonal(), interface.by_even, interface.elastic_length
     return interface
 
 
-def _along(normal: Array, vectors: Array) -> Array:
-    return np.einsum("id,id->i", normal, vectors)
+def _along(axes: Array, vectors: Array) -> Array:
+    """Return components (rows, a, ...) along axes (rows, a, d) of vectors (rows, d, ...), or of what is along e_n."""
+    return vectors if vectors.shape[1] == 1 else np.einsum("iab,ib...->ia...", axes, vectors)
+
+
+def _used(shares: csr_array, nodes: Nodes) -> tuple[Nodes, csr_array]:
+    """Return which columns have shares, and these alone; all of them for runs of nodes."""
+    if isinstance(nodes, slice):
+        return EVERY, shares
+    some = np.unique(shares.indices).astype(np.int64)
+    return some, csr_array(shares[:, some])

@@ -26,6 +26,18 @@ def common_normal(punch: ContactSurface, strip: Array) -> Array:
     return unit(strip - facing_normal(punch, strip))
 
 
+def contact_frame(normal: Array) -> Array:
+    """Return e_n and the tangents of each node (n, d, d), by rows, for e_n (n, d); the first tangent lies along x."""
+    n, d = normal.shape
+    along = np.zeros((n, d))
+    along[:, 0] = 1.0
+    first = along - normal[:, :1] * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    if d == 2:
+        return np.stack([normal, first], axis=1)
+    return np.stack([normal, first, np.cross(normal, first)], axis=1)
+
+
 def unit(vectors: Array) -> Array:
     """Return vectors (n, d) of length 1."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

@@ -112,7 +112,7 @@ class SteadyTangent:
         gaps = np.zeros((m, n, m, n))
         balance = np.zeros((m, r, m, n))
         for k, (own, ratio) in enumerate(zip(system.interfaces, system.friction_ratios(), strict=True)):
-            gaps[k, :, k] = own.compliance(ratio)
+            gaps[k, :, k] = own.compliance(ratio).matrix()
             balance[k, :, k] = own.rigid.equilibrium(ratio)
         heat = cycle_heat(system)
         if heat is not None:
@@ -175,7 +175,11 @@ def _gaps(system: Tribosystem, state: _Unknown, closed: Mask) -> Array:
     modes = system.rigid.rigid_normal
     gaps = np.array(
         [
-            own.compliance(ratio) @ p + modes @ a + own.load_gap + own.pair.initial_gap - system.pair.initial_gap
+            own.compliance(ratio).apply(np.asarray(p))
+            + modes @ a
+            + own.load_gap
+            + own.pair.initial_gap
+            - system.pair.initial_gap
             for own, ratio, p, a in zip(
                 system.interfaces, system.friction_ratios(), state.pressure, state.rigid, strict=True
             )

@@ -24,7 +24,7 @@ from fenwear.assembly import (
     set_up_by,
 )
 from fenwear.assembly.tribosystem import Condensed
-from fenwear.bodies.condensation import CondensedBody, respond_to_load
+from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case
 from fenwear.contact import ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
@@ -174,7 +174,7 @@ class Coulomb:
         bodies, condensed = system.bodies, (system.condensed.punch, system.condensed.strip)
         if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
             bodies = bodies.under(case)
-            condensed = _under(bodies, condensed)
+            condensed = condensed[0].under(bodies.punch), condensed[1].under(bodies.strip)
         if (before.heat, before.punch.temperatures, before.strip.temperatures) != (
             case.heat,
             case.punch.temperatures,
@@ -202,22 +202,13 @@ class Coulomb:
 LAW = Coulomb()
 
 
-def _under(bodies: Bodies, condensed: tuple[CondensedBody, CondensedBody]) -> tuple[CondensedBody, CondensedBody]:
-    """Return the same under the loads of these bodies; collective."""
-    punch, strip = condensed
-    return (
-        replace(punch, by_load=respond_to_load(bodies.punch, punch.patterns)),
-        replace(strip, by_load=respond_to_load(bodies.strip, strip.patterns)),
-    )
-
-
 def system_of(
     case: Case,
     bodies: Bodies,
     *,
     heat: Preparation = "as set",
     fresh: bool = False,
-    condensed: tuple[CondensedBody, CondensedBody] | None = None,
+    condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
     ends: Ends | None = None,
 ) -> Tribosystem:
     """Return the system of bodies that are built; collective.

@@ -86,7 +86,7 @@ class Step:
         self.approached = now[: self.n] - old[: self.n] - self.free[: self.n]
         # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area. One c for both
         # tangents: t = P(t - c s) turns slip against the traction only where c is a number, not a matrix.
-        self.scale = np.abs(np.diag(position.compliance)).reshape(self.d, self.n)
+        self.scale = np.abs(position.compliance.diagonal()).reshape(self.d, self.n)
         self.scale[1:] = self.scale[1:].mean(axis=0)
         self.length = float(np.median(self.scale[0]))
         self.units = self.length / np.maximum(np.abs(position.modes).max(axis=0, initial=0.0), 1e-300)
@@ -95,12 +95,7 @@ class Step:
     def jumps(self, found: Found) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
         position = self.position
-        if found.moved is not None:
-            j = found.moved.jump
-        else:
-            # C W^-1 is symmetric: rows of the few nodes that carry something, which lie together in memory.
-            loaded, weights = np.flatnonzero(found.f), position.weights
-            j = (weights[loaded] * found.f[loaded]) @ position.compliance[loaded] / weights
+        j = position.compliance.apply(found.f) if found.moved is None else found.moved.jump
         j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
@@ -124,8 +119,8 @@ class Step:
             A[rows, : len(closed)][:, tied] += matrix[:, n + closed[tied]] * ratio
 
         unit, C = 1 / self.scale.ravel()[columns][:, None], self.position.compliance
-        A[:k, :k] = C[columns[:, None], columns] * unit
-        A[:k, : len(closed)][:, tied] += C[columns[:, None], n + closed[tied]] * unit * ratio
+        A[:k, :k] = C.entries(columns, columns) * unit
+        A[:k, : len(closed)][:, tied] += C.entries(columns, n + closed[tied]) * unit * ratio
         A[:k, k : k + r] = self.position.modes[columns] * (unit * self.units)
         b[:k] = -unit[:, 0] * self.free[columns]
         if loose:
@@ -205,14 +200,7 @@ class Step:
         position, interface = self.position, self.interface
         force = position.in_space(f * position.weights)
         back = position.reading.T @ position.pair.placement.back(force)
-        strip = -_displaced(interface.strip.response, back)
-        return Moved(np.zeros(0), _displaced(interface.punch.response, force), strip)
-
-
-def _displaced(response: Array, force: Array) -> Array:
-    """Return the displacement (q, d) by forces (q, d), few of which are not zero: the response is symmetric."""
-    loaded = np.flatnonzero(force.any(axis=1))
-    return np.asarray(np.tensordot(force[loaded], response[loaded], 2))
+        return Moved(np.zeros(0), interface.punch.apply(force), -interface.strip.apply(back))
 
 
 def _solved(A: Array, b: Array) -> tuple[Array, int]:

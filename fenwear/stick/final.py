@@ -227,13 +227,13 @@ def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
     r, k = position.modes.shape[1], len(zone)
     scale = float(np.median(position.compliance.diagonal()[:n]))
     system, load = np.zeros((k + r, k + r)), np.zeros(k + r)
-    system[:k, :k] = position.compliance[np.ix_(zone, zone)] / scale
+    system[:k, :k] = position.compliance.entries(zone, zone) / scale
     system[:k, k:], system[k:, :k] = position.modes[zone], position.balance[:, zone]
     load[k:] = -rig.interface.loaded(None).resultant
     if not load.any():
         return None
     found = np.linalg.solve(system, load)
-    beside = position.compliance[np.ix_(places, zone)] / scale @ found[:k] + position.modes[places] @ found[k:]
+    beside = position.compliance.entries(places, zone) / scale @ found[:k] + position.modes[places] @ found[k:]
     near, far = -beside
     middle = (x[first] + x[last]) / 2
     distance, away = np.abs(x[places] - middle)

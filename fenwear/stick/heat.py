@@ -280,15 +280,12 @@ def expansions(
 ) -> tuple[Expansion, Expansion]:
     """Return the thermal expansion of both bodies on the bases of their temperatures; collective."""
     found = []
-    for elastic, condensed, basis in (
-        (bodies.punch, interface.punch, exchange.bases[0]),
-        (bodies.strip, interface.strip, exchange.bases[1]),
-    ):
+    for elastic, patterns, basis in zip((bodies.punch, bodies.strip), interface.patterns, exchange.bases, strict=True):
         if not isinstance(basis, ReducedBasis):
             raise CaseError(InputError("heat.operator", "expected 'reduced' with contact.law = 'coulomb'"))
         fields = np.hstack([basis.columns, (basis.lift - initial)[:, None]])
         picked = free_expansion(elastic, basis.body, fields)
-        at_patterns = np.einsum("qN,Ndk->qdk", condensed.patterns.T.toarray(), picked)
+        at_patterns = np.einsum("qN,Ndk->qdk", patterns.T.toarray(), picked)
         found.append(Expansion(at_patterns[:, :, :-1], at_patterns[:, :, -1]))
     return found[0], found[1]
 

@@ -21,10 +21,20 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Bodies, Needs, Sliding, body_needs, settle
-from fenwear.bodies.condensation import CondensedBody, condense_together, respond_to_load
-from fenwear.bodies.response import Request
+from fenwear.assembly.needs import condensed
+from fenwear.bodies.operators import SurfaceOperator, operators_for
+from fenwear.bodies.response import Request, identity
 from fenwear.case import Case
-from fenwear.interface import ContactPair, RigidEquilibrium, check_distance, pair, rigid_equilibrium
+from fenwear.interface import (
+    ContactPair,
+    FrameCompliance,
+    Interface,
+    RigidEquilibrium,
+    check_distance,
+    pair,
+    rigid_equilibrium,
+)
+from fenwear.interface.frame import contact_frame
 from fenwear.interface.placement import in_model
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
@@ -39,7 +49,7 @@ class Loaded:
     Attributes:
         resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
         on_punch: Displacement of the punch's contact nodes (n, d), mm.
-        on_strip: Of what the strip was condensed onto (q, d), mm.
+        on_strip: Of the strip at the nodes of its operator (q, d), mm.
     """
 
     resultant: Array
@@ -58,25 +68,43 @@ class Position:
     """Both bodies opposite each other in one place of the strip.
 
     Attributes:
-        rigid: The rigid modes and the pair of surfaces there.
-        frame: e_n and the tangents of each node (n, d, d), by rows.
-        reading: Takes what the strip was condensed onto to the contact nodes (n, q).
-        compliance: C (d n, d n), mm/MPa.
-        modes: H (d n, r).
+        interface: How their surfaces move against each other along e_n and the tangents of each node.
         drive: V (d n,), for a unit of the motion; along the tangents alone where the strip goes far.
     """
 
-    rigid: RigidEquilibrium
-    frame: Array
-    reading: csr_array
-    compliance: Array
-    modes: Array
+    interface: Interface
     drive: Array
+
+    @property
+    def rigid(self) -> RigidEquilibrium:
+        """The rigid modes and the pair of surfaces there."""
+        return self.interface.rigid
 
     @property
     def pair(self) -> ContactPair:
         """The surfaces."""
         return self.rigid.pair
+
+    @property
+    def frame(self) -> Array:
+        """e_n and the tangents of each node (n, d, d), by rows."""
+        return self.interface.axes
+
+    @cached_property
+    def reading(self) -> csr_array:
+        """Takes displacements of the strip at the nodes of its operator to the contact nodes (n, q)."""
+        return self.pair.transfer if self.interface.strip_moves else identity(len(self.pair.weights))
+
+    @cached_property
+    def compliance(self) -> FrameCompliance:
+        """C, mm/MPa."""
+        return FrameCompliance(self.interface)
+
+    @cached_property
+    def modes(self) -> Array:
+        """H (d n, r)."""
+        n, d, _ = self.frame.shape
+        return np.einsum("iac,icm->aim", self.frame, self.rigid.motion).reshape(d * n, -1)
 
     @cached_property
     def weights(self) -> Array:
@@ -96,8 +124,9 @@ class Position:
     @cached_property
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
-        n = len(self.pair.weights)
-        return float(np.abs(self.compliance[:n, :n].sum(axis=1)).mean())
+        n, even = len(self.pair.weights), np.zeros(len(self.weights))
+        even[:n] = 1.0
+        return float(np.abs(self.compliance.apply(even)[:n]).mean())
 
     def in_frame(self, vectors: Array) -> Array:
         """Return the components (d n,) of vectors (n, d)."""
@@ -109,10 +138,10 @@ class Position:
 
 
 class OppositeBodies:
-    """Two bodies condensed along all axes that stay opposite each other under one load.
+    """Two bodies that stay opposite each other under one load.
 
     Args:
-        punch, strip: What they were condensed onto is the contact's nodes.
+        punch, strip: How they answer along all axes at the contact's nodes.
         rigid: The rigid modes, their load, and the pair of surfaces.
         field: What the rig moves the strip by.
     """
@@ -123,11 +152,11 @@ class OppositeBodies:
     moved: Worn | None = None  # depths that the meshes have followed
 
     def __init__(
-        self, punch: CondensedBody, strip: CondensedBody, rigid: RigidEquilibrium, field: SlidingField
+        self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
     ) -> None:
         self.punch, self.strip, self.field = punch, strip, field
         self._load = Loaded(rigid.resultant, punch.by_load, strip.by_load)
-        self._positions = {0.0: position_of(rigid, punch, strip, _identity(len(rigid.pair.weights)), field)}
+        self._positions = {0.0: position_of(rigid, punch, strip, field)}
 
     @property
     def middle(self) -> Position:
@@ -136,7 +165,7 @@ class OppositeBodies:
 
     @property
     def bulk(self) -> Array:
-        """Displacement of what the strip was condensed onto by a unit bulk strain (q, d), mm: none."""
+        """Displacement of the strip at the nodes of its operator by a unit bulk strain (q, d), mm: none."""
         return np.zeros_like(self.strip.by_load)
 
     def held_nodes(self) -> Mask:
@@ -184,7 +213,7 @@ class StickInterface(OppositeBodies):
         keep: bool = False,
         fresh: bool = False,
         full: bool = False,
-        condensed: tuple[CondensedBody, CondensedBody] | None = None,
+        condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
     ) -> None:
         self.moved = bodies.moved
         self.bodies, self.sliding, self.case, self.moves, self.far = bodies, sliding, case, moves, moves or far
@@ -196,11 +225,12 @@ class StickInterface(OppositeBodies):
         middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
         if bodies.followed is None:
             check_distance(middle)
-        onto = _identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
+        onto = identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
+        self.patterns = middle.punch.spread, onto
         if condensed is None:
             self.needs = settle([bodies], self._needs(len(middle.weights), onto.shape[1]))
             wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
-            self.punch, self.strip = condense_together(wanted, keep=keep, fresh=fresh)
+            self.punch, self.strip = operators_for(wanted, keep=keep, fresh=fresh)
         else:
             self.needs = self._needs(len(middle.weights), onto.shape[1])
             self.punch, self.strip = condensed
@@ -220,11 +250,11 @@ class StickInterface(OppositeBodies):
         punch, strip = (
             body_needs(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
         )
-        return Needs(punch, strip, nodes, positions * d, d**2, both.comm.size)
+        return Needs(punch, strip, nodes, positions * d, d**2, both.comm.size, condensed(both))
 
     @cached_property
     def bulk(self) -> Array:
-        """Displacement of what the strip was condensed onto by a unit bulk strain along x (q, d), mm.
+        """Displacement of the strip at the nodes of its operator by a unit bulk strain along x (q, d), mm.
 
         A solid under stress along x alone gets narrower along y.
         """
@@ -283,14 +313,13 @@ class StickInterface(OppositeBodies):
         bodies = self.bodies if fraction is None or self.case is None else self.bodies.under(self.case, fraction)
         self._loaded[fraction] = Loaded(
             np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant]),
-            respond_to_load(bodies.punch, self.punch.patterns),
-            respond_to_load(bodies.strip, self.strip.patterns),
+            self.punch.under(bodies.punch).by_load,
+            self.strip.under(bodies.strip).by_load,
         )
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
-        reading = pair.transfer if self.moves else _identity(len(pair.weights))
-        found = position_of(rigid, self.punch, self.strip, reading, self.field)
+        found = position_of(rigid, self.punch, self.strip, self.field, strip_moves=self.moves)
         return along_tangents(found) if self.far else found
 
 
@@ -306,23 +335,24 @@ def meshed(bodies: OppositeBodies) -> StickInterface:
 
 
 def position_of(
-    rigid: RigidEquilibrium, punch: CondensedBody, strip: CondensedBody, reading: csr_array, field: SlidingField
+    rigid: RigidEquilibrium,
+    punch: SurfaceOperator,
+    strip: SurfaceOperator,
+    field: SlidingField,
+    *,
+    strip_moves: bool = False,
 ) -> Position:
     """Return both bodies opposite each other.
 
     Args:
         rigid: The rigid modes and the pair of surfaces.
-        punch, strip: The bodies.
-        reading: Takes what the strip was condensed onto to the contact nodes (n, q).
+        punch, strip: How the bodies answer, along all axes.
         field: The motion of the strip.
+        strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
     """
-    pair, frame = rigid.pair, contact_frame(rigid.pair)
-    n, d = pair.normal.shape
-    response = punch.response + _read(strip, pair, reading)
-    turned = np.einsum("iac,icjb,jeb->aiej", frame, response, frame, optimize=True).reshape(d * n, d * n)
-    modes = np.einsum("iac,icm->aim", frame, rigid.motion).reshape(d * n, -1)
-    drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(pair.punch.x), d))
-    return Position(rigid, frame, reading, turned * np.tile(pair.weights, d), modes, drive.ravel())
+    frame = contact_frame(rigid.pair.normal)
+    drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), frame.shape[2]))
+    return Position(Interface(rigid, punch, strip, strip_moves, frame=frame), drive.ravel())
 
 
 def along_tangents(position: Position) -> Position:
@@ -330,30 +360,3 @@ def along_tangents(position: Position) -> Position:
     drive = position.drive.copy()
     drive[: len(position.pair.weights)] = 0.0
     return replace(position, drive=drive)
-
-
-def contact_frame(pair: ContactPair) -> Array:
-    """Return e_n and the tangents of each node (n, d, d), by rows; the first tangent lies along x."""
-    normal = pair.normal
-    n, d = normal.shape
-    along = np.zeros((n, d))
-    along[:, 0] = 1.0
-    first = along - normal[:, :1] * normal
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    if d == 2:
-        return np.stack([normal, first], axis=1)
-    return np.stack([normal, first, np.cross(normal, first)], axis=1)
-
-
-def _read(strip: CondensedBody, pair: ContactPair, reading: csr_array) -> Array:
-    """Return the strip's answer (n, d, n, d) to forces at the contact nodes, in space."""
-    q, d = strip.by_load.shape
-    n = len(pair.weights)
-    seen = (reading @ strip.response.reshape(q, -1)).reshape(n * d, q, d)
-    both = (reading @ seen.transpose(1, 0, 2).reshape(q, -1)).reshape(n, n, d, d)  # [j, i, c, b]
-    return both.transpose(1, 2, 0, 3)
-
-
-def _identity(size: int) -> csr_array:
-    every = np.arange(size)
-    return csr_array((np.ones(size), (every, every)), shape=(size, size))

@@ -264,7 +264,7 @@ def _stiffness(position: Position, closed: NDArray[np.int64]) -> Array:
     n = len(position.pair.weights)
     unit = float(np.median(position.compliance.diagonal()[:n]))
     system = np.zeros((k + r, k + r))
-    system[:k, :k] = position.compliance[np.ix_(closed, closed)] / unit
+    system[:k, :k] = position.compliance.entries(closed, closed) / unit
     system[:k, k:] = position.modes[closed]
     system[k:, :k] = position.balance[:, closed]
     right = np.eye(k + r)[:, :k]

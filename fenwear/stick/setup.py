@@ -6,8 +6,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.assembly import Bodies, build_bodies, make_sliding
-from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.stick.cycle import Rig
@@ -24,7 +24,7 @@ def make_rig(
     steps: int | None = None,
     fresh: bool = False,
     bodies: Bodies | None = None,
-    condensed: tuple[CondensedBody, CondensedBody] | None = None,
+    condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
 ) -> Rig:
     """Return the bodies of a case with what is done to them; collective.
 
@@ -52,7 +52,7 @@ def unheated_rig(
     steps: int | None = None,
     *,
     fresh: bool = False,
-    condensed: tuple[CondensedBody, CondensedBody] | None = None,
+    condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
 ) -> Rig:
     """Return the same without heat; collective. Arguments as of `make_rig`."""
     sliding, surface = make_sliding(case), bodies.punch.surface

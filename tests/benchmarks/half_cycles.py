@@ -33,7 +33,9 @@ def by_hand(system: Tribosystem, half_cycles: int) -> tuple[Array, Array]:
     rigid, ratios = system.rigid, system.friction_ratios()
     modes = len(rigid.resultant)
     matrices = [
-        np.block([[own.compliance(tau), rigid.rigid_normal], [rigid.equilibrium(tau), np.zeros((modes, modes))]])
+        np.block(
+            [[own.compliance(tau).matrix(), rigid.rigid_normal], [rigid.equilibrium(tau), np.zeros((modes, modes))]]
+        )
         for own, tau in zip(system.interfaces, ratios, strict=True)
     ]
     rates = [system.phases_wear.depth(np.ones((len(phases), n)))[k] for k in phases]

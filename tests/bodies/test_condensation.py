@@ -79,13 +79,27 @@ def test_compliance_equals_a_direct_solve(
     direct = solve_directly(body, lambda x: ufl.as_vector([c * p(x[0]) for c in axis]))
     displacement = body.trace.pick(direct[:, None])[:, 1, 0]
     found = condense(body, surface.spread) if every_axis else condensed(body)
-    along = found.normal_response(np.broadcast_to(UP, surface.x.shape)) @ np.array(axis, dtype=float)
-    np.testing.assert_allclose(
-        along @ (surface.weights * p(surface.x[:, 0])),
-        displacement,
-        rtol=0,
-        atol=1e-8 * np.abs(displacement).max(),
-    )
+    moved = found.apply(np.outer(surface.weights * p(surface.x[:, 0]), axis))
+    along = moved @ UP if every_axis else moved[:, 0]
+    np.testing.assert_allclose(along, displacement, rtol=0, atol=1e-8 * np.abs(displacement).max())
+
+
+@pytest.mark.parametrize("every_axis", [False, True])
+def test_operator(assembled: Callable[..., Tribosystem], every_axis: bool) -> None:
+    """Products, some of its numbers and its diagonal are those of one matrix; of several forces at once, too."""
+    body = assembled("example1", *SMALL).bodies.strip
+    found = condense(body, body.surface.spread) if every_axis else condensed(body)
+    every, n = slice(None), len(body.surface.x)
+    whole = found.entries(every, every)
+    assert whole.shape == (n, found.directions.shape[2], n, 2)
+    forces = np.random.default_rng(1).uniform(-1, 1, (n, 2, 3))
+    forces[3:7] = 0.0
+    np.testing.assert_allclose(found.apply(forces), np.einsum("iajc,jck->iak", whole, forces), rtol=1e-11)
+    np.testing.assert_allclose(found.apply(forces)[:, :, 1], found.apply(forces[:, :, 1]), rtol=1e-11)
+    rows, columns = np.array([1, 5, 3]), np.array([2, 0])
+    np.testing.assert_array_equal(found.entries(rows, columns), whole[rows][:, :, columns])
+    np.testing.assert_array_equal(found.entries(rows, every), whole[rows])
+    np.testing.assert_array_equal(found.diagonal(), np.einsum("iaic->iac", whole))
 
 
 @pytest.mark.parametrize("degree", range(1, 9))

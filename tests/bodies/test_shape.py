@@ -53,8 +53,8 @@ def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..
     system = assembled("example1", *COARSE)
     depth = 1e-6
     moved = assemble(system.case, system.comm, Worn(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights))
-    scale = np.abs(system.interface.gap_by_force).max()
-    difference = np.abs(moved.interface.gap_by_force - system.interface.gap_by_force).max()
+    scale = np.abs(system.interface.dense()).max()
+    difference = np.abs(moved.interface.dense() - system.interface.dense()).max()
     assert 0 < difference < 1e-5 * scale
     worn = Worn(np.full_like(system.pair.x, depth), system.unworn().strip)
     np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-13)

@@ -48,12 +48,12 @@ def test_columns_are_made_when_they_are_asked_for(seed: int, n: int) -> None:
     columns = Columns(n, make)
     for _ in range(4):
         x = np.where(random.uniform(size=n) < 0.2, random.uniform(-1, 1, n), 0.0)
-        np.testing.assert_allclose(columns.multiply(x), matrix @ x, atol=1e-14 * n)
+        np.testing.assert_allclose(columns.apply(x), matrix @ x, atol=1e-14 * n)
         rows, some = (np.flatnonzero(random.uniform(size=n) < 0.1).astype(np.int32) for _ in range(2))
         np.testing.assert_array_equal(columns.entries(rows, some), matrix[np.ix_(rows, some)])
     assert len(asked) == len(set(asked)) == columns.made
     few = Columns(n, lambda nodes: matrix[:, nodes])
-    few.multiply(np.eye(n)[n // 2])
+    few.apply(np.eye(n)[n // 2])
     assert few.made == 1
 
 

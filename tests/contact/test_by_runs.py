@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.contact import phase_rows
 from fenwear.contact.by_runs import SpreadPhases
+from fenwear.contact.phase_rows import SomeNodes
 from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.interface import Interface
@@ -30,12 +31,16 @@ def equations(m: int, n: int) -> tuple[SpreadShape, ShapeEquations]:
     for shift in (0.0, 0.3 / n):
         distance = np.subtract.outer(x * (1 + shift), x * (1 + shift))
         normal = np.log(8 / np.maximum(np.abs(distance), 0.5 / n))
-        places.append(SimpleNamespace(gap_by_force=np.stack([np.sign(distance), normal], axis=2), pair=pair, rows=None))
+        numbers = SomeNodes(np.stack([np.sign(distance), normal], axis=2)[:, None])
+        places.append(SimpleNamespace(apply=numbers.apply, entries=numbers.entries, pair=pair, rows=None))
     interfaces = [cast(Interface, places[k % 2]) for k in range(m)]
     ratios = [np.stack([np.full(n, 0.3 * (-1) ** (k // 2)), np.zeros(n)], axis=1) for k in range(m)]
     balances = np.array([modes.T / n + 0.1 * (-1) ** k / n for k in range(m)])
     traction = [(pair.normal + ratio) * weights[:, None] for ratio in ratios]
-    whole = [np.einsum("ijd,jd->ij", own.gap_by_force, t) for own, t in zip(interfaces, traction, strict=True)]
+    every = slice(None)
+    whole = [
+        np.einsum("ijd,jd->ij", own.entries(every, every)[:, 0], t) for own, t in zip(interfaces, traction, strict=True)
+    ]
     return SpreadShape(SpreadPhases(interfaces, ratios, 1.0), modes, balances), ShapeEquations(whole, modes, balances)
 
 

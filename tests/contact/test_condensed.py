@@ -78,7 +78,7 @@ def test_gap_is_the_distance_of_the_displaced_surfaces(system: Tribosystem) -> N
     """gap = g0 + w + (S_n + d mu S_t) p + H a + g_load, from the state alone."""
     state = system.contact((-1,)).solve(gap := worn(system))
     interface = system.interface
-    expected = interface.compliance(system.friction_ratio(-1)) @ state.pressure[0]
+    expected = interface.compliance(system.friction_ratio(-1)).apply(state.pressure[0])
     expected += system.rigid.rigid_normal @ state.rigid[0] + interface.load_gap + gap
     np.testing.assert_allclose(state.gap[0], expected, atol=1e-12)
 

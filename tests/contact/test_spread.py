@@ -14,7 +14,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import needs_of, shares_text, tribosystem
 from fenwear.contact import CondensedContact, SlidingContact, phase_rows, spread, spread_nodes
 from fenwear.cycle import stability_number
-from fenwear.interface import Interface
+from fenwear.interface import PressureCompliance
 from fenwear.parallel import Rows, Team
 
 COMM = MPI.COMM_WORLD
@@ -33,13 +33,13 @@ def test_runs_are_the_same(name: str, settings: tuple[str, ...], monkeypatch: py
     monkeypatch.setattr(spread, "RUN", 7)
     monkeypatch.setattr(phase_rows, "RUN", 30)
     shared = assemble(load_case(name, settings))
-    n, rows = len(shared.pair.weights), shared.interface.gap_by_force.shape[0]
+    n, rows = len(shared.pair.weights), shared.interface.dense().shape[0]
     assert rows <= -(-n // COMM.size)
     assert shared.condensed.punch.response.shape[2] == rows
     assert shared.condensed.strip.response.shape[2] < whole.condensed.strip.response.shape[2]
     assert shared.interface.elastic_length == pytest.approx(whole.interface.elastic_length, rel=1e-12)
-    expected = whole.interface.compliance(whole.friction_ratio(1))
-    found = shared.interface.compliance(shared.friction_ratio(1))
+    expected = whole.interface.compliance(whole.friction_ratio(1)).matrix()
+    found = shared.interface.compliance(shared.friction_ratio(1)).matrix()
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
     runs: list[Callable[[Tribosystem], Array]] = [
         lambda system: list(march(system, 3))[-1].pressure[-2:],
@@ -70,7 +70,7 @@ def test_steady_states_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = shares_text(shared, needs_of(shared))
     assert any(f"{COMM.size} ranks share the rows of its {len(shared.pair.weights)} nodes" in line for line in lines)
     assert few < needed
-    monkeypatch.setattr(Interface, "compliance", None)  # no matrix of all nodes is made
+    monkeypatch.setattr(PressureCompliance, "matrix", None)  # no matrix of all nodes is made
     for change, one in zip(changes, expected, strict=True):
         other = steady(vary(shared, change)).phase_pressure
         np.testing.assert_allclose(other, one, rtol=0, atol=1e-9 * one.max())

@@ -35,7 +35,7 @@ def dense(system: Tribosystem) -> tuple[Array, Array, Array, Array]:
     uniform = np.full(n, system.rigid.mean_pressure)
     states, _ = exchange.change(0, exchange.conductance(uniform), pressure=np.eye(n))
     ratio = system.friction_ratio(1)
-    compliance = interface.compliance(ratio)
+    compliance = interface.compliance(ratio).matrix()
     rigid = interface.rigid
     return compliance + exchange.gap_change(states), compliance, rigid.rigid_normal, rigid.equilibrium(ratio)
 

@@ -11,7 +11,6 @@ from cylinders import equal_cylinders, line_load
 from fenwear import load_case
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
-from fenwear.interface import ContactPair
 from fenwear.stick.cycle import Rig
 from fenwear.stick.final import final_shape, stick_zone
 from fenwear.stick.jump import jump
@@ -86,8 +85,8 @@ def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.
     That is Ciavarella's and Jaeger's contact, node by node. Finite bodies rock under the tangential force.
     """
 
-    def upright(pair: ContactPair) -> Array:
-        return np.broadcast_to(np.array([[0.0, 1.0], [1.0, 0.0]]), (len(pair.normal), 2, 2)).copy()
+    def upright(normal: Array) -> Array:
+        return np.broadcast_to(np.array([[0.0, 1.0], [1.0, 0.0]]), (len(normal), 2, 2)).copy()
 
     def alike(body: CondensedBody) -> CondensedBody:
         response = body.response.copy()

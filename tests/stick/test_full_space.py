@@ -70,7 +70,7 @@ class FullSpace:
         """Return all tractions (d n,), the jumps without opening (d n,), and the Newton steps."""
         position, n, m = self.interface.middle, self.n, self.d - 1
         H, balance = csr_array(position.modes), csr_array(position.balance)
-        c = 1 / np.abs(np.diag(position.compliance)).reshape(self.d, n)
+        c = 1 / np.abs(position.compliance.diagonal()).reshape(self.d, n)
         c[1:] = c[1]  # one number for both tangents of a node: else slip were not against its traction
         c = c.ravel()
         moved = -position.drive * displacement

@@ -47,7 +47,7 @@ def _nothing_kept() -> Iterator[None]:
 def opposite_friction(patch: Patch) -> None:
     """Tangential compliance with the other sign."""
     right = Interface.compliance
-    patch.setattr(Interface, "compliance", lambda self, slip: right(self, -slip))
+    patch.setattr(Interface, "compliance", lambda self, slip, scale=1.0: right(self, -slip, scale))
 
 
 def opposite_moment(patch: Patch) -> None:

@@ -17,6 +17,7 @@ from scipy.sparse import csr_array, eye_array
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.half_space import influence
 from fenwear.interface import ContactPair, RigidEquilibrium
 from fenwear.interface.placement import HERE
 from fenwear.sliding.field import ALONG_X
@@ -32,34 +33,6 @@ class Elastic:
 
     shear: float
     poisson: float
-
-
-def influence(x: Array, side: float, body: Elastic) -> Array:
-    """Return the displacement at places x (k, 2) from uniform unit tractions on a square about 0 (k, 3, 3), mm/MPa.
-
-    Components along x, y and into the body; sources last. The integrals over the square of Boussinesq's and
-    Cerruti's solutions (K. L. Johnson, Contact Mechanics, 1985, sections 3.2 and 3.6), with r² = x² + y²,
-
-        2 pi G u = ((1 - nu) / r + nu x x / r³) q,   (1 - nu) / r q_z,   -+ (1 - 2 nu) / 2 x / r² between both.
-    """
-    nu = body.poisson
-    square = np.zeros((6, len(x)))  # of 1/r, x²/r³, y²/r³, x y/r³, x/r², y/r²
-    for i in (1, -1):
-        for j in (1, -1):
-            X, Y = x[:, 0] + i * side / 2, x[:, 1] + j * side / 2
-            r = np.hypot(X, Y)
-            xx, yy = Y * np.log(X + r), X * np.log(Y + r)
-            half = np.log(r)
-            square += i * j * np.array([xx + yy, xx, yy, -r, Y * half + X * np.arctan(Y / X),
-                                        X * half + Y * np.arctan(X / Y)])  # fmt: skip
-    over_r, xx, yy, xy, fx, fy = square
-    found = np.zeros((len(x), 3, 3))
-    found[:, 0, 0], found[:, 1, 1] = (1 - nu) * over_r + nu * xx, (1 - nu) * over_r + nu * yy
-    found[:, 0, 1] = found[:, 1, 0] = nu * xy
-    found[:, 2, 2] = (1 - nu) * over_r
-    for k, f in enumerate((fx, fy)):
-        found[:, 2, k], found[:, k, 2] = (0.5 - nu) * f, -(0.5 - nu) * f
-    return np.asarray(found / (2 * np.pi * body.shear), dtype=np.float64)
 
 
 @cache
@@ -98,7 +71,7 @@ def half_spaces(
                 for sign, mirror in zip((i, j), MIRRORS[symmetry], strict=True):
                     image = image * (mirror if sign < 0 else (1, 1, 1))
                 apart = x[:, None] - x * [i, j]
-                local = influence(apart.reshape(-1, 2), spacing, body)
+                local = influence(apart.reshape(-1, 2), (spacing, spacing), body.shear, body.poisson)
                 if symmetry == "pulled":
                     local[:, 2, :2] = local[:, :2, 2] = 0.0
                 local = local.reshape(n, n, 3, 3).transpose(0, 2, 1, 3)

@@ -1,0 +1,295 @@
+"""A body that is large against its contact, as an elastic half-space, in the plane a half-plane; without a mesh.
+
+Each node of a regular grid has a rectangle, in the plane a strip, over which its force is spread evenly. What that
+displaces is known in closed form, and depends on the distance of two nodes alone: products go by fast Fourier
+transforms, numbers are looked up. With r the distance, q the tractions, u_z into the body, G and nu of the material,
+
+    2 pi G u = ((1 - nu) / r + nu x x / r^3) q,    (1 - nu) / r q_z,    -+ (1/2 - nu) x / r^2 between both
+
+(Boussinesq, Cerruti; K. L. Johnson, Contact Mechanics, 1985, sections 3.2 and 3.6), over rectangles after A. E. H. Love
+(Phil. Trans. R. Soc. A 228, 1929); in the plane, with x the distance and D the depth from which displacements count,
+
+    pi G u_x = ((1 - nu) ln(D / |x|) + 1/2) q_x,    pi G u_z = ((1 - nu) ln(D / |x|) - 1/2) q_z
+
+(Flamant, Johnson sections 2.2, 2.3 and 5.6), and -+ pi (1/2 - nu) / 2 sign x between both.
+
+It leaves out all of the body that is not near the contact: supports and other boundaries, the curvature of the surface,
+and what loads displace. That is of the order of the contact's width over the distance of the next boundary, and over
+the radius. What the finite body does otherwise is smooth at the contact: another operator could add it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+from mpi4py import MPI
+from numpy.typing import NDArray
+from ufl.algorithms import extract_coefficients
+
+from fenwear.arrays import Array, Nodes
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.material import Isotropic
+from fenwear.bodies.response import Request
+from fenwear.errors import CaseError, InputError
+
+TRANSFORM = 85.0  # numbers that memory could give while one is transformed, there and back over two (measured)
+UNEVEN = 0.01  # of the spacing: how far a node may be off the grid
+WIDE = 1.25  # of a cell: what a node has at most; 1.5 between cells of one spacing and of two
+SAME = 1e-9  # of a material's constants: one material
+EVERY = slice(None)
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """An elastic half-space, or half-plane, under forces that are even over the cells of a regular grid.
+
+    Vectors have the grid's axes first and the outward normal last; `axes` says which of the model's they are.
+
+    Attributes:
+        places: Whole numbers of each node along the axes of the grid (q, d - 1).
+        spacing: Of the grid (d - 1,), mm.
+        shear: G, MPa.
+        poisson: nu; in plane stress nu / (1 + nu).
+        axes: The model's axis of each of the grid's and of the normal (d,).
+        outward: 1.0 where the normal out of the body points along its axis, else -1.0.
+        depth: From which displacements count, mm: in the plane alone, in space they count from far away.
+        along: Directions that displacements are asked for along, the same at all nodes (a, d); None for all axes.
+    """
+
+    places: NDArray[np.int64]
+    spacing: tuple[float, ...]
+    shear: float
+    poisson: float
+    axes: tuple[int, ...]
+    outward: float
+    depth: float = np.inf
+    along: Array | None = None
+    by_temperature: Array | None = None
+    kept: NDArray[np.int64] | None = None
+
+    @property
+    def dim(self) -> int:
+        """D."""
+        return len(self.axes)
+
+    @cached_property
+    def _directions(self) -> Array:
+        return np.eye(self.dim) if self.along is None else self.along
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors (q, d, a)."""
+        return np.broadcast_to(self._directions.T, (len(self.places), *self._directions.T.shape))
+
+    @property
+    def by_load(self) -> Array:
+        """Displacement by loads (q, d): none."""
+        return np.zeros((len(self.places), self.dim))
+
+    @cached_property
+    def _shape(self) -> tuple[int, ...]:
+        """Nodes of the whole grid along its axes."""
+        return tuple(int(count) for count in np.ptp(self.places, axis=0) + 1)
+
+    @cached_property
+    def _at(self) -> NDArray[np.int64]:
+        """Places counted from the grid's corner (q, d - 1)."""
+        return self.places - self.places.min(axis=0)
+
+    @property
+    def cost(self) -> float:
+        """Of a product: transforms of each component there, and of each displacement back."""
+        return TRANSFORM * 2.0 ** (self.dim - 1) / 4 * float(np.prod(self._shape)) * (self.dim + len(self._directions))
+
+    @cached_property
+    def _table(self) -> Array:
+        """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
+        counts = [np.arange(1 - count, count) for count in self._shape]
+        far = np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1) * np.array(self.spacing)
+        found = influence(far.reshape(-1, self.dim - 1), self.spacing, self.shear, self.poisson, self.depth)
+        found /= np.prod(self.spacing)
+        found[:, -1] *= -self.outward  # from into the body to along its axis
+        found[:, :, -1] *= -self.outward
+        whole = np.empty_like(found)
+        whole[:, np.array(self.axes)[:, None], np.array(self.axes)] = found
+        return np.asarray(self._directions @ whole).reshape(*far.shape[:-1], len(self._directions), self.dim)
+
+    @cached_property
+    def _kernel(self) -> NDArray[np.complex128]:
+        """The transform of the table, its zero distance first, over twice the grid."""
+        inner = tuple(range(self.dim - 1))
+        wrapped = np.zeros((*(2 * count for count in self._shape), *self._table.shape[-2:]))
+        to = np.ix_(*(np.arange(1 - count, count) % (2 * count) for count in self._shape))
+        wrapped[to] = self._table
+        return np.asarray(scipy.fft.rfftn(wrapped, axes=inner))
+
+    def apply(self, forces: Array) -> Array:
+        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
+        q, d, *rest = forces.shape
+        found = np.empty((q, len(self._directions), int(np.prod(rest))))
+        inner, size = tuple(range(1, d)), tuple(2 * count for count in self._shape)
+        at = (EVERY, *self._at.T)
+        for k, force in enumerate(forces.reshape(q, d, -1).transpose(2, 1, 0)):
+            pushed = np.flatnonzero(force.any(axis=1))
+            if not len(pushed):
+                found[:, :, k] = 0.0
+                continue
+            grid = np.zeros((len(pushed), *self._shape))
+            grid[at] = force[pushed]
+            image = np.einsum("...ac,c...->a...", self._kernel[..., pushed], scipy.fft.rfftn(grid, size, axes=inner))
+            found[:, :, k] = scipy.fft.irfftn(image, size, axes=inner)[at].T
+        return found.reshape(q, -1, *rest)
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the displacements at nodes from unit forces at others (rows, a, columns, d)."""
+        seen, pushed = self._at[rows], self._at[columns]
+        apart = seen[:, None] - pushed + np.array(self._shape) - 1
+        return self._table[tuple(np.moveaxis(apart, -1, 0))].transpose(0, 2, 1, 3)
+
+    def diagonal(self) -> Array:
+        """Return the displacements at each node from unit forces at itself (q, a, d)."""
+        middle = self._table[tuple(count - 1 for count in self._shape)]
+        return np.broadcast_to(middle, (len(self.places), *middle.shape))
+
+    def under(self, elastic: ElasticBody) -> HalfSpace:
+        """Return the same: loads displace nothing."""
+        del elastic
+        return self
+
+
+def half_space(request: Request) -> HalfSpace:
+    """Return a body as a half-space, at the places of its patterns; collective.
+
+    Raises:
+        CaseError: it is of rings, of several materials or not isotropic, a support moves it, or its contact nodes make
+            no regular grid, each with as much of the surface as the others.
+    """
+    elastic, key = request.elastic, f"{request.elastic.body.name}.operator"
+    if elastic.law.kind == "axisymmetric":
+        raise CaseError(InputError(key, "expected 'condensed' for rings: 'half-space' is of plane models and solids"))
+    if elastic.surface.degree != 1:
+        message = f"expected 1 with {key} = 'half-space': a contact node then has as much of the surface as the others"
+        raise CaseError(InputError("geometry.degree", message))
+    if elastic.moved:
+        message = "expected a load with 'half-space', which knows of no supports: none may move it"
+        raise CaseError(InputError(f"{elastic.body.name}.supports", message))
+    surface, shares = elastic.surface, request.patterns.sum(axis=0)
+    x = (request.patterns.T @ surface.trace) / np.asarray(shares).reshape(-1, 1)
+    mean = surface.weights @ surface.outward
+    normal = int(np.abs(mean).argmax())
+    inner = [axis for axis in range(elastic.dim) if axis != normal]
+    places, spacing = _grid(x[:, inner], surface.weights, key)
+    along = None if request.directions is None else request.directions
+    if along is not None:
+        along = along[:1] if np.abs(along - along[0]).max() <= SAME else None
+    low, high = _range(elastic, elastic.body.mesh.geometry.x[:, normal])
+    return HalfSpace(
+        places,
+        spacing,
+        *_constants(elastic, key),
+        axes=(*inner, normal),
+        outward=float(np.sign(mean[normal])),
+        depth=high - low if elastic.dim == 2 else np.inf,
+        along=along,
+    )
+
+
+def _grid(x: Array, weights: Array, key: str) -> tuple[NDArray[np.int64], tuple[float, ...]]:
+    """Return the places of nodes (q, m) on a regular grid, and its spacing, mm; weights (n,) are of the surface.
+
+    Raises:
+        CaseError: they are not on one, or leave some of it out.
+    """
+    extent = np.ptp(x, axis=0)
+    steps = np.diff(np.sort(x, axis=0), axis=0)
+    least = np.where(steps > UNEVEN * np.sqrt(np.prod(extent) / len(x)), steps, np.inf).min(axis=0, initial=np.inf)
+    counts = np.rint(extent / least)
+    spacing = extent / np.maximum(counts, 1)
+    off = (x - x.min(axis=0)) / spacing
+    places = np.rint(off).astype(np.int64)
+    regular = np.isfinite(least).all() and np.abs(off - places).max() <= UNEVEN
+    if not regular or weights.max() > WIDE * np.prod(spacing):
+        message = "expected contact nodes on a regular grid for 'half-space': even elements over all of the contact"
+        raise CaseError(InputError(key, message))
+    return places, tuple(float(one) for one in spacing)
+
+
+def _constants(elastic: ElasticBody, key: str) -> tuple[float, float]:
+    """Return G and nu of the one material of a body; collective.
+
+    Raises:
+        CaseError: it is of several, or not isotropic.
+    """
+    if not isinstance(elastic.law, Isotropic):
+        raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: 'half-space' is isotropic"))
+    values = {}
+    for field in dict.fromkeys(field for one in elastic.law.lame for field in extract_coefficients(one)):
+        low, high = _range(elastic, field.x.array)
+        if high - low > SAME * abs(high):
+            raise CaseError(InputError(key, "expected 'condensed' for a body of several materials"))
+        values[field] = high
+    first, second = (float(one((0.0,) * elastic.dim, values)) for one in elastic.law.lame)
+    return second, first / (2 * (first + second))
+
+
+def _range(elastic: ElasticBody, values: Array) -> tuple[float, float]:
+    """Return the least and the largest of the values that all ranks have; collective."""
+    comm = elastic.body.mesh.comm
+    least = comm.allreduce(values.min(initial=np.inf), op=MPI.MIN)
+    return float(least), float(comm.allreduce(values.max(initial=-np.inf), op=MPI.MAX))
+
+
+def influence(x: Array, sides: Sequence[float], shear: float, poisson: float, depth: float = np.inf) -> Array:
+    """Return the displacement at places from uniform unit tractions on a rectangle about 0 (k, d, d), mm/MPa.
+
+    Components along the surface, then into the body; sources last.
+
+    Args:
+        x: The places (k, d - 1), mm.
+        sides: Of the rectangle, in the plane of a strip (d - 1,), mm.
+        shear, poisson: G, MPa, and nu.
+        depth: From which displacements count in the plane, mm.
+    """
+    return (
+        _in_plane(x[:, 0], sides[0], shear, poisson, depth) if len(sides) == 1 else _in_space(x, sides, shear, poisson)
+    )
+
+
+def _in_plane(x: Array, side: float, shear: float, poisson: float, depth: float) -> Array:
+    log, sign = np.zeros(len(x)), np.zeros(len(x))  # integrals of ln(D / |x|) and of sign x over the strip
+    for i in (1, -1):
+        end = x + i * side / 2
+        log -= i * end * (np.log(np.abs(end) / depth) - 1)
+        sign += i * np.abs(end)
+    found = np.zeros((len(x), 2, 2))
+    for k, moved in enumerate((side / 2, -side / 2)):
+        found[:, k, k] = (1 - poisson) * log + moved
+    found[:, 1, 0] = np.pi / 2 * (0.5 - poisson) * sign
+    found[:, 0, 1] = -found[:, 1, 0]
+    return np.asarray(found / (np.pi * shear))
+
+
+def _in_space(x: Array, sides: Sequence[float], shear: float, poisson: float) -> Array:
+    square = np.zeros((6, len(x)))  # integrals of 1/r, x²/r³, y²/r³, x y/r³, x/r², y/r² over the rectangle
+    far, sign = np.abs(x), np.sign(x)  # logarithms of X + r, X < 0, would lose digits
+    for i in (1, -1):
+        for j in (1, -1):
+            X, Y = far[:, 0] + i * sides[0] / 2, far[:, 1] + j * sides[1] / 2
+            r = np.hypot(X, Y)
+            xx, yy = Y * np.log(X + r), X * np.log(Y + r)
+            half = np.log(r)
+            parts = (xx + yy, xx, yy, -r, Y * half + X * np.arctan(Y / X), X * half + Y * np.arctan(X / Y))
+            square += i * j * np.array(parts)
+    over_r, xx, yy, xy, fx, fy = square
+    xy, fx, fy = xy * sign.prod(axis=1), fx * sign[:, 0], fy * sign[:, 1]
+    found = np.zeros((len(x), 3, 3))
+    found[:, 0, 0], found[:, 1, 1] = (1 - poisson) * over_r + poisson * xx, (1 - poisson) * over_r + poisson * yy
+    found[:, 0, 1] = found[:, 1, 0] = poisson * xy
+    found[:, 2, 2] = (1 - poisson) * over_r
+    for k, f in enumerate((fx, fy)):
+        found[:, 2, k], found[:, k, 2] = (0.5 - poisson) * f, -(0.5 - poisson) * f
+    return np.asarray(found / (2 * np.pi * shear))

@@ -1,0 +1,147 @@
+"""How surfaces of bodies answer to forces: operators.
+
+An operator takes forces on the nodes of a contact surface to displacements of the same nodes. It is asked for products,
+for some of its numbers and for its diagonal, never for an array made in advance: what stands behind it, numbers in
+memory or a formula and a Fourier transform, is its own affair. By Maxwell and Betti it is symmetric.
+
+Each body has one of its own, `punch.operator` and `strip.operator` of a case, by the name that it is registered under
+here; who asks knows no names. So it is with the integral operators of half-space codes (L. Frérot et al., Tamaas, J.
+Open Source Software 5, 2020).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array, Nodes
+from fenwear.bodies.condensation import condense_together
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.half_space import half_space
+from fenwear.bodies.response import Request
+from fenwear.case import CONDENSED, Case
+from fenwear.errors import CaseError, InputError
+
+
+class SurfaceOperator(Protocol):
+    """What forces on q patterns of a contact surface do to them, per thickness.
+
+    Displacements are those along a directions of each pattern: along all d axes, or along one alone, the normal of the
+    contact, where no other is ever asked for.
+
+    Attributes:
+        directions: The directions (q, d, a), unit vectors.
+        by_load: Displacement of each pattern by the body's loads (q, d), mm.
+        by_temperature: Displacement of each pattern along its one direction from the temperature of this
+            rank's own nodes (q, owned), mm/K; None without heat.
+        kept: Patterns whose rows this rank has, ascending (k,), where ranks share them; None for all.
+        cost: Of a product, in numbers that memory could give meanwhile; None where the operator is numbers in memory.
+    """
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors (q, d, a)."""
+
+    @property
+    def by_load(self) -> Array:
+        """Displacement by the loads (q, d), mm."""
+
+    @property
+    def by_temperature(self) -> Array | None:
+        """Displacement from temperatures (q, owned), mm/K."""
+
+    @property
+    def kept(self) -> NDArray[np.int64] | None:
+        """Patterns whose rows this rank has (k,)."""
+
+    @property
+    def cost(self) -> float | None:
+        """Of a product."""
+
+    def apply(self, forces: Array) -> Array:
+        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N/mm in the plane; of the rows kept here."""
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the displacements at some patterns from unit forces along the axes at others (rows, a, columns, d).
+
+        Args:
+            rows: Their numbers; where ranks share rows, among those that this one keeps.
+            columns: Their numbers.
+        """
+
+    def diagonal(self) -> Array:
+        """Return the displacements at each pattern from unit forces at itself (q, a, d); where every rank has all."""
+
+    def under(self, elastic: ElasticBody) -> Self:
+        """Return the same under the loads of a body that differs by them alone; collective."""
+
+
+Make = Callable[[Request], SurfaceOperator]
+OPERATORS: dict[str, Make] = {
+    "half-space": half_space
+}  # besides the condensed body, which all of them are made of at once
+
+
+def register_operator(name: str, make: Make) -> None:
+    """Make an operator known by its name, as `operator = "name"` of a body in a case made in Python.
+
+    It is called on every rank with what the body is asked for: the body, the shares of its trace nodes in the forces
+    (N, q), and one direction for each where no other is asked for.
+
+    Args:
+        name: A word, with hyphens; registered again, the new one takes its place.
+        make: Returns the operator; collective.
+
+    Raises:
+        CaseError: `name` is no word, or that of the condensed body, or `make` cannot be called.
+    """
+    if not (isinstance(name, str) and name.replace("-", "_").isidentifier()) or name == CONDENSED:
+        raise CaseError(
+            InputError("operator", f"expected a word other than {CONDENSED!r} as a name, got {str(name)!r}")
+        )
+    if not callable(make):
+        raise CaseError(InputError(f"operator {name!r}", "expected a function of a request"))
+    OPERATORS[name] = make
+
+
+def check_operators(case: Case) -> None:
+    """Make sure that the operators of both bodies are known.
+
+    Raises:
+        CaseError: one is not.
+    """
+    known = ", ".join(map(repr, (CONDENSED, *sorted(OPERATORS))))
+    problems = [
+        InputError(
+            f"{name}.operator",
+            f"no operator {body.operator!r} is registered, known are {known}: those of one's own are made known in "
+            "Python, by fenwear.register_operator",
+        )
+        for name, body in (("punch", case.punch), ("strip", case.strip))
+        if body.operator not in (CONDENSED, *OPERATORS)
+    ]
+    if problems:
+        raise CaseError(problems)
+
+
+def operators_for(requests: Sequence[Request], *, keep: bool = False, fresh: bool = False) -> list[SurfaceOperator]:
+    """Return how bodies answer, each by its own operator; collective.
+
+    Args:
+        requests: Of the bodies.
+        keep: Whether condensed bodies are kept on disk, and taken from there where they are.
+        fresh: Condense them whatever is kept.
+
+    Raises:
+        CaseError: a body is none for its operator.
+        ConvergenceError: a stiffness has no factor.
+    """
+    wanted = [one for one in requests if one.elastic.operator == CONDENSED]
+    condensed = iter(condense_together(wanted, keep=keep, fresh=fresh) if wanted else [])
+    return [
+        next(condensed) if one.elastic.operator == CONDENSED else OPERATORS[one.elastic.operator](one)
+        for one in requests
+    ]

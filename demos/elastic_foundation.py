@@ -59,7 +59,7 @@ class Foundation:
         same = every[rows][:, None] == every[columns]
         return same[:, None, :, None] * self.diagonal()[rows][:, :, None]
 
-    def under(self, elastic: ElasticBody) -> Foundation:
+    def under(self, _: ElasticBody) -> Foundation:
         """Return the same under other loads."""
         return self
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import runpy
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -27,10 +27,9 @@ HALF_SPACES = ("punch.operator='half-space'", "strip.operator='half-space'")
 
 
 @pytest.fixture
-def _registered(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def registry(monkeypatch: pytest.MonkeyPatch) -> None:
     """Forget what a test registers."""
     monkeypatch.setattr(operators, "OPERATORS", dict(OPERATORS))
-    yield
 
 
 def plane(along: Array | None = None) -> HalfSpace:
@@ -115,6 +114,7 @@ def test_ball_on_flat_is_the_contact_of_hertz() -> None:
     assert errors[1] < 0.5 * errors[0] < 0.03
 
 
+@pytest.mark.usefixtures("registry")
 @pytest.mark.parametrize(
     ("name", "small"),
     [
@@ -123,7 +123,7 @@ def test_ball_on_flat_is_the_contact_of_hertz() -> None:
         ("ball-on-flat", [*BALL[:5], "geometry.parameters.across=8"]),
     ],
 )
-def test_by_name_or_condensed(name: str, small: list[str], _registered: None) -> None:
+def test_by_name_or_condensed(name: str, small: list[str]) -> None:
     """An operator that answers by products as the condensed body does gives the same pressures with the other body."""
 
     class Product:
@@ -173,15 +173,17 @@ def test_bodies_that_are_no_half_space(name: str, settings: list[str], message: 
         assemble(load_case(name, settings))
 
 
+@pytest.mark.usefixtures("registry")
 @pytest.mark.parametrize(("name", "make"), [("condensed", print), ("two words", print), (3, print), ("mine", 3)])
-def test_what_cannot_be_registered(name: Any, make: Any, _registered: None) -> None:
+def test_what_cannot_be_registered(name: Any, make: Any) -> None:
     """A name that is taken or no word, and what cannot be called."""
     with pytest.raises(CaseError, match="operator"):
         register_operator(name, make)
 
 
-def test_elastic_foundation(_registered: None) -> None:
-    """The demo: a steel cylinder on a thin layer has Johnson's parabola of pressure, node by node, as nodes get finer."""
+@pytest.mark.usefixtures("registry")
+def test_elastic_foundation() -> None:
+    """The demo: a steel cylinder on a thin layer has Johnson's parabola of pressure, node by node."""
     names, errors = runpy.run_path(str(DEMO)), []
     for elements in (60, 120):
         system, pressure = names["main"](

@@ -7,6 +7,8 @@ from collections import Counter
 LINE_SEARCH = "contact solved with a line search"
 FULL_START = "contact solved from full contact on"
 FULL_START_SEARCH = "contact solved from full contact on, with a line search"
+RIGID_START = "contact solved from where rigid bodies would touch"
+RIGID_START_SEARCH = "contact solved from where rigid bodies would touch, with a line search"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
 GRAZING = "nodes conduct whose pressure tends to nothing"

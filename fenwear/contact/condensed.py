@@ -19,6 +19,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 from mpi4py import MPI
+from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
@@ -30,13 +31,21 @@ from fenwear.contact.spread_nodes import SpreadNodes
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
 from fenwear.parallel import Team
-from fenwear.remedies import FULL_START, FULL_START_SEARCH, LINE_SEARCH, Remedies
+from fenwear.remedies import (
+    FULL_START,
+    FULL_START_SEARCH,
+    LINE_SEARCH,
+    RIGID_START,
+    RIGID_START_SEARCH,
+    Remedies,
+)
 
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
+EVEN = 0.3  # of all that an even pressure gives: what of it has to act against the loads for it to be a start
 
 
 @dataclass(frozen=True)
@@ -325,7 +334,42 @@ class CondensedContact:
             near[:, : self.shape[1]] = start.pressure / self._pressure_scale
             yield near, False, ""
             yield near, True, LINE_SEARCH
+        if not self._carried_evenly:
+            yield self._rigid_touch(), False, RIGID_START
+            yield self._rigid_touch(), True, RIGID_START_SEARCH
         full = np.zeros_like(self._offset)
         full[:, : self.shape[1]] = 1.0
         yield full, False, FULL_START
         yield full, True, FULL_START_SEARCH
+
+    def _balance(self, phase: int) -> Array:
+        """Return E of a phase (r, n), scaled."""
+        n = self.shape[1]
+        return np.asarray(self.blocks[phase].balance if self._many else self._dense[phase, n:, :n])
+
+    @property
+    def _carried_evenly(self) -> bool:
+        """Whether an even pressure carries the loads, more or less: not in a bore, where it adds up to nothing."""
+        n = self.shape[1]
+        for k, load in enumerate(self._offset[:, n:]):
+            balance = self._balance(k)
+            against = np.abs(balance).sum(axis=1) @ np.abs(load)
+            if -(balance.sum(axis=1) @ load) < EVEN * against:
+                return False
+        return True
+
+    def _rigid_touch(self) -> Array:
+        """Return where rigid bodies would rest on each other under the loads (m, n + r).
+
+        Of all forces that balance the loads these do the least work on the gaps; their multipliers are the rigid
+        motion that goes as far along the loads as the gaps allow.
+        """
+        found, n = np.zeros_like(self._offset), self.shape[1]
+        for k, offset in enumerate(self._offset):
+            gap, load = offset[:n], offset[n:]
+            if len(load):
+                rest = linprog(gap, A_eq=self._balance(k), b_eq=-load)
+                found[k, :n] = rest.x if rest.status == 0 else 1.0
+            else:
+                found[k, :n] = gap < 0
+        return found

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import basix
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
@@ -50,13 +51,8 @@ def facing_normal(surface: ContactSurface, other: Array) -> Array:
         surface: The surface.
         other: Unit normals of the other body opposite each node (n, d).
     """
-    number = np.full(len(surface.trace), -1)
-    number[surface.nodes] = np.arange(len(surface.nodes))
-    own = number[surface.facets].ravel()
-    used = own >= 0
-    node = own[used]
-    area = _area_vectors(surface).reshape(-1, surface.dim)[used]
-    area *= np.sign(np.einsum("ic,ic->i", area, surface.outward[node]))[:, None]
+    area, node = _outward_areas(surface)
+    area, node = area[node >= 0], node[node >= 0]
     normal = unit(area)
     facing = -np.einsum("ic,ic->i", normal, other[node])
     order = np.lexsort((facing, node))  # of each node the facet that faces most comes last
@@ -68,6 +64,27 @@ def facing_normal(surface: ContactSurface, other: Array) -> Array:
     np.add.at(kept, node[smooth], area[smooth])
     found[edge] = unit(kept[edge])
     return found
+
+
+def facet_normals(surface: ContactSurface) -> Array:
+    """Return the mean unit normals of the facets out of a body (f, d)."""
+    area, _ = _outward_areas(surface)
+    return unit(area.reshape(len(surface.facets), -1, surface.dim).sum(axis=1))
+
+
+def _outward_areas(surface: ContactSurface) -> tuple[Array, NDArray[np.int64]]:
+    """Return normals out of the body at the trace nodes of each facet (f k, d), and their pressure node, or -1 (f k,).
+
+    They are as long as the facet is large there; where a node carries no pressure the facet's others say which way is
+    outward.
+    """
+    number = np.full(len(surface.trace), -1)
+    number[surface.nodes] = np.arange(len(surface.nodes))
+    node = number[surface.facets]
+    area = _area_vectors(surface)
+    along = np.einsum("fkc,fkc->fk", area, surface.outward[node]) * (node >= 0)
+    area *= np.sign(np.where(node >= 0, along, along.sum(axis=1, keepdims=True)))[:, :, None]
+    return area.reshape(-1, surface.dim), node.ravel()
 
 
 def _area_vectors(surface: ContactSurface) -> Array:

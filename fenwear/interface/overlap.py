@@ -1,7 +1,7 @@
 """Where two surfaces lie over each other: geometry in a common chart, no mechanics.
 
-A chart takes the points of both surfaces to coordinates s in R^(d - 1): the plane of a flat contact, the
-unrolled ring. In it the facets are intervals, triangles or quadrilaterals with straight edges, and two of
+A chart takes the points of both surfaces to coordinates s in R^(d - 1): the plane of a flat contact, or of
+a patch of a curved one. In it the facets are intervals, triangles or quadrilaterals with straight edges, and two of
 them meet in an interval or a convex polygon, which is cut into simplices: everything that follows is a sum
 over these. Polygons are clipped edge by edge (Sutherland and Hodgman, Comm. ACM 17, 1974).
 """
@@ -117,6 +117,25 @@ class Overlap:
     per_simplex: int
     covered_facets: Mask
     covered: Mask
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Parts of two surfaces laid out in one chart, where they lie over each other.
+
+    Attributes:
+        first, second: Facets of both that are seen there; their nodes are numbered as on the whole surfaces.
+        common: Their overlap.
+    """
+
+    first: ChartedSurface
+    second: ChartedSurface
+    common: Overlap
+
+    @classmethod
+    def of(cls, first: ChartedSurface, second: ChartedSurface) -> Patch:
+        """Lay one surface over the other."""
+        return cls(first, second, overlap(first, second))
 
 
 @dataclass(frozen=True)

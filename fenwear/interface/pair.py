@@ -9,6 +9,7 @@ other way, on curved surfaces and in every place.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,11 +20,13 @@ from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.frame import common_normal, unit
-from fenwear.interface.overlap import ChartedSurface, Overlap, overlap
+from fenwear.interface.overlap import ChartedSurface, Patch
+from fenwear.interface.patches import folds, patches
 from fenwear.interface.placement import HERE, Placement
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
 STEEPEST = 0.7  # cosine between the normals of the two surfaces: steeper parts never touch
+BELOW = 0.5  # mean component of e_n against z from which on a plane punch is below, not around or inside
 
 
 @dataclass(frozen=True)
@@ -101,20 +104,20 @@ def pair(
     Raises:
         CaseError: the surfaces do not face each other, or the strip's does not reach below the whole punch.
     """
-    axis = _chart_axis(strip)
     strip_trace, strip_outward = placement.points(strip.trace), placement.vectors(strip.outward)
-    first, second = _charted(punch, punch.trace, axis), _charted(strip, strip_trace, axis)
     if placement == HERE:
         for surface in (punch, strip):
-            if _folds(surface, axis):
-                _not_facing(f"{surface.body}_contact folds back on itself seen along {'xyz'[axis]}")
-    common = overlap(first, second)
-    _check_covered(common, first, second, placement)
-    transfer = dual_transfer(first, second, _around(common, first, punch) if axisymmetric else common)
-    material = _material(first, second, transfer)
+            if folds(surface):
+                _not_facing(f"{surface.body}_contact folds back on itself: it goes on around an edge")
+    parts = patches(punch, strip, placement)
+    _check_covered(parts, placement)
+    if axisymmetric:
+        parts = [_around(part, punch) for part in parts]
+    transfer = dual_transfer(parts)
+    material = _material(parts, transfer)
     normal = unit(material @ strip_outward)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
-    _check_facing(punch, normal, facing, axis, placement)
+    _check_facing(punch, normal, facing, placement)
     if halfway:
         normal = common_normal(punch, normal)
         facing = -np.einsum("ic,ic->i", punch.outward, normal)
@@ -122,7 +125,7 @@ def pair(
     gap += _profiles(punch, strip, material)
     # Forces act along the common normal: a node's weight is its area seen along it.
     weights = punch.weights * facing
-    wear_projection = _wear_projection(first, second, weights, strip.weights)
+    wear_projection = _wear_projection(parts, weights, strip.weights)
     return ContactPair(punch, strip, placement, normal, weights, transfer, material, wear_projection, gap)
 
 
@@ -134,13 +137,10 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     """
     if placement == middle.placement:
         return middle
-    axis = _chart_axis(middle.strip)
-    first = _charted(middle.punch, middle.punch.trace, axis)
-    second = _charted(middle.strip, placement.points(middle.strip.trace), axis)
-    common = overlap(first, second)
-    _check_covered(common, first, second, placement)
-    material = _material(first, second, dual_transfer(first, second, common))
-    wear_projection = _wear_projection(first, second, middle.weights, middle.strip.weights)
+    parts = patches(middle.punch, middle.strip, placement)
+    _check_covered(parts, placement)
+    material = _material(parts, dual_transfer(parts))
+    wear_projection = _wear_projection(parts, middle.weights, middle.strip.weights)
     # The profile of the strip's surface goes with its material.
     gap = middle.initial_gap + _profiles(middle.punch, middle.strip, material)
     gap -= _profiles(middle.punch, middle.strip, middle.wear_interpolation)
@@ -163,31 +163,32 @@ def transfer_at(middle: ContactPair, placement: Placement) -> csr_array:
     """
     if placement == middle.placement:
         return middle.transfer
-    axis = _chart_axis(middle.strip)
-    first = _charted(middle.punch, middle.punch.trace, axis)
-    second = _charted(middle.strip, placement.points(middle.strip.trace), axis)
-    common = overlap(first, second)
-    _check_covered(common, first, second, placement)
-    return dual_transfer(first, second, common)
+    parts = patches(middle.punch, middle.strip, placement)
+    _check_covered(parts, placement)
+    return dual_transfer(parts)
 
 
-def _material(first: ChartedSurface, second: ChartedSurface, transfer: csr_array) -> csr_array:
+def _material(parts: Sequence[Patch], transfer: csr_array) -> csr_array:
     """Return what takes values at the strip's pressure nodes to the punch's (n, n_strip)."""
-    if len(second.nodes) == len(second.s):
+    strip = parts[0].second
+    if len(strip.nodes) == len(strip.s):
         return transfer
-    if second.cell != "triangle":  # a node on the axis of rings stands for nothing: it takes its neighbour's value
-        nearest = np.abs(second.s - second.s[second.nodes].T).argmin(axis=1)
+    if strip.cell != "triangle":  # a node on the axis of rings stands for nothing: it takes its neighbour's value
+        nearest = np.abs(strip.s - strip.s[strip.nodes].T).argmin(axis=1)
         to_trace = csr_array((np.ones(len(nearest)), (np.arange(len(nearest)), nearest)))
         return csr_array(transfer @ to_trace)
     # On the vertices alone: linear on each facet.
-    vertices = np.arange(len(second.nodes))
-    linear = ChartedSurface(second.s[second.nodes], second.pressure_facets, second.cell, 1, vertices)
-    return dual_transfer(first, linear)
+    linear = []
+    for part in parts:
+        second, vertices = part.second, np.arange(len(strip.nodes))
+        at_vertices = ChartedSurface(second.s[second.nodes], second.pressure_facets, second.cell, 1, vertices)
+        linear.append(Patch.of(part.first, at_vertices))
+    return dual_transfer(linear)
 
 
-def _wear_projection(first: ChartedSurface, second: ChartedSurface, weights: Array, strip_weights: Array) -> csr_array:
+def _wear_projection(parts: Sequence[Patch], weights: Array, strip_weights: Array) -> csr_array:
     """Return what puts depths of the punch's nodes on the strip's by the areas that their own areas share."""
-    return csr_array(wear_transfer(first, second).multiply(weights[:, None]).T / strip_weights[:, None])
+    return csr_array(wear_transfer(parts).multiply(weights[:, None]).T / strip_weights[:, None])
 
 
 def check_distance(pair: ContactPair) -> None:
@@ -202,34 +203,22 @@ def check_distance(pair: ContactPair) -> None:
         _not_facing(f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest")
 
 
-def _chart_axis(strip: ContactSurface) -> int:
-    """Return the axis along which the surfaces are seen: the one nearest to the strip's mean normal."""
-    return int(np.argmax(np.abs(strip.weights @ strip.outward)))
-
-
-def _charted(surface: ContactSurface, trace: Array, axis: int) -> ChartedSurface:
-    return ChartedSurface(np.delete(trace, axis, axis=1), surface.facets, surface.cell, surface.degree, surface.nodes)
-
-
-def _around(common: Overlap, first: ChartedSurface, punch: ContactSurface) -> Overlap:
-    """Return the overlap of rings, each point with its circumference 2 pi r."""
+def _around(part: Patch, punch: ContactSurface) -> Patch:
+    """Return a patch of rings, each point with its circumference 2 pi r."""
+    first, common = part.first, part.common
     radius = punch.trace[first.facets[common.facet1], 0]
     around = 2 * np.pi * np.einsum("qk,qk->q", first.shape_functions(common.points1), radius)
-    return replace(common, weights=common.weights * around)
+    return replace(part, common=replace(common, weights=common.weights * around))
 
 
-def _folds(surface: ContactSurface, axis: int) -> bool:
-    """Return whether a surface is no graph over its chart: its normals then point both ways along the axis."""
-    along = surface.outward[:, axis]
-    return bool((along * np.sign(surface.weights @ along) <= 0).any())
-
-
-def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurface, placement: Placement) -> None:
+def _check_covered(parts: Sequence[Patch], placement: Placement) -> None:
     """Raise where a part of the punch's surface has nothing of the strip's below it."""
-    if common.covered.all():
+    bare = next((part for part in parts if not part.common.covered.all()), None)
+    if bare is None:
         return
+    first, second = (used.s[np.unique(used.facets)] for used in (bare.first, bare.second))
     spans = [
-        " and ".join(f"{low:g} to {high:g}" for low, high in zip(c.s.min(axis=0), c.s.max(axis=0), strict=True))
+        " and ".join(f"{low:g} to {high:g}" for low, high in zip(c.min(axis=0), c.max(axis=0), strict=True))
         for c in (first, second)
     ]
     if placement == HERE:
@@ -247,13 +236,13 @@ def _check_covered(common: Overlap, first: ChartedSurface, second: ChartedSurfac
     )
 
 
-def _missing(first: ChartedSurface, second: ChartedSurface) -> float:
-    """Return how far the first surface reaches beyond the box around the second, mm."""
-    low, high = second.s.min(axis=0) - first.s.min(axis=0), first.s.max(axis=0) - second.s.max(axis=0)
+def _missing(first: Array, second: Array) -> float:
+    """Return how far points reach beyond the box around others, mm."""
+    low, high = second.min(axis=0) - first.min(axis=0), first.max(axis=0) - second.max(axis=0)
     return float(max(low.max(), high.max(), 0.0))
 
 
-def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int, placement: Placement) -> None:
+def _check_facing(punch: ContactSurface, normal: Array, facing: Array, placement: Placement) -> None:
     """Raise where the surfaces look past each other."""
     where = "" if placement == HERE else f" with the strip {placement}"
     if (facing < STEEPEST).any():
@@ -264,7 +253,7 @@ def _check_facing(punch: ContactSurface, normal: Array, facing: Array, axis: int
             f"their outward normals do not point at each other at x = {place} mm{where}: they are {angle:.0f} degrees "
             "off"
         )
-    if punch.dim == 2 and axis == 1 and normal[:, 1].mean() < 0:
+    if punch.dim == 2 and normal[:, 1].mean() < -BELOW:
         _not_facing("the punch lies below the strip; expected it above, with z upwards")
 
 

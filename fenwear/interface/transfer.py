@@ -1,4 +1,4 @@
-"""Transfer between two surfaces whose facets need not match, in their common chart: dual mortar and wear.
+"""Transfer between two surfaces whose facets need not match, patch by patch: dual mortar and wear.
 
 The nodal pressures p_i of the first surface, forces w_i p_i, act as the traction sum of p_i psi_i. On each
 facet its dual functions psi_i span the same polynomials as the shape functions lambda_i of the pressure, and
@@ -16,25 +16,35 @@ The psi_i have negative parts, by which wear would let material grow. Worn depth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
 from fenwear.arrays import Array
-from fenwear.interface.overlap import ChartedSurface, Indices, Overlap, overlap, shared_areas
+from fenwear.interface.overlap import Indices, Patch, shared_areas
 
 ROUNDING = 1e-14  # entries of T that are left of zero
 
 
-def dual_transfer(first: ChartedSurface, second: ChartedSurface, common: Overlap | None = None) -> csr_array:
+def dual_transfer(patches: Sequence[Patch]) -> csr_array:
     """Return T (n1, N2): values at the second surface's trace nodes to the first's pressure nodes.
 
     The integrals, those of the psi_i too, are sums over the same points, so that constants and the pressure's
     polynomials are reproduced to rounding on facets of any form. Rows of nodes that are not covered are zero.
-
-    Args:
-        common: The overlap of the two surfaces, where it is known already.
     """
-    common = overlap(first, second) if common is None else common
+    matrix = sum((_integrals(patch) for patch in patches[1:]), _integrals(patches[0]))
+    matrix = _rows_to_one(matrix)  # by w_i: the phi_j add up to one
+    matrix.data[np.abs(matrix.data) < ROUNDING] = 0.0
+    covered = np.all([patch.common.covered for patch in patches], axis=0)
+    matrix = csr_array(diags_array(covered.astype(float)) @ matrix)
+    matrix.eliminate_zeros()
+    return _rows_to_one(matrix)
+
+
+def _integrals(patch: Patch) -> csr_array:
+    """Return the integrals of psi_i phi_j over the facets of a patch (n1, N2)."""
+    first, second, common = patch.first, patch.second, patch.common
     shape = (len(first.nodes), len(second.s))
     used = common.covered_facets[common.facet1]
     facet1, facet2 = (facet[used][:: common.per_simplex] for facet in (common.facet1, common.facet2))
@@ -51,21 +61,17 @@ def dual_transfer(first: ChartedSurface, second: ChartedSurface, common: Overlap
     weights = sums @ weighted.sum(axis=2)
     dual = np.linalg.solve(mass, weights[:, :, None] * np.eye(functions))  # psi_i = sum of dual_ki lambda_k
     parts = dual.swapaxes(1, 2)[number] @ (weighted @ other)
-    matrix = _assemble(first.pressure_facets[facet1], second.facets[facet2], parts, shape)
-    matrix = _rows_to_one(matrix)  # by w_i: the phi_j add up to one
-    matrix.data[np.abs(matrix.data) < ROUNDING] = 0.0
-    matrix = csr_array(diags_array(common.covered.astype(float)) @ matrix)
-    matrix.eliminate_zeros()
-    return _rows_to_one(matrix)
+    return _assemble(first.pressure_facets[facet1], second.facets[facet2], parts, shape)
 
 
-def wear_transfer(first: ChartedSurface, second: ChartedSurface) -> csr_array:
+def wear_transfer(patches: Sequence[Patch]) -> csr_array:
     """Return W (n1, n2): worn depths at the second surface's pressure nodes to the first's.
 
     Each entry is the share of node i's area that node k's lies over: none is negative, rows add up to one where
     anything lies over the node. Depths v worn at the first are put down as W^T (w1 v) / w2: volume is kept.
     """
-    return _rows_to_one(shared_areas(first, second))
+    shared = [shared_areas(patch.first, patch.second) for patch in patches]
+    return _rows_to_one(csr_array(sum(shared[1:], shared[0])))
 
 
 def _assemble(rows: Indices, columns: Indices, parts: Array, shape: tuple[int, int]) -> csr_array:

@@ -12,7 +12,7 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic
 from fenwear.bodies.mesh import build_meshes
 from fenwear.case import Body, Geometry, Material
-from fenwear.interface.overlap import ChartedSurface, tabulate
+from fenwear.interface.overlap import ChartedSurface, Patch, tabulate
 from fenwear.interface.transfer import dual_transfer
 
 
@@ -97,7 +97,7 @@ def test_forces_on_the_trace(degree: int) -> None:
     assert spread.shape == (len(surface.trace), len(surface.nodes))
     np.testing.assert_allclose(spread.sum(axis=0), 1, rtol=1e-13)
     np.testing.assert_allclose(spread.T @ surface.trace, surface.x, atol=1e-13)
-    np.testing.assert_allclose(spread.T.toarray(), dual_transfer(charted, charted).toarray(), atol=1e-12)
+    np.testing.assert_allclose(spread.T.toarray(), dual_transfer([Patch.of(charted, charted)]).toarray(), atol=1e-12)
 
 
 def test_no_pressure_on_the_axis() -> None:

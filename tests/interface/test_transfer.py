@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import basix
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from charted import grid, integrals, line, surface
 from mortar import transfer_matrix
 
 from fenwear.arrays import Array
-from fenwear.interface.overlap import ChartedSurface, node_areas, overlap, tabulate
+from fenwear.interface.overlap import ChartedSurface, Patch, node_areas, tabulate
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
 CELLS = ["triangle", "quadrilateral"]
@@ -42,7 +44,7 @@ def test_lines(degree1: int, degree2: int) -> None:
     first = line(np.sort(np.r_[-1, 1, random.uniform(-1, 1, 7)]), degree1, 1)
     second = line(np.sort(np.r_[-1.5, 1.2, random.uniform(-1, 1, 10)]), degree2, 2)
     (x1, rows, _), (x2, _, columns) = ascending(first), ascending(second)
-    found = dual_transfer(first, second).toarray()[np.ix_(rows, columns)]
+    found = dual_transfer([Patch.of(first, second)]).toarray()[np.ix_(rows, columns)]
     np.testing.assert_allclose(found, transfer_matrix(x1, degree1, x2, degree2), atol=1e-12)
 
 
@@ -59,7 +61,7 @@ def test_grids(degrees: tuple[int, int]) -> None:
         rows = np.abs(first.s[first.nodes, c, None] - x1).argmin(axis=1)
         columns = np.abs(second.s[:, c, None] - x2).argmin(axis=1)
         exact *= transfer_matrix(x1, degrees[0], x2, degrees[1])[np.ix_(rows, columns)]
-    np.testing.assert_allclose(dual_transfer(first, second).toarray(), exact, atol=1e-12)
+    np.testing.assert_allclose(dual_transfer([Patch.of(first, second)]).toarray(), exact, atol=1e-12)
 
 
 def test_triangles_below_one_facet() -> None:
@@ -78,14 +80,14 @@ def test_triangles_below_one_facet() -> None:
         for i, node in enumerate(nodes):
             loads[node, second.facets[0]] += scale * (gauss * dual[:, i]) @ values
             weights[node] += scale * gauss @ dual[:, i]
-    np.testing.assert_allclose(dual_transfer(first, second).toarray(), loads / weights[:, None], atol=1e-13)
+    np.testing.assert_allclose(dual_transfer([Patch.of(first, second)]).toarray(), loads / weights[:, None], atol=1e-13)
 
 
 @pytest.mark.parametrize(("cell1", "degree1", "cell2", "degree2"), QUADS_AND_TRIANGLES)
 def test_polynomials(cell1: str, degree1: int, cell2: str, degree2: int) -> None:
     """Constants, and polynomials up to the pressure's degree and the trace's opposite, are transferred exactly."""
     first, second = pair(cell1, degree1, cell2, degree2)
-    transfer = dual_transfer(first, second)
+    transfer = dual_transfer([Patch.of(first, second)])
     np.testing.assert_allclose(transfer.sum(axis=1), 1, rtol=1e-14)
     x, y = first.s[first.nodes].T
     # A distorted quadrilateral has the polynomials of its degree in x and y, all of them.
@@ -102,7 +104,7 @@ def test_uniform_pressure_gives_exact_loads(cell1: str, degree1: int, cell2: str
     first = grid(np.linspace(-1, 1, 6), np.linspace(0, 1, 4), cell1, degree1, turn=0.3, seed=1)
     second = grid(np.linspace(-1, 1, 5), np.linspace(0, 1, 8), cell2, degree2, turn=0.3, seed=2)
     weights = integrals(first)[1]
-    np.testing.assert_allclose(dual_transfer(first, second).T @ weights, integrals(second)[0], atol=1e-13)
+    np.testing.assert_allclose(dual_transfer([Patch.of(first, second)]).T @ weights, integrals(second)[0], atol=1e-13)
 
 
 @pytest.mark.parametrize("degree", [1, 2, 3, 4])
@@ -118,8 +120,8 @@ def test_identity_where_nodes_match(degree: int) -> None:
             second = turned
         apart = np.linalg.norm(first.s[first.nodes][:, None] - second.s, axis=2)
         if first.pressure_degree == degree:
-            np.testing.assert_allclose(dual_transfer(first, second).toarray(), apart < 1e-9, atol=1e-13)
-        assert (wear_transfer(first, second).toarray() == (apart[:, second.nodes] < 1e-9)).all()
+            np.testing.assert_allclose(dual_transfer([Patch.of(first, second)]).toarray(), apart < 1e-9, atol=1e-13)
+        assert (wear_transfer([Patch.of(first, second)]).toarray() == (apart[:, second.nodes] < 1e-9)).all()
 
 
 @pytest.mark.parametrize(("cell", "degree"), [("quadrilateral", 1), ("quadrilateral", 2), ("triangle", 2)])
@@ -128,7 +130,7 @@ def test_converges(cell: str, degree: int) -> None:
     errors = []
     for count in (6, 24):
         first, second = pair(cell, degree, "quadrilateral", degree, count)
-        values = dual_transfer(first, second) @ np.sin(3 * second.s[:, 0] + second.s[:, 1])
+        values = dual_transfer([Patch.of(first, second)]) @ np.sin(3 * second.s[:, 0] + second.s[:, 1])
         error = values - np.sin(3 * first.s[first.nodes, 0] + first.s[first.nodes, 1])
         errors.append(np.sqrt(np.mean(error**2)))
     assert np.log2(errors[0] / errors[1]) / 2 > first.pressure_degree + 0.7
@@ -139,25 +141,39 @@ def test_rows_of_uncovered_nodes_are_zero() -> None:
     sides = np.linspace(0, 1, 5)
     first = grid(sides, sides, "quadrilateral", 2)
     second = grid(np.linspace(-1, 0.6, 4), np.linspace(-1, 2, 4), "triangle", 2)
-    sums = dual_transfer(first, second).sum(axis=1)
+    sums = dual_transfer([Patch.of(first, second)]).sum(axis=1)
     np.testing.assert_allclose(sums, first.s[first.nodes, 0] < 0.499, atol=1e-14)
     beyond = grid(sides + 7, sides, "quadrilateral", 2)
-    for transfer in (dual_transfer(first, beyond), wear_transfer(first, beyond)):
+    for transfer in (dual_transfer([Patch.of(first, beyond)]), wear_transfer([Patch.of(first, beyond)])):
         assert transfer.nnz == 0
 
 
-def test_overlap_can_be_shared() -> None:
-    """An overlap that is known gives the same transfer."""
+def test_patches_add_up() -> None:
+    """Facets dealt among patches, seen under other scales, give the same: nodes between have a part in each."""
     first, second = pair("triangle", 2, "quadrilateral", 2)
-    found = dual_transfer(first, second, overlap(first, second))
-    assert (found.toarray() == dual_transfer(first, second).toarray()).all()
+    whole = [Patch.of(first, second)]
+    here = first.s[first.facets].mean(axis=1)[:, 0] < 0.4
+    dealt = [
+        Patch.of(replace(first, facets=first.facets[part], s=scale * first.s), replace(second, s=scale * second.s))
+        for part, scale in ((here, 1.0), (~here, 1.0))
+    ]
+    for transfer in (dual_transfer, wear_transfer):
+        np.testing.assert_allclose(transfer(dealt).toarray(), transfer(whole).toarray(), atol=1e-13)
+    steep = [
+        dealt[0],
+        Patch.of(replace(first, facets=first.facets[~here], s=2 * first.s), replace(second, s=2 * second.s)),
+    ]
+    found = dual_transfer(steep)
+    x = second.s
+    for values, at in ((x[:, 0], first.s[:, 0]), (x[:, 1], first.s[:, 1]), (np.ones(len(x)), np.ones(len(first.s)))):
+        np.testing.assert_allclose(found @ values, at[first.nodes], atol=1e-12)
 
 
 @pytest.mark.parametrize(("cell1", "degree1", "cell2", "degree2"), QUADS_AND_TRIANGLES)
 def test_wear(cell1: str, degree1: int, cell2: str, degree2: int) -> None:
     """Wear never grows material, keeps constants read and volumes put down, and stays below its place."""
     first, second = pair(cell1, degree1, cell2, degree2)
-    transfer = wear_transfer(first, second)
+    transfer = wear_transfer([Patch.of(first, second)])
     assert transfer.data.min() > 0
     np.testing.assert_allclose(transfer.sum(axis=1), 1, rtol=1e-14)
     worn = np.random.default_rng(1).uniform(0, 1, len(first.nodes))

@@ -109,7 +109,8 @@ def strip_does_not_wear(patch: Patch) -> None:
 def collocated(patch: Patch) -> None:
     """Values picked at the punch's nodes in place of the mortar."""
 
-    def transfer(first: Any, second: Any, _: Any) -> Any:
+    def transfer(patches: Any) -> Any:
+        first, second = patches[0].first, patches[0].second
         return csr_array(interpolation(second.s[:, 0], second.degree, first.s[:, 0]))
 
     patch.setattr(sys.modules["fenwear.interface.pair"], "dual_transfer", transfer)

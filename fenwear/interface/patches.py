@@ -1,0 +1,146 @@
+"""Patches: parts of two surfaces that look at each other one way, where both are graphs over a plane.
+
+A flat or gently curved contact is one patch, seen along the axis that it looks along. A full bore is four, a cup five:
+seen from the axis of the bore or the middle of the cup through the sides of a square or cube around it, so that points
+of both surfaces that lie behind each other along the normal do so in every patch. Both faces of a disc between pads are
+two, seen along the axis. Straight edges stay straight both ways. What is integrated over facets is added up over the
+patches; a node where two of them meet has a part in each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array, Mask
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.interface.frame import facet_normals, unit
+from fenwear.interface.overlap import RING, ChartedSurface, Patch
+from fenwear.interface.placement import HERE, Placement
+
+GRAPH = 0.5  # cosine between the axis and the normals of all facets from which on a contact is one patch
+SEEN = 0.2  # the same of facets of the second surface that a patch of several sees
+AROUND = 0.35  # cosine between the axis and the ways to facets of the second surface that a patch sees from the middle
+ROUND = 0.2  # of the radius: how far normals of round surfaces may pass the middle
+STRAIGHT = 1e-3  # of what normals fix of the middle across them: what they fix of it along the axis of a cylinder
+
+
+def patches(punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE) -> list[Patch]:
+    """Return the patches of a contact with the strip in its place; the first surface of each is the punch's."""
+    own, other = facet_normals(punch), placement.vectors(facet_normals(strip))
+    trace, found = placement.points(strip.trace), []
+    middle = None if _is_graph(own) else _middle(punch, own)
+    if middle is not None:
+        return _from_middle(middle, (punch, punch.trace, own), (strip, trace, other))
+    for axis, side, part in _sides(own):
+        seen = other[:, axis] * side <= -SEEN
+        if not seen.any() or (part.all() and (other[:, axis] * side < 0).all()):
+            seen[:] = True
+        views = [np.delete(x, axis, axis=1) for x in (punch.trace, trace)]
+        found.append(Patch.of(_charted(punch, views[0], part), _charted(strip, views[1], seen)))
+    return found
+
+
+def folds(surface: ContactSurface) -> bool:
+    """Return whether a surface is neither a graph, nor two of them back to back, nor round: more than can touch."""
+    normal = facet_normals(surface)
+    back_to_back = (np.abs(normal) >= GRAPH).all(axis=0).any()
+    return not (_is_graph(normal) or back_to_back or _middle(surface, normal) is not None)
+
+
+def _is_graph(normal: Array) -> bool:
+    """Return whether facets with these normals (f, d) all look along one axis."""
+    return len(_sides(normal)) == 1
+
+
+def _sides(directions: Array) -> list[tuple[int, float, Mask]]:
+    """Return the axis and the side of it of each part of directions (f, d), and which these are (f,)."""
+    mean = directions.sum(axis=0)
+    axis = int(np.abs(mean).argmax())
+    side = float(np.sign(mean[axis]))
+    if (directions[:, axis] * side >= GRAPH).all():
+        return [(axis, side, np.ones(len(directions), dtype=bool))]
+    nearest = np.abs(directions).argmax(axis=1)
+    towards = np.sign(np.take_along_axis(directions, nearest[:, None], axis=1)[:, 0])
+    keys = np.unique(np.column_stack([nearest, towards]), axis=0)
+    return [(int(k), float(end), (nearest == k) & (towards == end)) for k, end in keys]
+
+
+@dataclass(frozen=True)
+class _Middle:
+    """The middle of round surfaces, a point or an axis.
+
+    Attributes:
+        point: In the middle, or on the axis (d,), mm.
+        across: Directions that go round (2 or 3, d).
+        along: The axis (0 or 1, d).
+        radius: mm.
+    """
+
+    point: Array
+    across: Array
+    along: Array
+    radius: float
+
+    def ways(self, x: Array) -> Array:
+        """Return unit vectors from the middle to points (n, d), in the directions that go round."""
+        return unit((x - self.point) @ self.across.T)
+
+    def chart(self, x: Array, axis: int) -> Array:
+        """Return where points (n, d) are seen from the middle in the plane at the radius across one direction, mm."""
+        seen = (x - self.point) @ self.across.T
+        flat = np.delete(seen, axis, axis=1) / seen[:, axis, None] * self.radius
+        return np.column_stack([flat, (x - self.point) @ self.along.T])
+
+
+def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
+    """Return the middle that normals (f, d) of facets pass, in least squares; None where they pass none."""
+    x, d = _places(surface, surface.trace), surface.dim
+    across = np.eye(d) - normal[:, :, None] * normal[:, None, :]
+    system = across.mean(axis=0)
+    sizes, axes = np.linalg.eigh(system)
+    fixed = sizes > STRAIGHT * sizes[-1]
+    if (~fixed).sum() > d - 2:
+        return None
+    load = axes.T @ np.einsum("fab,fb->a", across, x) / len(x)
+    point = axes[:, fixed] @ (load[fixed] / sizes[fixed])
+    round_ = axes[:, fixed] if not fixed.all() else np.eye(d)
+    off = np.linalg.norm(np.einsum("fab,fb->fa", across, x - point) @ round_, axis=1)
+    radius = np.linalg.norm((x - point) @ round_, axis=1)
+    if (off > ROUND * radius).any():
+        return None
+    return _Middle(point, round_.T, axes[:, ~fixed].T, float(np.median(radius)))
+
+
+def _from_middle(
+    middle: _Middle, first: tuple[ContactSurface, Array, Array], second: tuple[ContactSurface, Array, Array]
+) -> list[Patch]:
+    """Return the patches of round surfaces, each given with its trace in place (N, d) and normals (f, d)."""
+    (punch, punch_trace, own), (strip, trace, other) = first, second
+    ways, opposite = (middle.ways(_places(surface, x)) for surface, x in ((punch, punch_trace), (strip, trace)))
+    outwards, facing = (
+        np.sign(np.einsum("fc,fc->f", way, normal @ middle.across.T))
+        for way, normal in ((ways, own), (opposite, other))
+    )
+    found = []
+    for axis, side, part in _sides(ways):
+        for out in np.unique(outwards[part]):
+            seen = (opposite[:, axis] * side >= AROUND) & (facing == -out)
+            views = []
+            for surface, x, facets in ((punch, punch_trace, part & (outwards == out)), (strip, trace, seen)):
+                s, used = np.zeros((len(x), surface.dim - 1)), np.unique(surface.facets[facets])
+                s[used] = middle.chart(x[used], axis)
+                views.append(_charted(surface, s, facets))
+            found.append(Patch.of(*views))
+    return found
+
+
+def _places(surface: ContactSurface, trace: Array) -> Array:
+    """Return the middles of facets (f, d) by their corners."""
+    return np.asarray(trace[surface.facets[:, : len(RING[surface.cell])]].mean(axis=1))
+
+
+def _charted(surface: ContactSurface, s: Array, part: NDArray[np.bool_]) -> ChartedSurface:
+    return ChartedSurface(s, surface.facets[part], surface.cell, surface.degree, surface.nodes)

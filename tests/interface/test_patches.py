@@ -1,0 +1,201 @@
+"""Contacts of several patches: full bores, cups, both faces of a disc."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march
+from fenwear.arrays import Array
+from fenwear.bodies.contact_surface import ContactSurface, vertex_surface
+from fenwear.interface import pair
+from fenwear.interface.patches import folds, patches
+from fenwear.interface.placement import Placement
+
+RADIUS, CLEARANCE, YOUNG, POISSON = 10.0, 0.05, 210e3, 0.3
+
+
+def bore(load: float, elements: int, folder: Any, clearance: float = CLEARANCE) -> Tribosystem:
+    """Return a shaft in the whole of a bore in a large plate of its material, loaded along z, mm and N/mm."""
+    (folder / "bore.toml").write_text(f"""
+title = "bore"
+[geometry]
+file = "bushing.geo"
+degree = 2
+order = 2
+[geometry.parameters]
+radius = {RADIUS}
+clearance = {clearance}
+wall = 790
+shaft_wall = 9.9
+contact_angle = 180
+elements_along_contact = {elements}
+[model]
+plane = "strain"
+thickness = "1 mm"
+[materials.steel]
+young = {YOUNG}
+poisson = {POISSON}
+[punch]
+regions = {{punch_body = "steel"}}
+[[punch.supports]]
+on = "punch_top"
+fix = ["x"]
+[[punch.loads]]
+on = "punch_top"
+force = [0, {-load!r}]
+[strip]
+regions = {{strip_body = "steel"}}
+[[strip.supports]]
+on = "strip_bottom"
+fix = ["x", "z"]
+[contact]
+friction = 0
+[wear.punch]
+coefficient = 1e-8
+[motion]
+kind = "rotation"
+axis = [0, 1, 0]
+angular_speed = 1
+duration = 1
+[run]
+half_cycles = 1
+""")
+    return assemble(load_case(folder / "bore.toml"))
+
+
+def angles(system: Tribosystem, clearance: float) -> Array:
+    """Return the angle of each contact node from where the load presses, about the bore's axis, rad."""
+    x = system.pair.punch.x
+    return np.arctan2(x[:, 0], x[:, 1] + clearance)
+
+
+@pytest.mark.parametrize("degrees", [30, 60])
+def test_persson(degrees: float, tmp_path: Any) -> None:
+    """A pin in the hole of a large plate: pressures at all nodes but the outermost, falling with the mesh."""
+    b = np.tan(np.radians(degrees) / 2)
+    arc = (2 - np.log(b**2 + 1) - 2 * b**4) / (np.pi * b**2 * (b**2 + 1))
+    narrow = CLEARANCE / 50  # the theory is of none against the radius
+    load, errors = float(YOUNG / (1 - POISSON**2) * narrow / arc), []
+    for elements in (80, 160):
+        system = bore(load, elements, tmp_path, narrow)
+        pressure = next(iter(march(system, 1))).pressure[0]
+        y = np.tan(angles(system, narrow) / 2)
+        root, inner = np.sqrt(b**2 + 1), np.sqrt(np.maximum(b**2 - y**2, 0))
+        exact = 2 * inner / (np.pi * root * (1 + y**2))
+        exact += np.log((root + inner) / (root - inner)) / (2 * np.pi * b**2 * (1 + b**2))
+        exact *= load / RADIUS * (np.abs(y) < b)
+        inside = np.abs(angles(system, narrow)) < np.radians(0.75 * degrees)
+        errors.append(np.abs(pressure - exact)[inside].max() / exact.max())
+        assert (pressure[np.abs(angles(system, narrow)) > np.radians(1.1 * degrees + 3)] == 0).all()
+    assert errors[1] < 0.6 * errors[0] < 2e-3
+
+
+def test_worn_bore(tmp_path: Any) -> None:
+    """Row 41's elastic bushing after sliding 0.1, 1 and 10 km; the arc grows to 82 degrees on each side."""
+    for half_cycles, depth, area, largest in (
+        (10_000, 7.446e-3, 0.051368, 5.317),
+        (100_000, 42.191e-3, 0.552101, 3.445),
+        (1_000_000, 331.773e-3, 6.130718, 3.1863),
+    ):
+        system = bore(50.0, 160, tmp_path)
+        *_, last = jump(system, half_cycles, tolerance=0.01)
+        assert last.wear[-1].max() == pytest.approx(depth, rel=3e-3)
+        assert system.pair.weights @ last.wear[-1] == pytest.approx(area, rel=2e-3)
+        assert last.pressure[-1].max() == pytest.approx(largest, rel=1e-2)
+
+
+def test_transfer_around_a_bore(tmp_path: Any) -> None:
+    """Constants to rounding, waves around the shaft pointwise to third order, also where patches meet; wear kept."""
+    errors = []
+    for elements in (40, 80):
+        between = bore(50.0, elements, tmp_path).pair
+        assert len(patches(between.punch, between.strip)) == 4
+        on_shaft = np.arctan2(*between.strip.trace.T)
+        way = (between.punch.x + np.array([0, CLEARANCE])) / (RADIUS + CLEARANCE)
+        down = CLEARANCE * way[:, 1]
+        opposite = (down + np.sqrt(down**2 + RADIUS**2 - CLEARANCE**2))[:, None] * way - np.array([0, CLEARANCE])
+        errors.append(np.abs(between.transfer @ np.sin(3 * on_shaft) - np.sin(3 * np.arctan2(*opposite.T))).max())
+        np.testing.assert_allclose(between.transfer.sum(axis=1), 1, rtol=1e-12)
+        assert between.wear_projection.data.min() > 0
+        depth = np.random.default_rng(1).uniform(size=len(between.weights))
+        on_strip = between.wear_projection @ depth
+        assert between.strip.weights @ on_strip == pytest.approx(between.weights @ depth, rel=1e-12)
+        even = between.wear_projection @ np.ones(len(between.weights))
+        np.testing.assert_allclose(even, between.weights.sum() / between.strip.weights.sum(), rtol=0.02)
+    assert errors[1] < 0.3 * errors[0] < 2e-4
+
+
+def sphere(name: str, radius: float, points: int, below: float, seed: int) -> ContactSurface:
+    """Return the part of a sphere below a height, of points that lie anywhere; a cup's is seen from inside."""
+    along = np.arccos(1 - 2 * (np.arange(points) + 0.5) / points)
+    around = np.pi * (1 + 5**0.5) * np.arange(points)
+    x = np.stack([np.sin(along) * np.cos(around), np.sin(along) * np.sin(around), np.cos(along)], axis=1)
+    x = Rotation.random(random_state=seed).apply(x)
+    facets = ConvexHull(x).simplices
+    facets = facets[(x[facets][:, :, 2] < below).all(axis=1)]
+    used, facets = np.unique(facets, return_inverse=True)
+    inner = x[used][facets.reshape(-1, 3)].mean(axis=1) * (2 * radius if name == "punch" else 0.0)
+    return vertex_surface(name, radius * x[used], facets.reshape(-1, 3), 1, inner)
+
+
+def test_ball_in_a_cup() -> None:
+    """A cup and a ball that has turned any way: nodes have the ball's surface opposite, to second order."""
+    errors = []
+    for points in (500, 2000):
+        cup, ball = sphere("punch", 10.02, points, 0.0, 1), sphere("strip", 10.0, 2 * points, 2.0, 2)
+        turned = Placement(turn=(0.5, -0.9, 0.3))
+        assert {len(patches(cup, ball)), len(patches(cup, ball, turned))} == {5}
+        between = pair(cup, ball, turned)
+        there = turned.points(ball.trace)
+        np.testing.assert_allclose(between.transfer.sum(axis=1), 1, rtol=1e-12)
+        way = (between.transfer @ there) / 10.0
+        errors.append(np.linalg.norm(way - cup.x / 10.02, axis=1).max())
+        np.testing.assert_allclose(between.initial_gap, 0.02, atol=10 * errors[-1])
+        assert between.wear_projection.data.min() >= 0
+    assert errors[1] < 0.35 * errors[0] < 0.02
+
+
+def faces(name: str, heights: tuple[float, float], count: int, inwards: float) -> ContactSurface:
+    """Return two square faces at these heights, which look away from each other, or at each other (-1)."""
+    line = np.linspace(0, 1, count + 1)
+    grid = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+    corner = i * (count + 1) + j
+    one = np.concatenate([np.stack(c, 1) for c in ((corner, corner + 1, corner + count + 1),
+                                                   (corner + 1, corner + count + 1, corner + count + 2))])  # fmt: skip
+    trace = np.concatenate([np.column_stack([grid, np.full(len(grid), z)]) for z in heights])
+    facets = np.concatenate([one, one + len(grid)])
+    inner = trace[facets].mean(axis=1)
+    inner[:, 2] += inwards * np.sign(np.mean(heights) - inner[:, 2]) * 0.1
+    order = np.lexsort(trace.T[::-1])
+    rank = np.argsort(order)
+    return vertex_surface(name, trace[order], rank[facets], 1, inner)
+
+
+def test_both_faces_of_a_disc() -> None:
+    """Pads on both sides look at the disc between them: two patches, each with its own face opposite."""
+    pads, disc = faces("punch", (-0.5, 0.5), 4, -1.0), faces("strip", (-0.5, 0.5), 7, 1.0)
+    assert len(patches(pads, disc)) == 2
+    between = pair(pads, disc)
+    np.testing.assert_allclose(between.transfer @ disc.trace, pads.x, atol=1e-12)
+    np.testing.assert_allclose(between.normal[:, 2], 2 * pads.x[:, 2], atol=1e-12)
+    np.testing.assert_allclose(between.initial_gap, 0, atol=1e-12)
+
+
+def test_a_box_is_no_contact() -> None:
+    """Its sides meet at edges, and lie on no round surface."""
+    box = faces("strip", (-0.5, 0.5), 3, 1.0)
+    sides = vertex_surface("strip", box.trace[:, [2, 0, 1]], box.facets, 1, np.full((len(box.facets), 3), 0.5) * 0)
+    assert not folds(box)
+    assert not folds(sides)
+    both = np.concatenate([box.trace, box.trace[:, [2, 0, 1]] + (0.5, 0.5, -0.5)])
+    facets = np.concatenate([box.facets, box.facets + len(box.trace)])
+    whole = vertex_surface("strip", both, facets, 1, np.broadcast_to([0.5, 0.5, 0.0], (len(facets), 3)))
+    assert folds(whole)
+    with pytest.raises(CaseError, match="strip_contact folds back on itself"):
+        pair(faces("punch", (-0.5, 0.5), 4, -1.0), whole)

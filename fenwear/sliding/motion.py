@@ -181,15 +181,22 @@ class Motion:
         return np.array(powers)
 
     def mean_speeds(self, steps: int) -> Array:
-        """Return the mean speed in equal steps of each phase (phases, steps), mm/s; they add up exactly."""
+        """Return the mean speed in equal steps of each phase (phases, steps), mm/s; they add up exactly.
+
+        Speeds that differ by rounding alone are the same to the last digit: such steps share their operators.
+        """
         rows = []
         for stroke in self._strokes:
             edges = itertools.pairwise(_edges(stroke, self.positions * steps))
             distances = np.array([_power(stroke, a, b, 1.0) for a, b in edges])
             speeds = distances / (stroke.duration / len(distances))
             mirrored = (speeds + speeds[::-1]) / 2
-            if np.abs(mirrored - speeds).max() < 1e-9 * max(speeds.max(), 1e-300):
-                speeds = mirrored  # equal pairs to the last digit: they share their operators
+            mean = _power(stroke, 0.0, stroke.duration, 1.0) / stroke.duration
+            rounding = 1e-9 * max(speeds.max(), 1e-300)
+            if np.abs(mean - speeds).max() < rounding:
+                speeds = np.full(len(speeds), mean)
+            elif np.abs(mirrored - speeds).max() < rounding:
+                speeds = mirrored
             rows.append(speeds.reshape(self.positions, steps))
         return np.concatenate(rows)
 

@@ -37,6 +37,17 @@ def test_one_way(direction: str, d: int) -> None:
     assert motion.sliding(2)[0] == pytest.approx(4000, rel=1e-14)
 
 
+@pytest.mark.parametrize("steps", [3, 5, 7])
+def test_steps_at_one_speed_are_equal_to_the_last_digit(steps: int) -> None:
+    """A constant speed is that of every step, however many: they share the operators of heat with it."""
+    for v in (10.0, 200 / 3, 1000 / 7):
+        one_way = OneWay(kind="one-way", direction="rightward", speed=v, duration=0.05)
+        turning = Rotation(kind="rotation", direction="clockwise", angular_speed=v, duration=0.05)
+        for description in (one_way, turning):
+            speeds = make_motion(description).mean_speeds(steps)
+            assert np.unique(speeds).tolist() == [v * 0.05 / 0.05]
+
+
 def speed(profile: str, t: float) -> float:
     """v(t) of u0 = 1.5 mm, period 2 s, ramp 0.25 by its definition."""
     t %= 1.0

@@ -27,6 +27,7 @@ from petsc4py import PETSc
 from fenwear.errors import RanksError
 
 T = TypeVar("T")
+K = TypeVar("K")
 BUSY, NAP = 2e-3, 2e-4  # s that a rank looks out for an order without a pause, and its pauses afterwards
 
 
@@ -66,6 +67,13 @@ def total(comm: MPI.Comm, partial: NDArray[np.float64]) -> NDArray[np.float64]:
     comm.Bcast(result, root=0)
     result += 0.0  # no -0.0, which another rank's zeros would have made positive
     return result
+
+
+def once(comm: MPI.Comm, known: dict[K, T], key: K, find: Callable[[], T]) -> T:
+    """Return what every rank knows by a key, else find it and keep it; collective."""
+    if not comm.allreduce(int(key in known), MPI.MIN):
+        known[key] = find()
+    return known[key]
 
 
 def lasting(comm: MPI.Comm) -> MPI.Comm:

@@ -73,7 +73,8 @@ class Heat(Part):
     track: Track | None = Field(default=None, description="closed track of one-way sliding, which warms up as a whole")
     initial: Temperature = Field(default=0.0, description="at the start, free of thermal stress")
     steps: Annotated[int, Field(ge=1, le=1000, strict=True)] | None = Field(
-        default=None, description="in each half-cycle; by default 5, or to and fro as many as step_tolerance asks for"
+        default=None,
+        description="in each half-cycle; by default as many as step_tolerance asks for, or where nothing passes 5",
     )
     step_tolerance: Annotated[Number, Field(gt=0, lt=1)] = Field(
         default=0.005,

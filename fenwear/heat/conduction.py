@@ -118,6 +118,7 @@ class HeatBody:
         self._flows: dict[SlidingField, _Flow] = {}
         self.shared_bases: dict[Any, Any] = {}  # of the stages of a program
         self.certified: dict[Any, float] = {}  # how far they are from the whole mesh
+        self.fineness: dict[Any, Any] = {}  # of the steps of one-way motions
         self._conductivity_matrix: PETSc.Mat | None = None  # of material at rest
         self._tag_boundary(description)
 

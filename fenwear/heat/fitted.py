@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear.errors import HeatError
@@ -16,6 +15,7 @@ from fenwear.heat.contact_response import contact_responses
 from fenwear.heat.field import ReducedBasis, ReducedField
 from fenwear.heat.kept_basis import Way
 from fenwear.heat.reduction import PASSES, ROUNDING, reduced_basis
+from fenwear.parallel import once
 
 NEUTRAL = 1e-8  # of a spectral radius above 1: a body that loses no heat has 1
 TRIES = 3  # of the basis, each ten times as sharp as the one before, and followed over twice as many steps
@@ -80,7 +80,8 @@ def fitted_field(
         growth, difference = field.spectral_radius(wish.cycle), 0.0
         if growth <= 1 + NEUTRAL:
             hold = partial(certificate, steps[0], own[0], wish.surroundings, field, trial)
-            difference = _once(body, (id(basis), own[0]), hold) if shared else hold()
+            comm, key = body.body.mesh.comm, (id(basis), own[0])
+            difference = once(comm, body.certified, key, hold) if shared else hold()
             if difference <= wish.difference or tries >= TRIES or tolerance <= ROUNDING:
                 break
         elif tolerance <= ROUNDING:
@@ -98,17 +99,11 @@ def _shared(body: HeatBody, make: partial[ReducedBasis], way: Callable[[], Reduc
     inflow, speeds, duration, tolerance, around = make.args[1:]
     exposed = None if around.exposed is None else around.exposed.tobytes()
     key = (inflow.data.tobytes(), tuple(sorted(set(speeds))), duration, tolerance, around.renewed, exposed)
-    known = body.body.mesh.comm.allreduce(int(key in body.shared_bases), MPI.MIN)
-    if not known:
+
+    def another() -> ReducedBasis:
         if len(body.shared_bases) >= TRIES:
             body.shared_bases.clear()
             body.certified.clear()
-        body.shared_bases[key] = way()
-    return body.shared_bases[key]
+        return way()
 
-
-def _once(body: HeatBody, key: tuple[int, float], hold: Callable[[], float]) -> float:
-    """Return how far a shared basis is from the whole mesh at a velocity: found for the first stage with it."""
-    if not body.body.mesh.comm.allreduce(int(key in body.certified), MPI.MIN):
-        body.certified[key] = hold()
-    return body.certified[key]
+    return once(body.body.mesh.comm, body.shared_bases, key, another)

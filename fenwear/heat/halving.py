@@ -1,20 +1,29 @@
 """How far the steps of a half-cycle are from the limit: what halving them changes of the contact temperatures.
 
-Of bodies at rest the modes are known, theta_k' = -lambda_k theta_k + b_k, so that the cycle that repeats needs no
-marching, whatever the step: with a constant b a step leaves R(lambda dt) of what is missing to b / lambda, R being that
-of the rule of `fenwear.heat.exchange`.
+Where the strip's material passes one way, its steady state is the same by any steps, and what they change is largest at
+the end of the first half-cycle, from rest on.
+
+To and fro the strip is at rest in its own frame, and its modes are known, theta_k' = -lambda_k theta_k + b_k, so that
+the cycle that repeats needs no marching, whatever the step: with a constant b a step leaves R(lambda dt) of what is
+missing to b / lambda, R being that of the rule of `fenwear.heat.exchange`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
+from fenwear.case import Heat
+from fenwear.heat.conduction import HeatBody, Surroundings
 from fenwear.heat.exchange import EARLIER, STAGE
+from fenwear.heat.side import Fineness
+from fenwear.parallel import total
 
+STEPS, MOST = 5, 80  # of a half-cycle: to begin with, and the most that are chosen
 NEUTRAL = 1e-9  # of a cycle's decay: what loses no heat
 COLD = 0.1  # of the largest temperature: below, a change counts against that
 
@@ -49,8 +58,55 @@ class HeatedCycle:
         return np.asarray(self.reading @ np.divide(state, missing, out=np.zeros_like(state), where=lasts))
 
 
-def change_by_halving(coarse: HeatedCycle, fine: HeatedCycle) -> float:
+@dataclass(frozen=True)
+class HeatedPassage:
+    """A body whose material passes under the contact one way while an even pressure heats it, from rest on.
+
+    Attributes:
+        body: On its whole mesh.
+        velocity: Of its material, mm/s or rad/s.
+        surroundings: What it meets.
+        load: That heats it (owned,), mW/mm.
+        contact: Temperature at the contact nodes (n, owned).
+        duration: Of the half-cycle, s.
+    """
+
+    body: HeatBody
+    velocity: float
+    surroundings: Surroundings
+    load: Array
+    contact: csr_array
+    duration: float
+
+    def after(self, count: int) -> Array:
+        """Return the contact's temperature at the end of the half-cycle in this many steps (n,), K; collective."""
+        step = self.body.step(self.velocity, STAGE * self.duration / count, self.surroundings)
+        heated = step.respond(self.load[:, None])[:, 0]
+        theta: Array = np.zeros(len(self.load))
+        for counts in (EARLIER, 1.0) * count:
+            theta = theta + counts * (step.advance(theta, sources=False) + heated - theta)
+        step.free()
+        return total(self.body.body.mesh.comm, self.contact @ theta)
+
+
+def chosen(heat: Heat, positions: int, temperatures: Callable[[int], tuple[Array, Array]]) -> Fineness:
+    """Return the steps of a half-cycle, as given or as many as the tolerance asks for; collective.
+
+    Args:
+        heat: Settings of the heat.
+        positions: In a half-cycle, at each of which there are as many steps.
+        temperatures: Gives the contact's by so many steps at each of them, and by twice as many, (n,) each.
+    """
+    steps = heat.steps or STEPS
+    while True:
+        count = -(-steps // positions)
+        change = _change(*temperatures(count))
+        if heat.steps is not None or change <= heat.step_tolerance or 2 * steps > MOST:
+            return Fineness(count * positions, change)
+        steps *= 2
+
+
+def _change(coarse: Array, fine: Array) -> float:
     """Return the largest change of a contact's temperature by steps of half the length, over itself."""
-    limit = fine.repeating()
-    size = np.abs(limit)
-    return float((np.abs(coarse.repeating() - limit) / np.maximum(size, max(COLD * size.max(), 1e-300))).max())
+    size = np.abs(fine)
+    return float((np.abs(coarse - fine) / np.maximum(size, max(COLD * size.max(), 1e-300))).max())

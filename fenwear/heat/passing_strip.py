@@ -16,7 +16,7 @@ from fenwear.heat.contact_response import contact_responses
 from fenwear.heat.exchange import STAGE
 from fenwear.heat.field import ReducedBasis
 from fenwear.heat.fitted import TRIES
-from fenwear.heat.halving import HeatedCycle, change_by_halving
+from fenwear.heat.halving import HeatedCycle, chosen
 from fenwear.heat.kept_basis import Way
 from fenwear.heat.passage import Passage
 from fenwear.heat.passing import ModalField, modal_basis
@@ -26,7 +26,6 @@ from fenwear.parallel import total
 from fenwear.sliding.motion import Motion
 
 MANY = 300  # contact nodes above which a basis holds what is felt a step later alone
-STEPS, MOST = 5, 80  # of a half-cycle: to begin with, and the most that are chosen
 LEAST_AREA = 0.1  # of the mean: what a node counts for that has no area of its own
 
 
@@ -113,16 +112,14 @@ class PassingStrip:
 
     def fineness(self, motion: Motion, heat: Heat) -> Fineness:
         """Return the steps of a half-cycle, as given or as many as the tolerance asks for; collective."""
-        steps, phase = heat.steps or STEPS, motion.phases[0].duration
-        while True:
-            count = -(-steps // motion.positions)
-            basis, rates = self._modes(STAGE * phase / (2 * count))
+
+        def temperatures(count: int) -> tuple[Array, Array]:
+            basis, rates = self._modes(STAGE * motion.phases[0].duration / (2 * count))
             at_nodes = total(self.body.body.mesh.comm, self.nodes @ basis.columns)
-            coarse, fine = (self._cycle(rates, at_nodes, motion, k) for k in (count, 2 * count))
-            change = change_by_halving(coarse, fine)
-            if heat.steps is not None or change <= heat.step_tolerance or 2 * steps > MOST:
-                return Fineness(count * motion.positions, change)
-            steps *= 2
+            coarse, fine = (self._cycle(rates, at_nodes, motion, k).repeating() for k in (count, 2 * count))
+            return coarse, fine
+
+        return chosen(heat, motion.positions, temperatures)
 
     def _cycle(self, rates: Array, at_nodes: Array, motion: Motion, count: int) -> HeatedCycle:
         """Return a cycle of an even pressure in this many steps of each phase."""

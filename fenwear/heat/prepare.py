@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, hstack
@@ -17,15 +17,16 @@ from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import STAGE, HeatExchange
 from fenwear.heat.field import FullField, Functional, ReducedField
 from fenwear.heat.fitted import Wish, fitted_field
+from fenwear.heat.halving import STEPS, HeatedPassage, chosen
 from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.passage import Passage
 from fenwear.heat.passing import ModalField, PassingField
-from fenwear.heat.passing_strip import MANY, STEPS, PassingStrip
+from fenwear.heat.passing_strip import MANY, PassingStrip
 from fenwear.heat.section import section_modes
 from fenwear.heat.side import Fineness, Reading, Side, StepPlan
 from fenwear.heat.track import TrackField
 from fenwear.interface import ContactPair
-from fenwear.parallel import total
+from fenwear.parallel import once, total
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
 
@@ -80,6 +81,8 @@ def prepare_exchange(
     fineness = Fineness(heat.steps or STEPS)
     if strip is not None and motion.positions < STEPS:
         fineness = strip.fineness(motion, heat)
+    elif one_way and motion.positions < STEPS:
+        fineness = _passed_fineness(heat, bodies, pair, sliding, motion, friction, others)
     count = -(-fineness.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
     plans, velocities, duration = _plans(motion, count, moves=one_way)
     transfers: list[csr_array] = []
@@ -152,6 +155,36 @@ def _in_place(
     for step in steps if rated is not None else ():  # what is left of them is in the small field
         step.free()
     return side, difference
+
+
+def _passed_fineness(
+    heat: Heat,
+    bodies: tuple[HeatBody, HeatBody],
+    pair: ContactPair,
+    sliding: SlidingField,
+    motion: Motion,
+    friction: Array,
+    others: Sequence[float],
+) -> Fineness:
+    """Return the steps of a half-cycle one way, by the fastest speed of all stages; collective.
+
+    All stages of a program have the same, chosen for the first.
+    """
+    own = np.array(motion.directions) * motion.mean_speeds(1)[:, 0]
+    fastest, duration = max([*own, *others], key=abs), motion.phases[0].duration
+    if fastest == 0:
+        return Fineness(heat.steps or STEPS)
+    strip, load = bodies[1], np.asarray(inflows(bodies, pair)[1] @ friction)
+    around = _surroundings(strip, pair, sliding, renewed=True)
+    passage = HeatedPassage(strip, fastest, around, load, contact_rows(strip, pair), duration)
+    exposed = None if around.exposed is None else around.exposed.tobytes()
+    settings = (fastest, duration, motion.positions, heat.steps, heat.step_tolerance)
+    after = cache(passage.after)
+
+    def choose() -> Fineness:
+        return chosen(heat, motion.positions, lambda count: (after(count), after(2 * count)))
+
+    return once(strip.body.mesh.comm, strip.fineness, (*settings, load.tobytes(), exposed), choose)
 
 
 def _trial(

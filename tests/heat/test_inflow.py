@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from fenwear import Tribosystem, assemble, make_case, march, steady
+from fenwear import Tribosystem, assemble, make_case, march, steady, vary
 from fenwear.assembly import steady_exchange
+from fenwear.case.program import stages_of
 from fenwear.cycle import growth_rate
+from fenwear.cycle.program import at_stage
 from fenwear.errors import HeatError
 from fenwear.heat.field import ReducedField
 
@@ -92,6 +94,7 @@ def test_every_temperature_dies_out(velocity: float) -> None:
             "speed": abs(velocity),
             "duration": 0.05,
         },
+        heat={"steps": 5},
     )
     field = system.exchange.sides[1].field
     assert isinstance(field, ReducedField)
@@ -105,6 +108,37 @@ def test_every_temperature_dies_out(velocity: float) -> None:
         sizes.append(np.linalg.norm(state))
     assert max(sizes) < 3 * sizes[0]
     assert sizes[-1] < 1e-2 * sizes[0]
+
+
+def test_steps_are_as_many_as_the_tolerance_asks_for() -> None:
+    """After the first half-cycle, the hardest, halving them changes the temperatures of a run by less; halving half as
+    many by more."""
+    system = pad_on_strip(500.0)
+    chosen = system.exchange.fineness.steps
+    assert chosen > 5
+    found = []
+    for steps in (chosen // 2, chosen, 2 * chosen):
+        (block,) = march(vary(system, f"heat.steps={steps}"), 1)
+        found.append(block.heat.temperature_strip[-1])
+    size = np.maximum(found[-1], 0.1 * found[-1].max())
+    coarse, fine = (np.abs((found[k] - found[k + 1]) / size).max() for k in (0, 1))
+    assert fine < 0.005 < coarse
+
+
+@pytest.mark.mpi
+def test_stages_have_the_same_steps() -> None:
+    """They are chosen once, by the fastest stage; all stages share their bases, too."""
+    small: dict[str, Any] = {"sizes": {"elements_along_contact": 6}, "heat": {"reduction_tolerance": 1e-3}}
+    alone = pad_on_strip(500.0, **small)
+    steps = [{"cycles": 3, "speed": [10, 500]}, {"cycles": 1, "speed": 500}]
+    system = pad_on_strip(10.0, program={"steps": steps, "levels": 3}, run={}, **small)
+    stages = [at_stage(system, stage) for stage in stages_of(system.case)]
+    found = {(stage.exchange.fineness.steps, stage.exchange.fineness.change) for stage in stages}
+    assert len(stages) == 4
+    assert len(system.bodies.heat[1].fineness) == 1
+    assert len({id(stage.exchange.sides[1].field.basis) for stage in stages}) == 1
+    assert found == {(alone.exchange.fineness.steps, alone.exchange.fineness.change)}
+    assert alone.exchange.fineness.steps > vary(alone, "motion.speed=10").exchange.fineness.steps
 
 
 def test_full_step_is_coercive() -> None:

@@ -39,7 +39,8 @@ class ContactSurface:
 
     Attributes:
         body: Name of the body.
-        trace: Coordinates of the trace nodes (N, d), mm, in ascending order of x, then y, then z.
+        trace: Coordinates of the trace nodes (N, d), mm, in ascending order of x, then y, then z; on curves that are
+            no graphs over x along the curve.
         facets: Trace nodes of each facet (f, k), in the order of the Lagrange element on `cell`.
         cell: "interval", "triangle" or "quadrilateral".
         degree: Polynomial degree of the trace.
@@ -50,6 +51,7 @@ class ContactSurface:
         spread: Forces at the trace nodes from a unit force at each pressure node (N, n).
         profile: By how much the surface lies deeper in the body than its mesh at the pressure nodes (n,), mm; None
             where they are the same.
+        arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, x in its middle; else None.
     """
 
     body: str
@@ -62,6 +64,12 @@ class ContactSurface:
     outward: Array
     spread: csr_array
     profile: Array | None = None
+    arc: Array | None = None
+
+    @cached_property
+    def abscissa(self) -> Array:
+        """Where the pressure nodes are along a curve (n,), ascending, mm: x, or the arc length; in a solid x."""
+        return self.x[:, 0] if self.arc is None else self.arc[self.nodes]
 
     @cached_property
     def x(self) -> Array:
@@ -106,7 +114,7 @@ class ContactSurface:
         """Return how far contact nodes are apart, mm: the median."""
         if self.dim == 3:
             return float(np.sqrt(np.median(self.weights)))
-        return float(np.median(np.diff(np.unique(self.x[:, 0].round(12)))))
+        return float(np.median(np.diff(self.abscissa)))
 
 
 def profiled(surface: ContactSurface, points: Array) -> ContactSurface:
@@ -211,7 +219,8 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     )
     blocks, first, inverse = np.unique(facets, return_index=True, return_inverse=True)
     trace = coordinates.reshape(-1, dim)[first]
-    order = _ascending(trace)
+    arc = arc_length(trace, inverse.reshape(facets.shape), inner, body.name == "strip") if dim == 2 else None
+    order = _ascending(trace if arc is None else arc[:, None])
     rank = np.empty(len(order), dtype=np.int64)
     rank[order] = np.arange(len(order))
     facets = rank[inverse.reshape(facets.shape)]
@@ -225,6 +234,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
         nodes = np.flatnonzero(weights > NO_WEIGHT * weights.max(initial=0.0))
         spread = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(trace), len(nodes)))
         surface = ContactSurface(body.name, trace, facets, cell, degree, nodes, weights[nodes], outward[nodes], spread)
+        surface = replace(surface, arc=None if arc is None else arc[order])
     return surface, Trace(surface, space, blocks)
 
 
@@ -281,6 +291,54 @@ def corner_functions(cell: str, points: Array) -> Array:
     """Return the linear shape functions of a facet's corners at reference points (q, corners)."""
     linear = basix.create_element(basix.ElementFamily.P, basix.CellType[cell], 1)
     return linear.tabulate(0, points)[0, :, :, 0]
+
+
+def arc_length(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: bool) -> Array | None:
+    """Return the arc length of a curve's nodes (N,), mm; None of a graph over x, and of what is several curves.
+
+    It grows with x in the middle of the curve, where it is x. A closed curve is cut where it looks away from the other
+    body most, the punch being above the strip.
+
+    Args:
+        trace: Coordinates of the trace nodes (N, 2), mm.
+        facets: Trace nodes of each facet (f, k), ends first.
+        inner: A point on the body's side of each facet (f, 2).
+        looks_up: Whether the curve touches with its upper side, as the strip's does.
+    """
+    ends = trace[facets[:, :2], 0]
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    order = np.argsort(low, kind="stable")
+    grain = 1e-9 * float(np.ptp(trace, axis=0).max())
+    if (high[order][:-1] <= low[order][1:] + grain).all() and (high - low > grain).all():
+        return None
+    at: dict[int, list[int]] = {}  # the facets of each end
+    for facet, (a, b) in enumerate(facets[:, :2]):
+        at.setdefault(int(a), []).append(facet)
+        at.setdefault(int(b), []).append(facet)
+    if max(map(len, at.values())) > 2:
+        return None
+    single = [node for node, own in at.items() if len(own) == 1]
+    if len(single) > 2:
+        return None
+    rounded = np.round(trace / grain)
+    lowest, highest = (min(at, key=lambda end: (sign * rounded[end, 1], rounded[end, 0])) for sign in (1, -1))
+    hollow = inner[at[lowest][0], 1] < trace[lowest, 1]  # a bore, with its body around it
+    cut = lowest if hollow != looks_up else highest
+    start = node = min(single, key=lambda end: tuple(rounded[end])) if single else cut
+    local = np.argsort(_lagrange("interval", facets.shape[1] - 1).points[:, 0])
+    found, done, length = np.zeros(len(trace)), set[int](), 0.0
+    while ways := [facet for facet in at[node] if facet not in done]:
+        facet = min(ways, key=lambda way: trace[facets[way, :2], 0].sum())  # from a cut on towards smaller x
+        done.add(facet)
+        chain = facets[facet][local] if facets[facet, 0] == node else facets[facet][local[::-1]]
+        sizes = np.linalg.norm(np.diff(trace[chain], axis=0), axis=1)
+        found[chain[1:]] = length + np.cumsum(sizes)
+        length, node = length + float(sizes.sum()), int(chain[-1])
+    found[start] = 0.0
+    if len(done) < len(facets):
+        return None
+    middle = int(np.abs(found - length / 2).argmin())
+    return np.asarray(found - found[middle] + trace[middle, 0])
 
 
 def _ascending(x: Array) -> NDArray[np.int64]:

@@ -59,8 +59,8 @@ class ContactPair:
 
     @property
     def x(self) -> Array:
-        """Abscissae of the contact nodes (n,), mm."""
-        return self.punch.x[:, 0]
+        """Abscissae of the contact nodes (n,), mm: x, or the arc length of curves that are no graphs over x."""
+        return self.punch.abscissa
 
     @cached_property
     def opposite(self) -> Array:

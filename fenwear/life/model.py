@@ -409,7 +409,7 @@ def _worn_surfaces(
         totals: So far.
     """
     facing = system.pair
-    nodes = {"punch": (facing.x, facing.weights), "strip": (facing.strip.x[:, 0], facing.strip.weights)}
+    nodes = {"punch": (facing.x, facing.weights), "strip": (facing.strip.abscissa, facing.strip.weights)}
     surfaces = {}
     for body, (x, weights) in nodes.items():
         order, volume = np.argsort(x, kind="stable"), f"volume_{body}"

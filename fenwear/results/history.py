@@ -127,16 +127,19 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
     pair = system.pair
     if system.case.model.kind != "plane":
         return {**surface_columns(system), **steps.columns(system)}
-    text = "position along the contact, from the centre of the geometry"
+    arc = pair.punch.arc is not None
+    text = "arc length along the contact" if arc else "position along the contact, from the centre of the geometry"
     columns = {
         "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
         "height": Column(("x",), pair.punch.unworn[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
     }
     if system.strip_wears:
         along = "position along the strip, on its material, as x in the middle position"
-        columns["x_strip"] = Column(("x_strip",), pair.strip.x[:, 0], {"units": "mm", "long_name": along})
+        columns["x_strip"] = Column(("x_strip",), pair.strip.abscissa, {"units": "mm", "long_name": along})
         unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
         columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
+    if arc:
+        columns["place"] = Column(("x",), pair.punch.x[:, 0], {"units": "mm", "long_name": "x of the contact node"})
     return {**columns, **steps.columns(system)}
 
 

@@ -142,7 +142,7 @@ def contact_ends(system: Tribosystem) -> ContactEnds | None:
     closed, around = 2 / (np.pi * contact_modulus(system.case)), 1.0
     if system.case.model.kind == "axisymmetric":
         weights = system.pair.weights  # of whole circles
-        around = float(2 * np.pi * (weights @ system.pair.x) / weights.sum())
+        around = float(2 * np.pi * (weights @ system.pair.punch.x[:, 0]) / weights.sum())
     return ContactEnds(goes_on, punch.ends, x, gap - gap.min(), closed, around)
 
 

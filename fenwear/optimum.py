@@ -23,10 +23,14 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.pressure_law import PressureLaw
 
-MOVES = {"lambda_F": "move along z", "lambda_M": "tilt", "lambda_Mx": "tilt about x", "lambda_My": "tilt about y"}
+MOVES = {
+    **{"lambda_F": "move along z", "lambda_Fx": "move along x", "lambda_Fy": "move along y"},
+    **{"lambda_M": "tilt", "lambda_Mx": "tilt about x", "lambda_My": "tilt about y"},
+}
 TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
 RAMP = 1e-6  # of the mean wear rate, over which the pressure rises to a threshold
 RAMPS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, RAMP)  # on the way there
+SMALL = 0.1  # of the motion that wears a flat contact evenly
 HALVINGS = 60  # of an interval that holds a pressure
 
 
@@ -193,6 +197,8 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
         )
     # Unknown y: w_n over the mean rate at the mean pressure is shape y.
     y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
+    if np.linalg.norm(y) < SMALL:  # a bore wears evenly by no motion: from that along the loads on
+        y = -resultant / np.linalg.norm(resultant)
     for ramp in RAMPS if law.threshold > 0 else (RAMP,):
         y, pressure, residual = _newton(law, shape * rate, rows, resultant, y, ramp * rate)
     if residual > 1e-10:

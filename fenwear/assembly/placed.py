@@ -98,7 +98,7 @@ class Placed:
     def normal_force(self) -> float:
         """The mean force of the loads on the contact, N; 0 where supports and not the contact carry it."""
         force = self.rigid.mean_pressure * self.pair.weights.sum() * self.bodies.punch.thickness
-        return float(force) if "lambda_F" in self.rigid.mode_names else 0.0
+        return float(force) if self.rigid.translations else 0.0
 
     def __repr__(self) -> str:
         """Say in a line what it is."""

@@ -312,9 +312,9 @@ def arc_length(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: 
     if (high[order][:-1] <= low[order][1:] + grain).all() and (high - low > grain).all():
         return None
     at: dict[int, list[int]] = {}  # the facets of each end
-    for facet, (a, b) in enumerate(facets[:, :2]):
-        at.setdefault(int(a), []).append(facet)
-        at.setdefault(int(b), []).append(facet)
+    for facet in range(len(facets)):
+        for end in facets[facet, :2]:
+            at.setdefault(int(end), []).append(facet)
     if max(map(len, at.values())) > 2:
         return None
     single = [node for node, own in at.items() if len(own) == 1]

@@ -20,6 +20,7 @@ from fenwear.errors import CaseError, InputError
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
 SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about z: hold it against turning"
+WRAPPED = 0.5  # component of normals, both ways, from which on a contact holds a body along that axis
 PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
 RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
     "stress": PLANE,
@@ -46,7 +47,8 @@ class Supports:
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         pivot: The point about which rotations are taken, mm.
         modes: Columns of R on the owned degrees of freedom; the displacement of each for a unit velocity.
-        names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
+        names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx", "lambda_Fy"
+            where the contact wraps around the body or is wrapped by it.
     """
 
     def __init__(self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: Trace) -> None:
@@ -68,7 +70,7 @@ class Supports:
         self.imposed = fem.Function(space)
         own = [*self._described(description.supports), *self._on_axis()]
         self._check_parts(own)
-        self.modes, self.names = self._free_modes(own, contact.surface)
+        self.modes, self.names, self._loose = self._free_modes(own, contact.surface, description.no_turning_about)
         self.conditions = own + self._regularise()
         self.held = self._owned(self.conditions)
 
@@ -143,32 +145,55 @@ class Supports:
         return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, dim + turns.shape[2])
 
     def _free_modes(
-        self, supports: list[fem.DirichletBC], surface: ContactSurface
-    ) -> tuple[list[NDArray[np.float64]], list[str]]:
-        """Return the rigid modes that the supports leave, and their names.
+        self, supports: list[fem.DirichletBC], surface: ContactSurface, guided: Sequence[str]
+    ) -> tuple[list[NDArray[np.float64]], list[str], list[NDArray[np.float64]]]:
+        """Return the rigid modes that supports and guides leave, their names, and those that supports alone leave.
+
+        Args:
+            supports: What holds degrees of freedom.
+            surface: Of the contact.
+            guided: Axes about which guides hold the body against turning, by a couple.
 
         Raises:
             CaseError: the body is free to slide along the contact, or to spin about its normal; or it is free, and its
                 contact looks another way than z.
         """
-        names, forbidden = RIGID_MODES[self.kind]
+        names, forbidden = _balanced(self.kind, surface)
         columns = [*names, *forbidden]
+        turns = [self._turn(axis) for axis in guided]
         basis, comm = self.rigid_basis()[:, columns], self.body.mesh.comm
         held = basis[self._owned(supports)]
         gram = comm.allreduce(held.T @ held)
         scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
-        eigenvalues, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
-        free = vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)] * scale[:, None]
-        if free.shape[1]:
+        loose = _null_space(gram * np.outer(scale, scale)) * scale[:, None]
+        by_guides = np.diag(np.isin(columns, turns).astype(float))
+        free = _null_space(gram * np.outer(scale, scale) + by_guides) * scale[:, None]
+        if free.shape[1] and len(names) == len(RIGID_MODES[self.kind][0]):
             _check_facing(surface)
         # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
         echelon, pivots = _column_echelon(free)
-        loose = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
-        if loose:
+        away = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
+        if away:
             name = self.body.name
-            message = f"the {name} is free to {' and to '.join(loose)}, friction pulls it"
+            message = f"the {name} is free to {' and to '.join(away)}, friction pulls it"
             raise CaseError(InputError(f"{name}.supports", message))
-        return list((basis @ echelon).T.copy()), [names[columns[p]] for p in pivots]
+        return (
+            list((basis @ echelon).T.copy()),
+            [names[columns[p]] for p in pivots],
+            list((basis @ _column_echelon(loose)[0]).T.copy()),
+        )
+
+    def _turn(self, axis: str) -> int:
+        """Return the column of the rigid basis of the rotation about an axis.
+
+        Raises:
+            CaseError: the model has none.
+        """
+        known = {"y": 2} if self.dim == 2 and self.kind != "axisymmetric" else {"x": 3, "y": 4, "z": 5}
+        if axis not in known or self.kind == "axisymmetric":
+            message = f"expected {'none' if self.kind == 'axisymmetric' else ' or '.join(known)}, got {axis!r}"
+            raise CaseError(InputError(f"{self.body.name}.no_turning_about", message))
+        return known[axis]
 
     def _check_parts(self, supports: list[fem.DirichletBC]) -> None:
         """Make sure that a body of several parts is held in each of them; collective.
@@ -213,11 +238,11 @@ class Supports:
 
         The displacements under pressure are relative to these nodes: the same on any number of ranks.
         """
-        if not self.modes:
+        if not self._loose:
             return []
-        comm, count = self.body.mesh.comm, len(self.modes)
-        scale = np.array([comm.allreduce(np.abs(m).max(initial=0), MPI.MAX) for m in self.modes])
-        modes = np.array(self.modes).T / scale
+        comm, count = self.body.mesh.comm, len(self._loose)
+        scale = np.array([comm.allreduce(np.abs(m).max(initial=0), MPI.MAX) for m in self._loose])
+        modes = np.array(self._loose).T / scale
         modes *= np.repeat(self._remoteness(), self.dim)[:, None]
         modes.reshape(-1, self.dim, count)[self.contact] = 0.0
         mine = np.array(_best_rows(modes, count, comm), dtype=np.int32)
@@ -229,6 +254,28 @@ class Supports:
         known = self.dim * (index_map.size_local + index_map.num_ghosts)
         held = np.flatnonzero(mark.x.array[:known]).astype(np.int32)
         return [self._condition(component, held[held % self.dim == component]) for component in range(self.dim)]
+
+
+def _balanced(kind: Kind, surface: ContactSurface) -> tuple[dict[int, str], dict[int, str]]:
+    """Return the columns of the rigid basis that pressure balances, with names, and those that carry the body away.
+
+    Along an axis to both sides of which the contact looks it holds the body, as a bore its shaft.
+    """
+    names, forbidden = (dict(columns) for columns in RIGID_MODES[kind])
+    if kind == "axisymmetric":
+        return names, forbidden
+    for axis, column in axes(surface.dim).items():
+        normal = surface.outward[:, column]
+        if column in forbidden and normal.min() < -WRAPPED and normal.max() > WRAPPED:
+            names[column] = f"lambda_F{axis}"
+            del forbidden[column]
+    return names, forbidden
+
+
+def _null_space(gram: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the vectors that a symmetric matrix takes to nothing (columns)."""
+    eigenvalues, vectors = np.linalg.eigh(gram)
+    return np.asarray(vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)])
 
 
 def _check_facing(surface: ContactSurface) -> None:

@@ -184,7 +184,12 @@ class Body(Part):
     loads: tuple[Load, ...] = Field(default=(), description="forces on the body")
     temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
     pivot: Point | None = Field(
-        default=None, description="the point O of lambda_F and lambda_M; by default the first support's centre"
+        default=None,
+        description="the point O of lambda_F and lambda_M; by default the first support's centre, or the origin",
+    )
+    no_turning_about: tuple[Axis, ...] = Field(
+        default=(),
+        description="axes about which guides hold the body against turning, by a couple, where supports leave it free",
     )
     operator: str = Field(
         default=CONDENSED,

@@ -186,7 +186,9 @@ def _duration(seconds: float) -> str:
 
 
 def _velocities(velocity: dict[str, float], per: str) -> str:
-    units = {name: "mm" if name == "lambda_F" else "rad" for name in velocity}
+    from fenwear.interface import is_translation
+
+    units = {name: "mm" if is_translation(name) else "rad" for name in velocity}
     separator = "/" if len(per) == 1 else " "
     return ", ".join(f"{name} = {value:.5g} {units[name]}{separator}{per}" for name, value in velocity.items())
 

@@ -361,15 +361,16 @@ class CondensedContact:
     def _rigid_touch(self) -> Array:
         """Return where rigid bodies would rest on each other under the loads (m, n + r).
 
-        Of all forces that balance the loads these do the least work on the gaps; their multipliers are the rigid
-        motion that goes as far along the loads as the gaps allow.
+        Of all forces that balance the loads those of rigid bodies do the least work on the gaps; their multipliers are
+        the motion that goes as far along the loads as the gaps allow. What then is nearer than elastic bodies give
+        way by touches.
         """
         found, n = np.zeros_like(self._offset), self.shape[1]
         for k, offset in enumerate(self._offset):
             gap, load = offset[:n], offset[n:]
             if len(load):
                 rest = linprog(gap, A_eq=self._balance(k), b_eq=-load)
-                found[k, :n] = rest.x if rest.status == 0 else 1.0
+                found[k, :n] = (rest.lower.marginals < 1) if rest.status == 0 else 1.0
             else:
                 found[k, :n] = gap < 0
         return found

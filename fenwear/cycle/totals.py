@@ -141,8 +141,12 @@ def approach(rigid: RigidEquilibrium) -> Array:
 
     It is the translation of the bodies that brings them together; where supports hold it, the mean normal.
     """
-    if "lambda_F" in rigid.mode_names:
-        return rigid.motion[:, :, rigid.mode_names.index("lambda_F")]
+    moves = rigid.motion[:, :, rigid.translations]
+    if moves.shape[2] == 1:
+        return moves[:, :, 0]
+    if moves.shape[2]:
+        forces = rigid.resultant[rigid.translations]
+        return np.asarray(-moves @ (forces / (np.linalg.norm(forces) or 1.0)))
     mean = rigid.pair.weights @ rigid.pair.normal
     return np.broadcast_to(mean / np.linalg.norm(mean), rigid.pair.normal.shape)
 

@@ -1,7 +1,7 @@
 """Two surfaces in contact: opposite each other, in equilibrium, and elastic."""
 
 from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance, join
-from fenwear.interface.equilibrium import RigidEquilibrium, rigid_equilibrium
+from fenwear.interface.equilibrium import RigidEquilibrium, is_translation, rigid_equilibrium
 from fenwear.interface.pair import ContactPair, check_distance, interpolation, pair, pass_material, transfer_at
 from fenwear.interface.placement import Placement
 
@@ -14,6 +14,7 @@ __all__ = [
     "RigidEquilibrium",
     "check_distance",
     "interpolation",
+    "is_translation",
     "join",
     "pair",
     "pass_material",

@@ -12,6 +12,11 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.interface.pair import ContactPair
 
 
+def is_translation(mode: str) -> bool:
+    """Return whether a rigid mode of this name moves along an axis, in mm; else it turns, in rad."""
+    return mode.startswith("lambda_F")
+
+
 @dataclass(frozen=True)
 class RigidEquilibrium:
     """What the equilibrium of the rigid modes needs of the interface; no elasticity in it.
@@ -23,7 +28,7 @@ class RigidEquilibrium:
         pair: The nodes and the transfer.
         motion: m (n, d, modes), the motion of the punch's surface against the strip's by each rigid mode.
         resultant: F = R^T f of the loads (modes,), N/mm and N; in a solid N and N mm.
-        mode_names: Names of the rigid modes, lambda_F and lambda_M for a tilting punch.
+        mode_names: Names of the rigid modes, lambda_F and lambda_M for a tilting punch; lambda_Fx along x.
         of_punch: How many of them are the punch's; they come first.
     """
 
@@ -50,10 +55,22 @@ class RigidEquilibrium:
     @property
     def mean_pressure(self) -> float:
         """Load over the nominal contact, MPa; 1 where supports and not the contact carry the load."""
-        if "lambda_F" not in self.mode_names:
+        approach = self.approach
+        if approach is None:
             return 1.0
-        force = abs(self.resultant[self.mode_names.index("lambda_F")])
-        return float(force / self.pair.weights.sum()) or 1.0
+        return float(np.linalg.norm(approach) / self.pair.weights.sum()) or 1.0
+
+    @property
+    def approach(self) -> Array | None:
+        """Forces of the loads along the translations of the first body that has any (translations,); None without."""
+        at = self.translations
+        return self.resultant[at] if at else None
+
+    @property
+    def translations(self) -> list[int]:
+        """Numbers of the modes that move a body along an axis; of the punch, where it is free along any."""
+        along = [k for k, name in enumerate(self.mode_names) if is_translation(name)]
+        return [k for k in along if k < self.of_punch] or along
 
 
 def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:

@@ -16,6 +16,7 @@ from fenwear.case import Case
 from fenwear.cycle import at_step, evolve, steady
 from fenwear.cycle.state import joined
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.interface import is_translation
 from fenwear.law import check_decided
 from fenwear.results.steps import numbers
 from fenwear.stick.final import FinalShape
@@ -82,7 +83,7 @@ def meaning(name: str, of: Of, case: Case) -> Meaning:
             return found
         unit, size = ("mm", "width") if case.model.kind == "plane" else ("mm2", "area")
         return replace(found, unit=unit, name=found.name.replace(SIZE, size))
-    unit, per = ("mm" if name == "lambda_F" else "rad"), ("s" if of == "optimum" else "cycle")
+    unit, per = ("mm" if is_translation(name) else "rad"), ("s" if of == "optimum" else "cycle")
     dims = ("half_cycle",) if of == "optimum" else ()
     return Meaning(dims, f"{unit}/{per}", "rigid-body wear of the punch")
 

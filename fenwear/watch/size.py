@@ -71,7 +71,7 @@ def _measures(case: Case, bodies: Bodies, rigid: RigidEquilibrium) -> list[Measu
         _, distance, half_cycles = cycle_of(case)
         stroke = distance / half_cycles
         found.append(Measure(size / stroke, 1, 0.05, 1e4, f"the stroke is {stroke:.3g} mm"))
-    if "lambda_F" in rigid.mode_names:
+    if rigid.translations:
         used = {*case.punch.regions.values(), *case.strip.regions.values()}
         strain = rigid.mean_pressure / min(case.initial_materials[name].young for name in used)
         text = f"the load presses with {rigid.mean_pressure:,.3g} MPa on the whole surface"

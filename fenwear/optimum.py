@@ -24,14 +24,24 @@ from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.pressure_law import PressureLaw
 
 MOVES = {
-    **{"lambda_F": "move along z", "lambda_Fx": "move along x", "lambda_Fy": "move along y"},
-    **{"lambda_M": "tilt", "lambda_Mx": "tilt about x", "lambda_My": "tilt about y"},
+    "lambda_F": "move along z",
+    "lambda_Fx": "move along x",
+    "lambda_Fy": "move along y",
+    "lambda_M": "tilt",
+    "lambda_Mx": "tilt about x",
+    "lambda_My": "tilt about y",
 }
 TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
 RAMP = 1e-6  # of the mean wear rate, over which the pressure rises to a threshold
 RAMPS = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, RAMP)  # on the way there
 SMALL = 0.1  # of the motion that wears a flat contact evenly
 HALVINGS = 60  # of an interval that holds a pressure
+
+
+def motion_words(mode: str) -> str:
+    """Return what a body does that moves by a rigid mode of this name."""
+    name, kind, part = mode.split("_", maxsplit=1)[0], mode.split("_")[1], mode.split("_")[2:]
+    return MOVES[f"{name}_{kind}"] + (f" (part {part[0]})" if part else "")
 
 
 @dataclass(frozen=True, repr=False)
@@ -86,13 +96,13 @@ def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) 
     beginning = f"no pressure on the contact balances the loads in {way} sliding: "
     if size > 0 and balanced(punch):
         loose = [k for k in every[rigid.of_punch :] if not balanced([*punch, k])] or every[rigid.of_punch :]
-        freely = " and to ".join(MOVES[rigid.mode_names[k]] for k in loose)
+        freely = " and to ".join(motion_words(rigid.mode_names[k]) for k in loose)
         message = f"{beginning}the strip is free to {freely}, and the punch pushes it away; hold it against that"
         raise CaseError(InputError("strip.supports", message))
     tips = []
     if size > 0 and balanced(punch[:1]):
         tips = [k for k in punch[1:] if not balanced([*punch[:1], k])] or punch[1:]
-    how = " and to ".join(MOVES[rigid.mode_names[k]] for k in tips)
+    how = " and to ".join(motion_words(rigid.mode_names[k]) for k in tips)
     what = f"the punch tips over, free to {how}" if tips else "the punch lifts off"
     raise CaseError(
         InputError(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from fenwear import compat
+from fenwear.arrays import Mask
 from fenwear.bodies.contact_surface import ContactSurface, Trace
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
 from fenwear.bodies.parts import connected_parts, part_boxes
@@ -47,8 +48,9 @@ class Supports:
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         pivot: The point about which rotations are taken, mm.
         modes: Columns of R on the owned degrees of freedom; the displacement of each for a unit velocity.
-        names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx", "lambda_Fy"
-            where the contact wraps around the body or is wrapped by it.
+        names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx" and
+            "lambda_Fy" where the contact wraps around the body or is wrapped by it; of a body of several parts that
+            share no node with the number of the part, as "lambda_F_2".
     """
 
     def __init__(self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: Trace) -> None:
@@ -64,13 +66,12 @@ class Supports:
         Raises:
             CaseError: an unknown group, a support off the body, a body free to slide, or free and not facing z.
         """
-        self.body, self.space, self.kind, self.contact = body, space, kind, contact.local
+        self.body, self.space, self.kind, self.contact, self._trace = body, space, kind, contact.local, contact
         self.dim = body.mesh.geometry.dim
         self.pivot = _pivot(body, description)
         self.imposed = fem.Function(space)
         own = [*self._described(description.supports), *self._on_axis()]
-        self._check_parts(own)
-        self.modes, self.names, self._loose = self._free_modes(own, contact.surface, description.no_turning_about)
+        self.modes, self.names, self._loose = self._free_modes(self._owned(own), description.no_turning_about)
         self.conditions = own + self._regularise()
         self.held = self._owned(self.conditions)
 
@@ -145,31 +146,64 @@ class Supports:
         return np.concatenate([shifts, turns], axis=2).reshape(owned * dim, dim + turns.shape[2])
 
     def _free_modes(
-        self, supports: list[fem.DirichletBC], surface: ContactSurface, guided: Sequence[str]
+        self, held: NDArray[np.int32], guided: Sequence[str]
     ) -> tuple[list[NDArray[np.float64]], list[str], list[NDArray[np.float64]]]:
         """Return the rigid modes that supports and guides leave, their names, and those that supports alone leave.
 
+        Parts of the body that share no node have modes of their own.
+
         Args:
-            supports: What holds degrees of freedom.
-            surface: Of the contact.
+            held: Owned degrees of freedom that supports hold.
             guided: Axes about which guides hold the body against turning, by a couple.
 
         Raises:
-            CaseError: the body is free to slide along the contact, or to spin about its normal; or it is free, and its
-                contact looks another way than z.
+            CaseError: a part is free to slide along the contact, or to spin about its normal; or it is free, and its
+                contact looks another way than z, or it has none.
         """
-        names, forbidden = _balanced(self.kind, surface)
+        part, count = self._parts()
+        modes, names, loose = [], [], []
+        surface = self._trace.surface
+        owned = np.repeat(part, self.dim)
+        of_nodes = np.rint(self._trace.pick(owned[:, None].astype(float))[surface.nodes, 0, 0]).astype(np.int64)
+        for k in range(count):
+            found = self._modes_of(owned == k, surface.outward[of_nodes == k], held, guided)
+            modes += found[0]
+            names += [name if count == 1 else f"{name}_{k + 1}" for name in found[1]]
+            loose += found[2]
+            if found[0] and not (of_nodes == k).any():
+                raise CaseError(InputError(f"{self.body.name}.supports", self._untouched(k)))
+        return modes, names, loose
+
+    def _parts(self) -> tuple[NDArray[np.int64], int]:
+        """Return the part of each owned node (owned,), and how many there are; collective."""
+        mesh, index_map = self.body.mesh, self.space.dofmap.index_map
+        part = connected_parts(mesh)
+        node = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int64)
+        node[self.space.dofmap.list[: len(part)]] = part[:, None]
+        return node[: index_map.size_local], mesh.comm.allreduce(int(part.max(initial=0)), MPI.MAX) + 1
+
+    def _untouched(self, k: int) -> str:
+        """Say which part neither touches nor is held; collective."""
+        part = connected_parts(self.body.mesh)
+        count = self.body.mesh.comm.allreduce(int(part.max(initial=0)), MPI.MAX) + 1
+        return _parts_text(self.body.name, part_boxes(self.body.mesh, part, count), k)
+
+    def _modes_of(
+        self, own: Mask, normal: NDArray[np.float64], held: NDArray[np.int32], guided: Sequence[str]
+    ) -> tuple[list[NDArray[np.float64]], list[str], list[NDArray[np.float64]]]:
+        """Return the same of one part: of its degrees of freedom (owned,) and normals of its contact nodes (k, d)."""
+        names, forbidden = _balanced(self.kind, normal)
         columns = [*names, *forbidden]
         turns = [self._turn(axis) for axis in guided]
-        basis, comm = self.rigid_basis()[:, columns], self.body.mesh.comm
-        held = basis[self._owned(supports)]
-        gram = comm.allreduce(held.T @ held)
+        basis, comm = self.rigid_basis()[:, columns] * own[:, None], self.body.mesh.comm
+        rows = basis[held]
+        gram = comm.allreduce(rows.T @ rows)
         scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
         loose = _null_space(gram * np.outer(scale, scale)) * scale[:, None]
         by_guides = np.diag(np.isin(columns, turns).astype(float))
         free = _null_space(gram * np.outer(scale, scale) + by_guides) * scale[:, None]
         if free.shape[1] and len(names) == len(RIGID_MODES[self.kind][0]):
-            _check_facing(surface)
+            _check_facing(self._trace.surface, normal)
         # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
         echelon, pivots = _column_echelon(free)
         away = [forbidden[columns[p]] for p in pivots if columns[p] in forbidden]
@@ -194,29 +228,6 @@ class Supports:
             message = f"expected {'none' if self.kind == 'axisymmetric' else ' or '.join(known)}, got {axis!r}"
             raise CaseError(InputError(f"{self.body.name}.no_turning_about", message))
         return known[axis]
-
-    def _check_parts(self, supports: list[fem.DirichletBC]) -> None:
-        """Make sure that a body of several parts is held in each of them; collective.
-
-        Raises:
-            CaseError: a part would go its own way, which the rigid modes of the whole body do not have.
-        """
-        mesh, comm, owned = self.body.mesh, self.body.mesh.comm, self.space.dofmap.index_map.size_local
-        part = connected_parts(mesh)
-        count = comm.allreduce(int(part.max(initial=0)), MPI.MAX) + 1
-        if count == 1:
-            return
-        node = np.zeros(owned + self.space.dofmap.index_map.num_ghosts, dtype=np.int64)
-        node[self.space.dofmap.list[: len(part)]] = part[:, None]
-        names, forbidden = RIGID_MODES[self.kind]
-        held = self._owned(supports)
-        rows, where = self.rigid_basis()[held][:, [*names, *forbidden]], node[held // self.dim]
-        rows[:, np.array([*names, *forbidden]) >= self.dim] /= self._size()
-        grams = [comm.allreduce(rows[where == k].T @ rows[where == k]) for k in range(count)]
-        loose = [k for k, gram in enumerate(grams) if np.linalg.eigvalsh(gram)[0] <= 1e-12 * max(gram.max(), 1.0)]
-        if loose:
-            boxes = part_boxes(mesh, part, count)
-            raise CaseError(InputError(f"{self.body.name}.supports", _parts_text(self.body.name, boxes, loose)))
 
     def _owned(self, supports: list[fem.DirichletBC]) -> NDArray[np.int32]:
         parts = [bc.dof_indices()[0][: bc.dof_indices()[1]] for bc in supports]
@@ -256,17 +267,21 @@ class Supports:
         return [self._condition(component, held[held % self.dim == component]) for component in range(self.dim)]
 
 
-def _balanced(kind: Kind, surface: ContactSurface) -> tuple[dict[int, str], dict[int, str]]:
+def _balanced(kind: Kind, outward: NDArray[np.float64]) -> tuple[dict[int, str], dict[int, str]]:
     """Return the columns of the rigid basis that pressure balances, with names, and those that carry the body away.
 
     Along an axis to both sides of which the contact looks it holds the body, as a bore its shaft.
+
+    Args:
+        kind: Of the model.
+        outward: Normals at the contact nodes (n, d).
     """
     names, forbidden = (dict(columns) for columns in RIGID_MODES[kind])
     if kind == "axisymmetric":
         return names, forbidden
-    for axis, column in axes(surface.dim).items():
-        normal = surface.outward[:, column]
-        if column in forbidden and normal.min() < -WRAPPED and normal.max() > WRAPPED:
+    for axis, column in axes(outward.shape[1]).items():
+        normal = outward[:, column]
+        if column in forbidden and normal.min(initial=0.0) < -WRAPPED and normal.max(initial=0.0) > WRAPPED:
             names[column] = f"lambda_F{axis}"
             del forbidden[column]
     return names, forbidden
@@ -278,15 +293,19 @@ def _null_space(gram: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)])
 
 
-def _check_facing(surface: ContactSurface) -> None:
-    """Make sure that pressure on a body that is not held acts along z, the only direction in which it may be free.
+def _check_facing(surface: ContactSurface, outward: NDArray[np.float64]) -> None:
+    """Make sure that pressure on what is not held acts along z, the only direction in which it may be free.
+
+    Args:
+        surface: Of the body.
+        outward: Normals at those of its nodes that are of the part.
 
     Raises:
         CaseError: all of its contact surface looks nearer to x or y than to z.
     """
-    across = np.abs(surface.outward[:, :-1]).max(axis=1) - np.abs(surface.outward[:, -1])
-    if (across > 1e-9).all():  # a wedge of 45 degrees still works
-        mean = surface.weights @ np.abs(surface.outward)
+    across = np.abs(outward[:, :-1]).max(axis=1, initial=0.0) - np.abs(outward[:, -1])
+    if len(across) and (across > 1e-9).all():  # a wedge of 45 degrees still works
+        mean = np.abs(outward).sum(axis=0)
         name, axis = surface.body, next(a for a, c in axes(surface.dim).items() if c == mean.argmax())
         message = (
             f"{name}_contact looks along {axis}, and the {name} is not held: pressure would have to carry its loads "
@@ -308,14 +327,13 @@ def _support_points(body: BodyMesh, support: Support, key: str) -> NDArray[np.fl
     return body.points[support.on]
 
 
-def _parts_text(name: str, boxes: NDArray[np.float64], loose: Sequence[int]) -> str:
-    """Say that parts of a body are joined by nothing and not all held."""
+def _parts_text(name: str, boxes: NDArray[np.float64], part: int) -> str:
+    """Say that a part of a body touches nothing, is joined to nothing and not held."""
     spans = [f"x = {box[0, 0]:.4g} to {box[1, 0]:.4g} mm" for box in boxes]
-    which = f"part {loose[0] + 1}" if len(loose) == 1 else f"parts {' and '.join(str(k + 1) for k in loose)}"
     return (
-        f"the {name} is of {len(boxes)} parts that share no node ({'; '.join(spans)}), and {which} could move "
-        "alone: pressure on it would be balanced by loads on the others. Expected parts that are joined in the mesh "
-        "(in gmsh Coherence, or BooleanFragments), or each part held against every motion of its own"
+        f"the {name} is of {len(boxes)} parts that share no node ({'; '.join(spans)}), and part {part + 1} neither "
+        f"touches nor is held: expected parts that are joined in the mesh (in gmsh Coherence, or BooleanFragments), or "
+        f"each with a share of {name}_contact or supports of its own"
     )
 
 

@@ -103,6 +103,8 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
             _check_stick(loaded, law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False))
             return
         system = replace(system, made_from=loaded)
+    from fenwear.optimum import motion_words
+
     number = stability_number(system)
     system.check_touching()
     warnings = [*position_warnings(system), *system.bodies.remarks, *doubts(loaded), *initial_warnings(system)]
@@ -116,6 +118,10 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
         f"{system.bodies.unknowns:,} displacement degrees of freedom, "
         f"wear step {100 * number:.3g} % of the explicit limit")  # fmt: skip
+    rigid = system.rigid
+    for body, modes in (("punch", rigid.mode_names[: rigid.of_punch]), ("strip", rigid.mode_names[rigid.of_punch :])):
+        if modes:
+            log(f"the {body} is free to {', '.join(map(motion_words, modes))}: the contact has to balance it")
 
 
 def _check_stick(case: Case, system: Tribosystem | None = None) -> None:

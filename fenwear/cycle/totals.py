@@ -141,12 +141,9 @@ def approach(rigid: RigidEquilibrium) -> Array:
 
     It is the translation of the bodies that brings them together; where supports hold it, the mean normal.
     """
-    moves = rigid.motion[:, :, rigid.translations]
-    if moves.shape[2] == 1:
-        return moves[:, :, 0]
-    if moves.shape[2]:
-        forces = rigid.resultant[rigid.translations]
-        return np.asarray(-moves @ (forces / (np.linalg.norm(forces) or 1.0)))
+    along = rigid.approach
+    if along is not None:
+        return along
     mean = rigid.pair.weights @ rigid.pair.normal
     return np.broadcast_to(mean / np.linalg.norm(mean), rigid.pair.normal.shape)
 

@@ -55,22 +55,31 @@ class RigidEquilibrium:
     @property
     def mean_pressure(self) -> float:
         """Load over the nominal contact, MPa; 1 where supports and not the contact carry the load."""
-        approach = self.approach
-        if approach is None:
-            return 1.0
-        return float(np.linalg.norm(approach) / self.pair.weights.sum()) or 1.0
+        forces = [np.linalg.norm(self.resultant[own]) for own in self.translations]
+        return float(sum(forces) / self.pair.weights.sum()) or 1.0 if forces else 1.0
+
+    @property
+    def translations(self) -> list[list[int]]:
+        """Numbers of the modes that move along axes, of each part that has any: the punch's, or else the strip's."""
+        along = [k for k, name in enumerate(self.mode_names) if is_translation(name)]
+        chosen = [k for k in along if k < self.of_punch] or along
+        parts: dict[str, list[int]] = {}
+        for k in chosen:
+            parts.setdefault(self.mode_names[k].partition("_F")[2].partition("_")[2], []).append(k)
+        return list(parts.values())
 
     @property
     def approach(self) -> Array | None:
-        """Forces of the loads along the translations of the first body that has any (translations,); None without."""
-        at = self.translations
-        return self.resultant[at] if at else None
+        """How the loads' translation of each part moves its nodes against the other body (n, d); None without.
 
-    @property
-    def translations(self) -> list[int]:
-        """Numbers of the modes that move a body along an axis; of the punch, where it is free along any."""
-        along = [k for k, name in enumerate(self.mode_names) if is_translation(name)]
-        return [k for k in along if k < self.of_punch] or along
+        Of each part against the resultant of the loads on it along its translations.
+        """
+        found: Array = np.zeros(self.motion.shape[:2])
+        for own in self.translations:
+            force = self.resultant[own]
+            share = -force / np.linalg.norm(force) if force.any() else np.eye(len(own))[0]
+            found += self.motion[:, :, own] @ share
+        return found if self.translations else None
 
 
 def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:

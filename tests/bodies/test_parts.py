@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fenwear import CaseError, assemble, load_case, make_case
+from fenwear import CaseError, assemble, load_case, make_case, steady
 from fenwear.bodies.mesh import build_meshes
 from fenwear.bodies.parts import connected_parts, part_boxes
 from fenwear.case import Geometry
 
 # Two pads on one plate; joined = 1 has a bridge over them.
 PADS = """
-DefineConstant[ joined = 0 ];
+DefineConstant[ joined = 0, apart = 0 ];
 For k In {0 : 1}
   x = 4 * k;
   a = newp; Point(a) = {x, 0, 0}; Point(a + 1) = {x + 2, 0, 0}; Point(a + 2) = {x + 2, 1, 0}; Point(a + 3) = {x, 1, 0};
@@ -37,8 +37,46 @@ c = newll; Curve Loop(c) = {m, m + 1, m + 2, m + 3}; plate = news; Plane Surface
 Transfinite Curve{m, m + 2} = 13; Transfinite Curve{m + 1, m + 3} = 4; Transfinite Surface{plate};
 Recombine Surface{plate};
 Physical Surface("punch_body") = pads[]; Physical Curve("punch_contact") = lower[];
-Physical Curve("punch_far") = upper[]; Physical Curve("punch_sides") = sides[];
+If(apart)
+  Physical Curve("punch_left") = upper[0]; Physical Curve("punch_right") = upper[1];
+Else
+  Physical Curve("punch_far") = upper[];
+EndIf
+Physical Curve("punch_sides") = sides[];
 Physical Surface("strip_body") = plate; Physical Curve("strip_contact") = m; Physical Curve("strip_far") = m + 2;
+"""
+
+
+# Two pads on sectors of a disc, of 60 degrees and 30; opposed = 1: the second at the disc's lower face.
+BRAKE = """
+DefineConstant[ opposed = 0 ];
+pads[] = {}; touching[] = {}; disc[] = {}; rubbed[] = {}; held[] = {};
+For k In {0 : 1}
+  below = (opposed && k == 1) ? 1 : 0;
+  For of In {0 : 1}  // the pad, and the disc's sector
+    half = ((k == 0) ? Pi / 6 : Pi / 12) + 0.05 * of; from = k * Pi - half; to = k * Pi + half;
+    r1 = 60 - 5 * of; r2 = 100 + 5 * of; across = 4 + of; around = ((k == 0) ? 8 : 4) + of;
+    z = (below && !of) ? -8 : 0; up = of ? -8 : (below ? -10 : 10);
+    a = newp; Point(a) = {r1 * Cos(from), r1 * Sin(from), z}; Point(a + 1) = {r2 * Cos(from), r2 * Sin(from), z};
+    Point(a + 2) = {r2 * Cos(to), r2 * Sin(to), z}; Point(a + 3) = {r1 * Cos(to), r1 * Sin(to), z};
+    Point(a + 4) = {0, 0, z};
+    l = newl; Line(l) = {a, a + 1}; Circle(l + 1) = {a + 1, a + 4, a + 2}; Line(l + 2) = {a + 2, a + 3};
+    Circle(l + 3) = {a + 3, a + 4, a};
+    Transfinite Curve{l, l + 2} = across + 1; Transfinite Curve{l + 1, l + 3} = around + 1;
+    c = newll; Curve Loop(c) = {l, l + 1, l + 2, l + 3}; flat = news; Plane Surface(flat) = {c};
+    Transfinite Surface{flat}; Recombine Surface{flat};
+    body[] = Extrude {0, 0, up} { Surface{flat}; Layers{2}; Recombine; };
+    If(of)
+      disc[] += body[1]; rubbed[] += below ? body[0] : flat; held[] += body[3];
+    Else
+      pads[] += body[1]; touching[] += flat; back~{k} = body[0];
+    EndIf
+  EndFor
+EndFor
+Physical Volume("punch_body") = pads[]; Physical Surface("punch_contact") = touching[];
+Physical Surface("punch_first") = back_0; Physical Surface("punch_second") = back_1;
+Physical Volume("strip_body") = disc[]; Physical Surface("strip_contact") = rubbed[];
+Physical Surface("strip_ends") = held[];
 """
 
 
@@ -74,14 +112,50 @@ def test_parts_are_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.mpi
-def test_parts_that_nothing_holds(tmp_path: Path) -> None:
-    """Two pads with one load: their pressures were F / A at all nodes, into each other by 33 um, without a word."""
-    expected = r"punch\.supports: the punch is of 2 parts .*x = 0 to 2 mm; x = 4 to 6 mm.* parts 1 and 2 could move"
-    with pytest.raises(CaseError, match=expected):
-        assemble(make_case(tables(tmp_path)))
+@pytest.mark.parametrize("forces", [(-1000.0,), (-300.0, -900.0)])
+def test_parts_that_move_by_themselves(forces: tuple[float, ...], tmp_path: Path) -> None:
+    """Two pads, under one load on both or each under its own: no node of one is in the plate when the other touches.
+
+    As one rigid body their pressures were F / A at all nodes, into each other by 33 um. Steady, each wears evenly.
+    """
+    apart = len(forces) == 2
+    found, groups = tables(tmp_path, apart=float(apart)), ("punch_left", "punch_right") if apart else ("punch_far",)
+    found["punch"]["supports"] = [{"on": group, "fix": ["x"]} for group in groups]
+    found["punch"]["loads"] = [{"on": on, "force": [0.0, force]} for on, force in zip(groups, forces, strict=True)]
+    found["punch"]["no_turning_about"] = ["y"]
+    system = assemble(make_case(found))
+    assert system.rigid.mode_names == ("lambda_F_1", "lambda_F_2")
+    left, weights = system.pair.x < 3, system.pair.weights
+    shares = np.array(forces if apart else (forces[0] / 2,) * 2) / -10.0  # of 10 mm thickness
+    assert system.normal_force == pytest.approx(10 * shares.sum(), rel=1e-12)
+    contact = system.contact((1,)).solve(system.pair.initial_gap)
+    assert np.abs(contact.gap[contact.pressure > 0]).max() < 1e-12
+    assert contact.gap.min() > -1e-12
+    for own, share in zip((left, ~left), shares, strict=True):
+        assert weights[own] @ contact.pressure[0, own] == pytest.approx(share, rel=1e-9)
+        np.testing.assert_allclose(system.optimum(1).pressure[own], share / 2, rtol=1e-9)  # of 2 mm
+        np.testing.assert_allclose(steady(system).phase_pressure.mean(axis=0)[own], share / 2, rtol=1e-6)
+
+
+def test_joined_parts(tmp_path: Path) -> None:
+    """Pads that a bridge joins have one rigid motion and one load."""
     joined = assemble(make_case(tables(tmp_path, joined=1)))
     pressure = joined.contact((1,)).solve(joined.pair.initial_gap).pressure[0]
-    assert joined.pair.weights @ pressure == pytest.approx(100.0, rel=1e-9)  # of 10 mm thickness
+    assert joined.pair.weights @ pressure == pytest.approx(100.0, rel=1e-9)
+
+
+@pytest.mark.mpi
+def test_a_part_that_neither_touches_nor_is_held(tmp_path: Path) -> None:
+    """It is named: mostly a mesh whose layers share no nodes."""
+    found = tables(tmp_path)
+    text = (tmp_path / "pads.geo").read_text()
+    MPI.COMM_WORLD.barrier()
+    if MPI.COMM_WORLD.rank == 0:
+        (tmp_path / "pads.geo").write_text(text.replace("= lower[];", "= lower[0];"))
+    MPI.COMM_WORLD.barrier()
+    expected = r"punch\.supports: the punch is of 2 parts .*x = 0 to 2 mm; x = 4 to 6 mm.* part 2 neither touches nor"
+    with pytest.raises(CaseError, match=expected):
+        assemble(make_case(found))
 
 
 def test_parts_that_are_held(tmp_path: Path) -> None:
@@ -93,3 +167,43 @@ def test_parts_that_are_held(tmp_path: Path) -> None:
     contact = system.contact((1,)).solve(system.pair.initial_gap)
     assert (contact.pressure > 0).any()
     assert (contact.gap[contact.pressure > 0] < 1e-12).all()
+
+
+@pytest.mark.parametrize("opposed", [0, 1])
+def test_two_pads_on_one_disc(opposed: int, tmp_path: Path) -> None:
+    """Both on one face of a disc that wears, too, or on both faces: p r is even in each pad, by its own load.
+
+    Rates of approach k omega p r, the disc's by what both spread along its whole circumference.
+    """
+    (tmp_path / "brake.geo").write_text(BRAKE)
+    found = load_case("brake-pad", ["unset=heat"]).resolved()
+    found["geometry"] = {"file": str(tmp_path / "brake.geo"), "degree": 1, "parameters": {"opposed": opposed}}
+    found["materials"] = {"steel": {"young": 2e5, "poisson": 0.3}}
+    loads = {"punch_first": -5000.0, "punch_second": 2000.0 if opposed else -2000.0}
+    found["punch"] = {
+        "regions": {"punch_body": "steel"},
+        "supports": [{"on": on, "fix": ["x", "y"]} for on in loads],
+        "loads": [{"on": on, "force": [0.0, 0.0, force]} for on, force in loads.items()],
+        "no_turning_about": ["x", "y"],
+    }
+    found["strip"] = {"regions": {"strip_body": "steel"}, "supports": [{"on": "strip_ends", "fix": ["x", "y", "z"]}]}
+    found["wear"] = {"punch": {"coefficient": 1e-8}, "strip": {"coefficient": 0.0 if opposed else 1e-9}}
+    found["contact"] = {"friction": 0.3}
+    found["motion"] = {"kind": "rotation", "axis": [0, 0, 1], "angular_speed": 10.0, "duration": 1.0}
+    system = assemble(make_case(found))
+    assert system.rigid.mode_names == ("lambda_F_1", "lambda_F_2")
+    assert system.normal_force == pytest.approx(7000, rel=1e-9)
+    x, weights = system.pair.punch.x, system.pair.weights
+    radius, first = np.hypot(x[:, 0], x[:, 1]), x[:, 0] > 0
+    best = system.optimum(1)
+    spread = 0.0 if opposed else 2.7852115e-7
+    for name, own, load, rate in (
+        ("lambda_F_2", first, 5000, 1.1936621e-5),
+        ("lambda_F_1", ~first, 2000, 9.5492966e-6),
+    ):
+        assert weights[own] @ best.pressure[own] == pytest.approx(load, rel=1e-8)
+        pressed = (best.pressure * radius)[own]
+        assert np.ptp(pressed) < 0.01 * pressed.mean()
+        assert abs(best.velocity[name]) == pytest.approx(rate + spread, rel=0.01)
+    pressure = steady(system).phase_pressure[0]
+    np.testing.assert_allclose(pressure, best.pressure, rtol=0, atol=1e-6 * best.pressure.max())

@@ -16,6 +16,7 @@ from fenwear.sliding.friction import Friction
 from fenwear.sliding.motion import Motion, make_motion
 
 OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
+FACET = 0.1  # the same at a single node, beside facets of no regular form
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,8 @@ def check_stays(middle: ContactPair, sliding: Sliding) -> None:
     if not any(sliding.field.turn) or sliding.motion.reach > 0:
         return
     velocity, normal = sliding.field.velocity(middle.punch.x), in_space(middle.normal)
-    out = np.abs(np.einsum("ic,ic->i", velocity, normal)).max()
-    if out > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max():
+    out = np.abs(np.einsum("ic,ic->i", velocity, normal)) / np.linalg.norm(velocity, axis=1).max()
+    if out.mean() > OUT_OF_SURFACE or out.max() > FACET:
         raise CaseError(
             InputError(
                 "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 
+ACROSS = 0.95  # component of a normal along x from which on tangents are counted from y
 EDGE = np.cos(np.radians(20))  # cosine of the angle between facets beyond which an edge is no smooth surface
 
 
@@ -28,14 +29,15 @@ def common_normal(punch: ContactSurface, strip: Array) -> Array:
 
 
 def contact_frame(normal: Array) -> Array:
-    """Return e_n and the tangents of each node (n, d, d), by rows, for e_n (n, d); the first tangent lies along x."""
-    n, d = normal.shape
-    along = np.zeros((n, d))
-    along[:, 0] = 1.0
-    first = along - normal[:, :1] * normal
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    if d == 2:
-        return np.stack([normal, first], axis=1)
+    """Return e_n and the tangents of each node (n, d, d), by rows, for e_n (n, d).
+
+    The first tangent lies along x as far as it can; in the plane it goes on around curves, in a solid it lies along y
+    where the normal is nearly that of x.
+    """
+    if normal.shape[1] == 2:
+        return np.stack([normal, np.stack([normal[:, 1], -normal[:, 0]], axis=1)], axis=1)
+    along = np.where(np.abs(normal[:, :1]) < ACROSS, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    first = unit(along - np.einsum("ic,ic->i", along, normal)[:, None] * normal)
     return np.stack([normal, first, np.cross(normal, first)], axis=1)
 
 

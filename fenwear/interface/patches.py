@@ -23,7 +23,8 @@ from fenwear.interface.placement import HERE, Placement
 GRAPH = 0.5  # cosine between the axis and the normals of all facets from which on a contact is one patch
 SEEN = 0.2  # the same of facets of the second surface that a patch of several sees
 AROUND = 0.35  # cosine between the axis and the ways to facets of the second surface that a patch sees from the middle
-ROUND = 0.2  # of the radius: how far normals of round surfaces may pass the middle
+ROUND = 0.05  # of the radius: how far, in the mean, normals of round surfaces may pass the middle
+SLIVER = 0.5  # the same of any one facet
 STRAIGHT = 1e-3  # of what normals fix of the middle across them: what they fix of it along the axis of a cylinder
 
 
@@ -109,7 +110,7 @@ def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
     round_ = axes[:, fixed] if not fixed.all() else np.eye(d)
     off = np.linalg.norm(np.einsum("fab,fb->fa", across, x - point) @ round_, axis=1)
     radius = np.linalg.norm((x - point) @ round_, axis=1)
-    if (off > ROUND * radius).any():
+    if (off / radius).mean() > ROUND or (off > SLIVER * radius).any():
         return None
     return _Middle(point, round_.T, axes[:, ~fixed].T, float(np.median(radius)))
 

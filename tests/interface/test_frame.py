@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.interface.frame import common_normal
+from fenwear.interface.frame import common_normal, contact_frame
 
 
 def line(points: Array) -> ContactSurface:
@@ -39,3 +40,16 @@ def test_the_face_beside_a_chamfer_counts() -> None:
     normal = common_normal(line(np.column_stack([x, np.maximum(np.abs(x) - 2, 0)])), np.tile([0.0, 1.0], (9, 1)))
     np.testing.assert_allclose(normal[2:7], np.tile([0.0, 1.0], (5, 1)), atol=1e-12)
     np.testing.assert_allclose(normal[[1, 7], 0], np.sin(np.radians([22.5, -22.5])), atol=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_frames_all_around(d: int) -> None:
+    """Orthonormal, right-handed and with the normal first whichever way it looks; along x where the contact is flat."""
+    normal = np.random.default_rng(1).standard_normal((200, d))
+    normal[: 2 * d] = np.concatenate([np.eye(d), -np.eye(d)])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    frame = contact_frame(normal)
+    np.testing.assert_allclose(frame @ frame.transpose(0, 2, 1), np.broadcast_to(np.eye(d), frame.shape), atol=1e-14)
+    np.testing.assert_array_equal(frame[:, 0], normal)
+    np.testing.assert_allclose(np.linalg.det(frame), -1.0 if d == 2 else 1.0, rtol=1e-13)
+    np.testing.assert_allclose(frame[d - 1, 1], np.eye(d)[0], atol=1e-15)

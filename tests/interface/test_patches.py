@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march
+from fenwear import CaseError, Tribosystem, assemble, jump, load_case, make_case, march
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface, vertex_surface
 from fenwear.interface import pair
@@ -19,7 +19,7 @@ from fenwear.interface.placement import Placement
 RADIUS, CLEARANCE, YOUNG, POISSON = 10.0, 0.05, 210e3, 0.3
 
 
-def bore(load: float, elements: int, folder: Any, clearance: float = CLEARANCE) -> Tribosystem:
+def bore(load: float, elements: int, folder: Path, clearance: float = CLEARANCE) -> Tribosystem:
     """Return a shaft in the whole of a bore in a large plate of its material, loaded along z, mm and N/mm."""
     (folder / "bore.toml").write_text(f"""
 title = "bore"
@@ -75,7 +75,7 @@ def angles(system: Tribosystem, clearance: float) -> Array:
 
 
 @pytest.mark.parametrize("degrees", [30, 60])
-def test_persson(degrees: float, tmp_path: Any) -> None:
+def test_persson(degrees: float, tmp_path: Path) -> None:
     """A pin in the hole of a large plate: pressures at all nodes but the outermost, falling with the mesh."""
     b = np.tan(np.radians(degrees) / 2)
     arc = (2 - np.log(b**2 + 1) - 2 * b**4) / (np.pi * b**2 * (b**2 + 1))
@@ -95,7 +95,7 @@ def test_persson(degrees: float, tmp_path: Any) -> None:
     assert errors[1] < 0.6 * errors[0] < 2e-3
 
 
-def test_worn_bore(tmp_path: Any) -> None:
+def test_worn_bore(tmp_path: Path) -> None:
     """Row 41's elastic bushing after sliding 0.1, 1 and 10 km; the arc grows to 82 degrees on each side."""
     for half_cycles, depth, area, largest in (
         (10_000, 7.446e-3, 0.051368, 5.317),
@@ -109,7 +109,7 @@ def test_worn_bore(tmp_path: Any) -> None:
         assert last.pressure[-1].max() == pytest.approx(largest, rel=1e-2)
 
 
-def test_transfer_around_a_bore(tmp_path: Any) -> None:
+def test_transfer_around_a_bore(tmp_path: Path) -> None:
     """Constants to rounding, waves around the shaft pointwise to third order, also where patches meet; wear kept."""
     errors = []
     for elements in (40, 80):
@@ -199,3 +199,66 @@ def test_a_box_is_no_contact() -> None:
     assert folds(whole)
     with pytest.raises(CaseError, match="strip_contact folds back on itself"):
         pair(faces("punch", (-0.5, 0.5), 4, -1.0), whole)
+
+
+CUP = """
+DefineConstant[ size = 2.5 ];
+SetFactory("OpenCASCADE");
+Sphere(1) = {0, 0, 0, 15, 0, Pi/2};
+Sphere(2) = {0, 0, 0, 10, 0, Pi/2};
+BooleanDifference(3) = { Volume{1}; Delete; }{ Volume{2}; Delete; };
+Sphere(4) = {0, 0, 0, 10, -0.3, Pi/2};
+Sphere(5) = {0, 0, 0, 5};
+BooleanDifference(6) = { Volume{4}; Delete; }{ Volume{5}; Delete; };
+Mesh.MeshSizeMax = size; Mesh.MeshSizeMin = size;
+Physical Volume("punch_body") = {3}; Physical Surface("punch_contact") = {3}; Physical Surface("punch_far") = {1};
+Physical Volume("strip_body") = {6}; Physical Surface("strip_contact") = {4}; Physical Surface("strip_core") = {6};
+"""
+
+
+def test_worn_in_cup(tmp_path: Path) -> None:
+    """A cup that wears on a ball turning about an axis square to the load: p = p0 cos psi, p0 = 4 F / (pi² R²).
+
+    psi is the longitude about the axis; the cup sinks by 4 k omega F / (pi² R), of k F omega R 4 / pi in volume.
+    """
+    (tmp_path / "cup.geo").write_text(CUP)
+    load, coefficient, errors = 1000.0, 1e-7, []
+    for size in (2.5, 1.5):
+        tables = {
+            "title": "cup",
+            "geometry": {"file": str(tmp_path / "cup.geo"), "degree": 1, "parameters": {"size": size}},
+            "model": {"kind": "solid"},
+            "materials": {"polymer": {"young": 1000, "poisson": 0.4}, "steel": {"young": 210e3, "poisson": 0.3}},
+            "punch": {
+                "regions": {"punch_body": "polymer"},
+                "no_turning_about": ["x", "y", "z"],
+                "loads": [{"on": "punch_far", "force": [0, 0, -load]}],
+            },
+            "strip": {
+                "regions": {"strip_body": "steel"},
+                "supports": [{"on": "strip_core", "fix": ["x", "y", "z"]}],
+            },
+            "contact": {"friction": 0.0},
+            "wear": {"punch": {"coefficient": coefficient}},
+            "motion": {"kind": "rotation", "axis": [0, 1, 0], "angular_speed": 1.0, "duration": 1.0},
+            "run": {"half_cycles": 1},
+        }
+        system = assemble(make_case(tables))
+        assert system.rigid.mode_names == ("lambda_F", "lambda_Fx", "lambda_Fy")
+        x, weights = system.pair.punch.x, system.pair.weights
+        best, largest = system.optimum(1), 4 * load / (np.pi**2 * 100)
+        exact = largest * np.maximum(np.cos(np.arctan2(x[:, 0], x[:, 2])), 0)
+        rate = weights @ (coefficient * best.pressure * system.slid[0])
+        errors.append(
+            (
+                np.abs(best.pressure - exact).max() / largest,
+                abs(best.velocity["lambda_F"] / (10 * coefficient * largest) - 1),
+                abs(rate / (4 / np.pi * coefficient * load * 10) - 1),
+            )
+        )
+        assert abs(best.velocity["lambda_Fx"]) < 2e-3 * best.velocity["lambda_F"]
+        first = next(iter(march(system, 1))).pressure[0]
+        np.testing.assert_allclose((weights * first) @ system.pair.normal, [0, 0, load], atol=1e-7)
+    assert all(fine < 0.6 * coarse for coarse, fine in zip(*errors, strict=True))
+    assert errors[1][0] < 0.05
+    assert max(errors[1][1:]) < 5e-3

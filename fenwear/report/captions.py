@@ -11,8 +11,8 @@ from fenwear.results.sheet import BODIES
 TEXTS = {
     "geometry": "Geometry: (a) whole, (b) near the contact, with elements, supports (red), loads (blue) and the "
     "contact (green); x along the contact, z upwards.",
-    "profiles": "Surface profiles of {bodies}, unworn and worn, at {chosen}. Heights are magnified; the punch lies "
-    "above.",
+    "profiles": "Surface profiles of {bodies}, unworn and worn, at {chosen}. Heights, or the depths of round "
+    "contacts, are magnified; the punch lies above.",
     "shape": "Worn depth of {bodies} along the contact at {chosen}.",
     "wear_map": "Worn depth of {bodies} over the position along the contact and the {axis}.",
     "pressure": "Contact pressure along the contact at {chosen}: {panels}. First "

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+DRAWN = 0.2  # of a round contact's size: its largest depth as it is drawn
+
+
 def surfaces_of(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
     """Return abscissae, worn depths and unworn heights (mm) of the surfaces that wear, by the body."""
     found = {}
@@ -31,6 +34,8 @@ def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Lo
 
     Depths are drawn along z: right where slopes are small, as those of worn surfaces are.
     """
+    if "place" in history:
+        return _outline_figure(history, half_cycles, look)
     surfaces = surfaces_of(history)
     figure, axes = panels(len(surfaces), 3.0, look=look)
     for ax, (body, (x, depth, height)) in zip(axes, surfaces.items(), strict=True):
@@ -45,6 +50,30 @@ def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Lo
     left, right = worn_range(history)
     axes[-1].set_xlim(left, right)
     contact_axis(axes[-1])
+    return figure
+
+
+def _outline_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look) -> Figure:
+    """Draw a round contact of the punch as a tester of roundness sees it: its outline, depths magnified."""
+    outline = np.column_stack([history.place.values, history.height.values])
+    middle = (outline.min(axis=0) + outline.max(axis=0)) / 2
+    ways = np.gradient(outline, axis=0)
+    normal = (
+        np.column_stack([-ways[:, 1], ways[:, 0]]) / np.linalg.norm(ways, axis=1)[:, None]
+    )  # to the left of the way
+    depth, size = history.wear, float(np.ptp(outline, axis=0).max())
+    deepest = float(depth.sel(half_cycle=list(half_cycles)).max())
+    magnified = DRAWN * size / deepest if deepest > 0 else 1.0
+    figure, (ax,) = panels(1, 5.0, look=look)
+    ax.plot(*outline.T, color="0", linestyle="--", linewidth=1.2, label="unworn")
+    for colour, n in shades(half_cycles):
+        worn = outline + magnified * depth.sel(half_cycle=n).values[:, None] * normal
+        ax.plot(*worn.T, color=colour, label=look.name(history, n), gid=str(n))
+    ax.plot(*middle, "+", color="0")
+    ax.set_aspect("equal")
+    ax.set_xlabel("x (mm)")
+    ax.set_ylabel(f"z (mm), depths {magnified:,.3g} times as large")
+    legend_beside(ax, look.of_one)
     return figure
 
 

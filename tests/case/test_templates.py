@@ -14,7 +14,7 @@ from fenwear.errors import CaseError
 
 USUAL = [
     *("ball-on-disc", "ball-on-flat", "block-on-ring", "brake-pad"),
-    *("bushing", "cylinder-on-flat", "fretting", "pin-on-disc"),
+    *("bushing", "cylinder-on-flat", "fretting", "pin-on-disc", "plain-bearing"),
 ]
 
 
@@ -108,6 +108,18 @@ def test_bushing_steady_state() -> None:
     theta = np.arctan2(pair.normal[:, 0], pair.normal[:, 1])
     scale = 20e3 / (20.0 * radius * (alpha + np.sin(alpha) * np.cos(alpha)))
     np.testing.assert_allclose(state.pressure[0], scale * np.cos(theta), rtol=2e-3)
+
+
+def test_plain_bearing() -> None:
+    """Its contact is at the attitude angle, and what it loses is k times the integral of pressure and sliding."""
+    case = case_of("plain-bearing", "revolutions=20000")
+    system = assemble(case)
+    *_, last = jump(system, 20000, tolerance=0.02)
+    x, weights, pressure = system.pair.punch.x, system.pair.weights, last.pressure[-1]
+    angle = np.arctan2(x[:, 0], x[:, 1] + 0.05)
+    assert angle @ (weights * pressure) / (weights @ pressure) == pytest.approx(-np.arctan(0.1), abs=np.radians(0.2))
+    slid = 2 * np.pi * 10 * 20000
+    assert 1.0 < weights @ last.wear[-1] / (1e-9 * 1000 / 20 * slid) < 4 / np.pi
 
 
 @pytest.mark.slow

@@ -23,11 +23,9 @@ import os
 import matplotlib.pyplot as plt
 import numpy as np
 
-from fenwear import load_case
+from fenwear import assemble, jump, load_case, march, steady, vary
 from fenwear.stick.cycle import Records
 from fenwear.stick.final import final_shape
-from fenwear.stick.jump import jump
-from fenwear.stick.setup import make_rig, with_steps
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
 ELEMENTS = 30 if COARSE else 40
@@ -38,27 +36,32 @@ plt.rcParams.update({"axes.spines.top": False, "axes.spines.right": False, "axes
 # %% [markdown]
 # ## One cycle with seven strokes
 #
-# The bodies are set up once; another stroke is only another program of the rig. The flat keeps its place under the
-# cylinder (`motion.positions = 1`): it moves by no more than a few nodes.
+# The bodies are set up once; another stroke is a variant of the system. The flat keeps its place under the cylinder
+# (`motion.positions = 1`): it moves by no more than a few nodes. `march` yields half-cycles, each with its time steps.
 
 # %%
 settings = [f"geometry.parameters.elements_along_contact={ELEMENTS}", "motion.positions=1"]
 case = load_case("fretting-partial-slip", settings)
-rig = make_rig(case)
-x, weights = rig.interface.middle.pair.x, rig.weights
+system = assemble(case)
+stepped = vary(system, "stick.steps=40")
+x, weights = system.pair.x, system.pair.weights
 
 load, radius, mu = 120.0, 6.0, case.contact.friction  # N/mm, mm
 modulus = 200e3 / (2 * (1 - 0.3**2))  # MPa: E* of two like bodies
 a = np.sqrt(4 * load * radius / (np.pi * modulus))  # Hertz's half-width, mm
 
 
-def cycle(amplitude):
+def time_steps(blocks):
+    """Return the time steps of all half-cycles of blocks, one after the other."""
+    return Records.joined([steps.records for block in blocks for steps in block.steps])
+
+
+def first_cycle(system, amplitude):
     """Return the time steps of the first cycle with an amplitude in µm."""
-    stroke = with_steps(rig, load_case("fretting-partial-slip", [*settings, f"motion.amplitude={amplitude} um"]), 40)
-    return Records.joined(stroke.cycle(stroke.beginning())[1])
+    return time_steps(march(vary(system, f"motion.amplitude='{amplitude} um'"), 2))
 
 
-cycles = {amplitude: cycle(amplitude) for amplitude in (0.2, 1, 2, 3, 4, 5, 8)}
+cycles = {amplitude: first_cycle(stepped, amplitude) for amplitude in (0.2, 1, 2, 3, 4, 5, 8)}
 print(f"contact: half-width {1e3 * weights @ (cycles[1].pressure > 0).any(axis=0) / 2:.1f} µm, by Hertz {1e3 * a:.1f}")
 for amplitude, records in cycles.items():
     sticks = weights @ records.sticking.all(axis=0)
@@ -189,13 +192,9 @@ plt.show()
 loads, amplitudes = np.linspace(30, 210, 4 if COARSE else 7), np.linspace(0.5, 8, 6 if COARSE else 16)  # N/mm, µm
 stuck = np.zeros((len(loads), len(amplitudes)))
 for row, force in enumerate(loads):
-    pressed = [*settings, f'punch.loads=[{{on="punch_top", force=["0 N", "-{force} N"]}}]']
-    held = make_rig(load_case("fretting-partial-slip", pressed))
+    held = vary(stepped, f'punch.loads=[{{on="punch_top", force=["0 N", "-{force} N"]}}]')
     for column, amplitude in enumerate(amplitudes):
-        stroke = with_steps(
-            held, load_case("fretting-partial-slip", [*pressed, f"motion.amplitude={amplitude} um"]), 40
-        )
-        records = Records.joined(stroke.cycle(stroke.beginning())[1])
+        records = first_cycle(held, amplitude)
         touches = weights @ (records.pressure > 0).any(axis=0)
         stuck[row, column] = weights @ records.sticking.all(axis=0) / touches
 
@@ -214,38 +213,49 @@ print(
 # %% [markdown]
 # ## Partial slip wears a scar beside the stick zone
 #
-# `jump` takes many cycles in one step of controlled error, with the stroke of ±3 µm of the case. `final_shape` finds the
-# shape to which it leads without the cycles before: in the end the stick zone alone carries the load, and beside it the
-# bodies are worn until no pressure is left. It takes the stick zone of the first cycle, unless it is given another one.
+# `jump` takes many cycles in one step of controlled error, with the stroke of ±3 µm of the case. `steady` finds the shape
+# to which it leads without the cycles before: in the end the stick zone alone carries the load, and beside it the bodies
+# are worn until no pressure is left. It takes the stick zone of the second cycle; `final_shape` can be given another one.
 
 # %%
-blocks = list(jump(rig, 300_000, tolerance=0.05))
+rows = [
+    (block, k)
+    for block in jump(system, 600_000, tolerance=0.05)
+    for k in range(len(block))
+    if block.half_cycle[k] % 2 == 0
+]
 ends = {
-    "stick zone of the first cycle": final_shape(rig),
-    "stick zone of the last cycle": final_shape(rig, blocks[-1].records.sticking.all(axis=0)),
+    "stick zone of the second cycle": steady(system),
+    "stick zone of the last cycle": final_shape(system.lawful.rig, rows[-1][0].steps[-1].stuck),
 }
-pair = rig.interface.middle.pair
 
 
-def both(worn):
+def both(block, k):
     """Return the depths of both bodies together at the contact nodes, mm."""
-    return pair.opening(worn.punch, worn.strip)
+    return system.pair.opening(block.wear[k], block.wear_strip[k])
 
 
-print(f"{blocks[-1].number:,} cycles in {len(blocks) - 1} steps; estimated error of the worst one "
-      f"{max(block.error for block in blocks):.3f} of what it wore")  # fmt: skip
-chosen = [min(blocks, key=lambda block: abs(block.number - cycles)) for cycles in (0, 2_000, 20_000, 300_000)]
+def work_of(block, k):
+    """Return friction's work in the cycle that ends with a half-cycle, N mm per mm."""
+    return sum(steps.records.energy(weights) for steps in block.steps[k - 1 : k + 1])
+
+
+print(f"{rows[-1][0].half_cycle[-1] // 2:,} cycles in {len(rows) - 1} steps; estimated error of the worst one "
+      f"{max(block.steps[k].jump_error for block, k in rows):.3f} of what it wore")  # fmt: skip
+chosen = [
+    min(rows, key=lambda row: abs(row[0].half_cycle[row[1]] // 2 - cycles)) for cycles in (1, 2_000, 20_000, 300_000)
+]
 print("    cycles   area worn off both (µm²)   friction's work in a cycle (µJ/mm)")
-for block in chosen:
-    print(f"{block.number:10,} {1e6 * weights @ both(block.worn):20.2f} "
-          f"{1e3 * block.records.energy(weights):30.2f}")  # fmt: skip
+for block, k in chosen:
+    print(f"{block.half_cycle[k] // 2:10,} {1e6 * weights @ both(block, k):20.2f} {1e3 * work_of(block, k):30.2f}")
 for name, end in ends.items():
     print(f"in the end {1e6 * weights @ end.depth:19.2f}   {name}, {1e3 * weights @ end.stick:.1f} µm wide")
 
 figure, axes = plt.subplots(2, 1, figsize=(7, 7), sharex=True, layout="constrained")
-for block, colour in zip(chosen, ("0", GREEN, BLUE, RED), strict=True):
-    axes[0].plot(1e3 * x, block.records.pressure[-1], color=colour, label=f"{block.number:,} cycles")
-    axes[1].plot(1e3 * x, 1e3 * both(block.worn), color=colour)
+for (block, k), colour in zip(chosen, ("0", GREEN, BLUE, RED), strict=True):
+    pressed = block.steps[k].pressure[-1]
+    axes[0].plot(1e3 * x, pressed, color=colour, label=f"{block.half_cycle[k] // 2:,} cycles")
+    axes[1].plot(1e3 * x, 1e3 * both(block, k), color=colour)
 axes[0].plot(1e3 * x, end.pressure, "k:", label="in the end")
 axes[1].plot(1e3 * x, 1e3 * end.depth, "k:")
 axes[0].set(ylabel="pressure (MPa)", title="The stick zone takes over the load")
@@ -276,9 +286,9 @@ across = 6 if COARSE else 8
 amplitude = 0.75  # µm
 settings = [f"geometry.parameters.across={across}", f"motion.amplitude={amplitude} um", "stick.steps=6"]
 case = load_case("fretting-sphere", settings)
-sphere = make_rig(case)
-records = Records.joined(sphere.cycle(sphere.beginning())[1])
-pair, weights = sphere.interface.middle.pair, sphere.weights
+sphere = assemble(case)
+records = time_steps(march(sphere, 2))
+pair, weights = sphere.pair, sphere.pair.weights
 along, over = pair.punch.x[:, 0], pair.punch.x[:, 1]
 
 load, radius, mu = 50.0, 10.0, case.contact.friction  # N, mm

@@ -170,7 +170,8 @@ class CycleMap:
         if np.abs(scipy.linalg.eigvals(self.through)).max() > 1 - NEUTRAL:
             message = (
                 "the bodies lose no heat: their temperature in the end depends on the way there, which `run` follows; "
-                "expected a held temperature, or convection above 0 for `steady`: any will do, as in the end nothing slips"
+                "expected a held temperature, or convection above 0 for `steady`: "
+                "any will do, as in the end nothing slips"
             )
             raise CaseError(InputError("heat.convection", message))
         return np.asarray(scipy.linalg.solve(np.eye(len(self.source)) - self.through, self.source))

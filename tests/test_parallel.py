@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +27,7 @@ from fenwear.sliding.wear import PhasesWear
 from fenwear.stick.equations import Step
 from fenwear.stick.final import final_shape
 from fenwear.stick.fineness import fine_enough
-from fenwear.stick.jump import jump as stick_jump
-from fenwear.stick.jump import march as stick_march
-from fenwear.stick.setup import make_rig
+from fenwear.stick.setup import with_steps
 
 COMM = MPI.COMM_WORLD
 several = pytest.mark.skipif(COMM.size == 1, reason="needs several ranks: mpirun -n 2 python3 -m pytest -m mpi")
@@ -197,12 +196,14 @@ def told(run: Callable[[], Iterator[Block]]) -> tuple[Any, list[Any], str]:
 def test_stick_on_ranks_whose_arithmetic_differs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Time steps as fine as they need to be, cycles, jumps and the final shape; rank 0's error is that of all."""
     case = load_case("fretting-partial-slip", STICK)
-    rig = make_rig(case)
+    system = assemble(case)
+    given = with_steps(system.lawful.rig, case, case.stick.steps)
     noisy(monkeypatch)
-    rig, fineness = fine_enough(rig, case)
+    rig, fineness = fine_enough(given, case)
     check_same(fineness.change, fineness.steps)
-    for cycle in (*stick_march(rig, 2), *stick_jump(rig, 30, 0.1)):
-        check_same(cycle.number, cycle.records.pressure, cycle.worn.punch, cycle.length)
+    system = replace(system, lawful=replace(system.lawful, rig=rig))
+    for block in (*march(system, 4), *jump(system, 60, tolerance=0.1, block=1)):
+        check_same(block.half_cycle, block.wear, block.end.jump_length, *(steps.pressure for steps in block.steps))
     found = final_shape(rig)
     check_same(found.pressure, found.depth)
 
@@ -211,7 +212,7 @@ def test_stick_on_ranks_whose_arithmetic_differs(monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(Step, "solve", fail)
     with pytest.raises(ConvergenceError, match="on rank 0"):
-        list(stick_march(rig, 1))
+        list(march(system, 2))
 
 
 @pytest.mark.mpi

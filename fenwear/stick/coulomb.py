@@ -6,7 +6,6 @@ cycles is that of `jump`. What a time step must remember of the one before goes 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,7 +38,7 @@ from fenwear.stick.cycle import Records, Rig, RigState
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
 from fenwear.stick.interface import meshed
-from fenwear.stick.jump import Cycle, first_cycle, jumped
+from fenwear.stick.jump import FrettingCycle, first_cycle, jumped
 from fenwear.stick.setup import heated, unheated_rig
 
 
@@ -56,7 +55,7 @@ class Memory:
     """
 
     at: RigState
-    cycle: Cycle | None = None
+    cycle: FrettingCycle | None = None
     warm: tuple[HeatState, ...] = ()
     stuck: Array | None = None
     meshes: float = 0.0
@@ -414,20 +413,20 @@ class Jumps(_Run):
         memory = Memory(kept.end, kept, after, stuck.astype(float), self.setup.meshes)
         return RunState(number, then.worn, tuple(contacts), warm, totals, then.length, memory=memory), made
 
-    def _cycle(self, state: RunState) -> Cycle:
+    def _cycle(self, state: RunState) -> FrettingCycle:
         """Return the cycle on the shape of a state."""
         memory, exchange = state.memory, self.system.exchange
         if memory is None or memory.cycle is None or memory.meshes != self.setup.meshes:
             at = self.at(state, self.loading(float(state.half_cycle)))
             return first_cycle(self.rig, at, state.worn, state.half_cycle // self.strokes, self.temperature(state))
-        cycle: Cycle = memory.cycle
+        cycle: FrettingCycle = memory.cycle
         if exchange is None:
             return cycle
         (after,) = memory.warm
         end = replace(cycle.end, temperature=exchange.own(after).values)
         return replace(cycle, end=end, warm=self.temperature(state))
 
-    def _adds(self, now: Cycle, then: Cycle, cycles: int) -> Totals:
+    def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: int) -> Totals:
         """Return what a jump adds: by the trapezoidal rule, but for the wear, which is that of its depths."""
         adds = [self.meter(one.records, one.first_step) for one in (now, then)]
         found = (adds[0] + adds[1]).times(cycles / 2)
@@ -452,7 +451,7 @@ def _energy_ratio(records: Records, weights: Array) -> float:
     return records.energy(weights) / max(most * stroke, 1e-300)
 
 
-def _in_order(rig: Rig, cycle: Cycle) -> list[tuple[int, Records]]:
+def _in_order(rig: Rig, cycle: FrettingCycle) -> list[tuple[int, Records]]:
     """Return the first steps and the records of a cycle's half-cycles in the order of the motion."""
     steps, first, found = rig.program.steps, cycle.first_step, []
     for records in cycle.half_cycles:
@@ -512,8 +511,3 @@ class Meter:
             mass = np.nan if density is None else float(MILLIGRAM * (area * density) @ depth)
             sums[SUMS.index(f"mass_{body}")] = mass
         return Totals(sums, totals.energy, totals.pressure)
-
-
-def parted(steps: Sequence[Steps]) -> Records:
-    """Return the records of half-cycles one after the other."""
-    return Records.joined([one.records for one in steps])

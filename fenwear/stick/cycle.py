@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 import numpy as np
 
 from fenwear.arrays import Array, Mask
-from fenwear.cycle.driver import Watching
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
@@ -195,12 +194,8 @@ class Rig:
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
 
-    def watched(self, watch: Callable[[], object]) -> Rig:
-        """Return the same, watched."""
-        return self.watching(Watching(self.interface.team, watch))
-
     def watching(self, watch: Callable[[], object]) -> Rig:
-        """Return the same, with what is called before every time step as it is."""
+        """Return the same with what is called before every time step."""
         return self._with(watch=watch)
 
     def _with(self, **changed: Any) -> Rig:

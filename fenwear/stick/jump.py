@@ -16,9 +16,7 @@ is computed again until both belong together; the trapezoidal rule gives its err
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -38,7 +36,7 @@ SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last
 
 
 @dataclass(frozen=True)
-class Cycle:
+class FrettingCycle:
     """A cycle at the shape that so many cycles have worn.
 
     Attributes:
@@ -49,10 +47,9 @@ class Cycle:
         error: Estimated error of the jump that led there, 0 where there was none: of its depths over what it wore, or
             of the contact temperatures over the warmest if that is more.
         first_step: Number of the time step that its records begin with.
-        end: State at its end; after a march's cycle its wear is taken off. What comes next follows from it.
+        end: State at its end. What comes next follows from it.
         length: Cycles of the next jump, as wished.
         warm: Temperatures at the start of its records (dim,); None without heat.
-        spent: Work of friction in all cycles before it, N in the plane and N mm in a solid.
     """
 
     number: int
@@ -64,7 +61,6 @@ class Cycle:
     end: RigState
     length: int = 1
     warm: Array | None = None
-    spent: float = 0.0
 
     @property
     def records(self) -> Records:
@@ -72,59 +68,18 @@ class Cycle:
         return Records.joined(self.half_cycles)
 
 
-def march(rig: Rig, cycles: int, start: Cycle | None = None) -> Iterator[Cycle]:
-    """Yield every cycle; the wear of each half-cycle is taken off at its end; collective.
+def jumped(rig: Rig, now: FrettingCycle, cycles: int, tolerance: float) -> FrettingCycle:
+    """Return the cycle after the next jump that is accurate enough.
 
     Args:
         rig: The bodies and what is done to them.
-        cycles: How many in all.
-        start: The one to go on after; by default none is done.
-
-    Raises:
-        ConvergenceError: a time step did not converge.
-    """
-    at = rig.beginning() if start is None else start.end
-    spent = 0.0 if start is None else start.spent + start.records.energy(rig.weights)
-    for number in range(0 if start is None else start.number + 1, cycles):
-        cycle = rig.led(partial(_marched, rig, at, number, spent))
-        yield cycle
-        at, spent = cycle.end, spent + cycle.records.energy(rig.weights)
-
-
-def _marched(rig: Rig, at: RigState, number: int, spent: float) -> Cycle:
-    """Return the cycle of a number; `at` is the state at its start, friction's work so far is `spent`."""
-    parts, begin = [], at.worn
-    for _ in range(rig.program.half_cycles):
-        first = at.next_step
-        at, records = rig.half_cycle(at)
-        at = replace(at, worn=at.worn + rig.worn_in(records, first))
-        parts.append(records)
-    return Cycle(number, begin, parts, at.worn - begin, 0.0, 0, at, spent=spent)
-
-
-def jump(rig: Rig, cycles: int, tolerance: float, start: Cycle | None = None) -> Iterator[Cycle]:
-    """Yield the cycle at the end of every jump, the unworn one first; collective.
-
-    Args:
-        rig: The bodies and what is done to them.
+        now: The cycle to go on from.
         cycles: How many in all.
         tolerance: Largest estimated error of one jump.
-        start: The one to go on after; by default the unworn one, which is yielded.
 
     Raises:
         ConvergenceError: the shortest jump did not converge.
     """
-    now = start
-    if now is None:
-        now = rig.led(lambda: first_cycle(rig, rig.beginning(), rig.unworn(), 0))
-        yield now
-    while now.number < cycles:
-        now = rig.led(partial(jumped, rig, now, cycles, tolerance))
-        yield now
-
-
-def jumped(rig: Rig, now: Cycle, cycles: int, tolerance: float) -> Cycle:
-    """Return the cycle after the next jump that is accurate enough."""
     length = now.length
     while True:
         tried = min(length, cycles - now.number)
@@ -144,14 +99,14 @@ def jumped(rig: Rig, now: Cycle, cycles: int, tolerance: float) -> Cycle:
         return replace(then, length=length)
 
 
-def first_cycle(rig: Rig, at: RigState, worn: Worn, number: int, warm: Array | None = None) -> Cycle:
+def first_cycle(rig: Rig, at: RigState, worn: Worn, number: int, warm: Array | None = None) -> FrettingCycle:
     """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,)."""
     return _rate(rig, at, worn, number, warm=warm)
 
 
 def _rate(
-    rig: Rig, at: RigState, worn: Worn, number: int, before: Cycle | None = None, warm: Array | None = None
-) -> Cycle:
+    rig: Rig, at: RigState, worn: Worn, number: int, before: FrettingCycle | None = None, warm: Array | None = None
+) -> FrettingCycle:
     """Return the cycle at a shape, after one that leads to it, half a one without heat.
 
     Raises:
@@ -182,20 +137,20 @@ def _rate(
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
 
-def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> Cycle:
+def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> FrettingCycle:
     first, warm = at.next_step, at.temperature
     at, parts = rig.cycle(at)
-    return Cycle(number, worn, parts, rig.worn_in(Records.joined(parts), first), 0.0, first, at, warm=warm)
+    return FrettingCycle(number, worn, parts, rig.worn_in(Records.joined(parts), first), 0.0, first, at, warm=warm)
 
 
-def _course(cycle: Cycle, steps: int) -> Course:
+def _course(cycle: FrettingCycle, steps: int) -> Course:
     """Return the heat of a cycle's time steps."""
     records = cycle.records
     numbers = [(cycle.first_step + k) % steps for k in range(len(records))]
     return Course(numbers, records.dissipated / records.duration[:, None], records.conductance)
 
 
-def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
+def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
     """Return the cycle after a jump."""
     n = len(now.worn.punch)
 
@@ -219,11 +174,10 @@ def _attempt(rig: Rig, now: Cycle, cycles: int) -> Cycle:
     area = np.concatenate([pair.weights, pair.strip.weights])
     scale = area @ (end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing) / max(scale, 1e-300))
-    work = sum(cycle.records.energy(rig.weights) for cycle in (now, then)) / 2  # by the trapezoidal rule
-    return replace(then, error=max(error, then.error), spent=now.spent + cycles * work)
+    return replace(then, error=max(error, then.error))
 
 
-def _slid_on(now: Cycle, cycles: int) -> RigState:
+def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
     """Return the end of a cycle after so many more, as far as what its nodes have slipped tells."""
     slid = now.end.slid
     if slid is None:
@@ -231,7 +185,7 @@ def _slid_on(now: Cycle, cycles: int) -> RigState:
     return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slid.sum(axis=0))
 
 
-def _derivative(rig: Rig, now: Cycle) -> Array:
+def _derivative(rig: Rig, now: FrettingCycle) -> Array:
     """Return A, the derivative of a cycle's wear to the depths while contact zone and slip stay (n + n_s, n + n_s)."""
     records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
     total = n + len(now.worn.strip)

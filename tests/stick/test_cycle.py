@@ -8,11 +8,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from fenwear import CaseError, assemble, load_case
+from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.fineness import HALVINGS, fine_enough
-from fenwear.stick.jump import Cycle, jump, march
 from fenwear.stick.program import make_program
 from fenwear.stick.setup import make_rig, with_steps
 
@@ -71,24 +70,24 @@ def test_force_and_displacement_drive_the_same_loop() -> None:
     assert pulled.displacement[ends] == pytest.approx(moved.displacement[ends], rel=2e-3)
 
 
-def depths(cycles: list[Cycle]) -> np.ndarray:
-    return np.concatenate([cycles[-1].worn.punch, cycles[-1].worn.strip])
+def depths(blocks: list[Block]) -> np.ndarray:
+    return np.concatenate([blocks[-1].wear[-1], blocks[-1].wear_strip[-1]])
 
 
 def test_jumps_tend_to_the_march() -> None:
     """The difference to the march falls with the tolerance; no depth ever decreases."""
     fast = ("wear.punch.coefficient='1e-6 1/MPa'", "wear.strip.coefficient='2e-6 1/MPa'")
-    driven, cycles = rig(*fast, "stick.steps=10"), 40
-    marched = list(march(driven, cycles + 1))  # the last begins with what the others have worn
-    exact = depths(marched)
+    settings = [*SMALL, *fast, "stick.steps=10", "stick.step_tolerance=1"]
+    system, cycles = assemble(load_case("fretting-partial-slip", settings)), 40
+    exact = depths(list(march(system, 2 * cycles)))
     differences, counts = [], []
     for tolerance in (0.1, 1e-2):
-        found = list(jump(driven, cycles, tolerance))
-        assert found[-1].number == cycles
+        found = list(jump(system, 2 * cycles, tolerance=tolerance, block=1))  # a block for each jump
+        assert found[-1].half_cycle[-1] == 2 * cycles
         counts.append(len(found))
         for before, after in itertools.pairwise(found):
-            assert (after.worn.punch >= before.worn.punch).all()
-            assert (after.worn.strip >= before.worn.strip).all()
+            assert (after.wear[-1] >= before.wear[-1]).all()
+            assert (after.wear_strip[-1] >= before.wear_strip[-1]).all()
         differences.append(np.abs(depths(found) - exact).sum() / exact.sum())
     assert counts[0] < counts[1] < cycles
     assert differences[0] < 0.1
@@ -99,21 +98,21 @@ def test_jumps_tend_to_the_march() -> None:
 def test_worn_volume_goes_with_the_work_of_friction() -> None:
     """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
     driven = rig()
-    cycle = next(iter(march(driven, 1)))
-    energy = cycle.records.energy(driven.weights)
-    assert driven.weights @ cycle.rate.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
+    records = first_cycle(driven)
+    energy, worn = records.energy(driven.weights), driven.worn_in(records, 0)
+    assert driven.weights @ worn.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
     strip = driven.interface.middle.pair.strip.weights
-    assert strip @ cycle.rate.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
+    assert strip @ worn.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
 
 
 def test_wear_begins_at_a_pressure_and_ends_to_grow_at_another() -> None:
     """Threshold and cap count at each node in each time step; sqrt(p) and the square of the speed, too."""
     law = "wear.punch={coefficient='1e-8 1/MPa', pressure_threshold='200 MPa', pressure_cap='500 MPa'}"
-    records = next(iter(march(rig(law), 1))).records
+    records = first_cycle(rig(law))
     expected = 1e-8 * (np.clip(records.pressure, 200, 500) - 200) * records.slid
     assert records.punch_depth == pytest.approx(expected, rel=1e-12)
     law = "wear.punch={coefficient=1e-8, pressure_exponent=0.5, speed_exponent=2}"
-    records = next(iter(march(rig(law), 1))).records
+    records = first_cycle(rig(law))
     duration = 0.2 / 40
     assert records.punch_depth == pytest.approx(1e-8 * records.pressure**0.5 * records.slid**2 / duration, rel=1e-12)
 

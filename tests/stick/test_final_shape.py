@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from cylinders import equal_cylinders, line_load
 
-from fenwear import load_case
+from fenwear import assemble, jump, load_case
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
+from fenwear.case import Case
 from fenwear.stick.cycle import Rig
 from fenwear.stick.final import final_shape, stick_zone
-from fenwear.stick.jump import jump
 from fenwear.stick.setup import make_rig
 
 LOAD, RADIUS, E_STAR = 120.0, 6.0, 2e5 / (2 * (1 - 0.3**2))
 C = 0.0609  # half-width that stays
 
 
-def rig(elements: int, *settings: str) -> Rig:
+def pressed_on(elements: int, *settings: str) -> Case:
     mesh = f"geometry.parameters.elements_along_contact={elements}"
-    return make_rig(load_case("fretting-partial-slip", [mesh, "geometry.follow_wear='never'", *settings]))
+    return load_case("fretting-partial-slip", [mesh, "geometry.follow_wear='never'", *settings])
 
 
 def exact_area(c: float) -> float:
@@ -47,7 +47,7 @@ def test_the_scar_tends_to_the_exact_one() -> None:
     """Of first order in the distance of nodes, as the edge of a zone of nodes is; hardly any tangential force."""
     errors = []
     for elements in (20, 40):
-        pressed = rig(elements, "stick.steps=2", "stick.force='1e-6 N'")
+        pressed = make_rig(pressed_on(elements, "stick.steps=2", "stick.force='1e-6 N'"))
         x, weights = pressed.interface.middle.pair.x, pressed.weights
         zone = np.abs(x) < C
         area = float(weights @ final_shape(pressed, zone).depth)
@@ -95,16 +95,18 @@ def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.
         return replace(body, response=response)
 
     monkeypatch.setattr("fenwear.stick.interface.contact_frame", upright)
-    coarse = rig(14, "stick.force='60 N'", "stick.steps=4")
+    system = assemble(pressed_on(14, "stick.force='60 N'", "stick.steps=4", "stick.step_tolerance=1"))
+    coarse = system.lawful.rig
     interface = coarse.interface
     interface.punch, interface.strip = alike(interface.punch), alike(interface.strip)
     interface._positions = {0.0: interface._position(interface.middle.pair)}
     driven = Rig(interface, coarse.program, coarse.wear, coarse.friction)
     zone = stick_zone(driven)
     end = final_shape(driven, zone)
-    last = list(jump(driven, 2_000_000, 0.02))[-1]
-    depth = last.worn.punch + interface.middle.pair.wear_interpolation @ last.worn.strip
-    pressure = last.records.pressure[-1]
+    alike_bodies = replace(system, lawful=replace(system.lawful, rig=driven))
+    last = list(jump(alike_bodies, 4_000_000, tolerance=0.02))[-1]
+    depth = last.wear[-1] + interface.middle.pair.wear_interpolation @ last.wear_strip[-1]
+    pressure = last.steps[-1].pressure[-1]
     assert driven.weights @ np.where(zone, pressure, 0) == pytest.approx(LOAD, rel=1e-5)
     assert np.abs(pressure - end.pressure)[zone].max() < 2e-3 * pressure.max()
     assert driven.weights @ depth == pytest.approx(driven.weights @ end.depth, rel=2e-3)

@@ -11,16 +11,13 @@ import pytest
 import xarray
 from work import half_cycles_whose_work_is_heat
 
-from fenwear import CaseError, assemble, load_case
+from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march
 from fenwear.cli.partial_slip import final_of
-from fenwear.cycle import march as march_sliding
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import Rig
+from fenwear.stick.cycle import Records
 from fenwear.stick.heat import balance_error
-from fenwear.stick.jump import jump, march
-from fenwear.stick.setup import make_rig
 
 WARM = (
     "materials.steel={young='200 GPa', poisson=0.3, conductivity='45 W/(m K)', heat_capacity='460 J/(kg K)', "
@@ -30,26 +27,27 @@ WARM = (
     "motion.period='0.001 s'",
     "geometry.follow_wear='never'",
 )
-SMALL = ("geometry.parameters.elements_along_contact=16", *WARM, "stick.steps=10")
+SMALL = ("geometry.parameters.elements_along_contact=16", *WARM, "stick.steps=10", "stick.step_tolerance=1")
 FAST = "wear.punch.coefficient='1e-6 1/MPa'"
 
 
 @lru_cache
-def rig(*settings: str) -> Rig:
-    return make_rig(load_case("fretting-partial-slip", [*SMALL, *settings]))
+def assembled(*settings: str) -> Tribosystem:
+    return assemble(load_case("fretting-partial-slip", [*SMALL, *settings]))
 
 
 @pytest.mark.parametrize("settings", [(), ("stick.force='60 N'",), ("heat.partition=0.3", "heat.debris=0.1")])
 def test_work_of_friction_is_the_heat(settings: tuple[str, ...]) -> None:
     """In each half-cycle, to rounding; and what rig and loads put in is stored or dissipated, expansion or not."""
-    for part in half_cycles_whose_work_is_heat(rig(*settings)):
+    for part in half_cycles_whose_work_is_heat(assembled(*settings)):
         assert (part.temperature[-1] > 0).all()
 
 
 def test_expansion_moves_the_surfaces_in_every_direction() -> None:
     """An even temperature of a free body: what expands by alpha T in every direction."""
     corner = "{at=[0, 0], fix=['x']}"
-    warm = rig("strip.temperatures=[]", f"strip.supports=[{{on='strip_bottom', fix=['z']}}, {corner}]")
+    supports = f"strip.supports=[{{on='strip_bottom', fix=['z']}}, {corner}]"
+    warm = assembled("strip.temperatures=[]", supports).lawful.rig
     assert warm.heat is not None
     punch, strip = warm.heat.exchange.bases
     even = np.concatenate([basis.coordinates(np.full(basis.body.owned, 10.0)) for basis in (punch, strip)])
@@ -74,11 +72,12 @@ def test_long_strokes_are_as_warm_as_in_gross_sliding() -> None:
                     "wear.strip.coefficient=0"]  # fmt: skip
         known = assemble(load_case("fretting-partial-slip", ["wear={punch={coefficient=1e-30}}", *settings[:-1],
                                                              "contact.law='gross-sliding'", "stick={}"]))  # fmt: skip
-        end = list(march_sliding(known, 4))[-1].heat
+        end = list(march(known, 4))[-1].heat
         assert end is not None
-        cycle = list(march(make_rig(load_case("fretting-partial-slip", settings)), 2))[-1]
-        work = known.bodies.punch.thickness * cycle.half_cycles[-1].energy(known.pair.weights)
-        warmth = cycle.records.temperature[-1, 0].mean() / end.temperature_punch[-1].mean()
+        last = list(march(assemble(load_case("fretting-partial-slip", settings)), 4))[-1]
+        assert last.heat is not None
+        work = known.bodies.punch.thickness * last.steps[-1].records.energy(known.pair.weights)
+        warmth = last.heat.temperature_punch[-1].mean() / end.temperature_punch[-1].mean()
         missing.append([1 - work / end.terms[-1, 0], 1 - warmth])
     (work_of_short, short), (work_of_long, long) = missing
     assert 0 < short < work_of_short < 0.2
@@ -89,21 +88,22 @@ def test_long_strokes_are_as_warm_as_in_gross_sliding() -> None:
 
 @pytest.mark.slow
 def test_jumps_get_as_warm_as_the_march() -> None:
-    """The error of the temperatures falls with the tolerance of the jumps."""
-    warm, cycles = rig(FAST, "geometry.parameters.elements_along_contact=10", "stick.steps=4"), 30
-    marched = list(march(warm, cycles + 1))[-1].records.temperature[-1, 0].max()
+    """The error of the temperatures falls with the tolerance of the jumps, whose last cycle is the next of a march."""
+    warm, cycles = assembled(FAST, "geometry.parameters.elements_along_contact=10", "stick.steps=4"), 30
+    marched = list(march(warm, 2 * (cycles + 1)))[-1].heat.temperature_punch[-1].max()
     errors = []
     for tolerance in (0.1, 5e-4):
-        cycle = list(jump(warm, cycles, tolerance))[-1]
-        assert cycle.number == cycles
-        assert balance_error(cycle.records.heat) < 1e-10
-        errors.append(abs(cycle.records.temperature[-1, 0].max() / marched - 1))
+        last = list(jump(warm, 2 * cycles, tolerance=tolerance))[-1]
+        assert last.half_cycle[-1] == 2 * cycles
+        records = Records.joined([steps.records for steps in last.steps[-2:]])
+        assert balance_error(records.heat) < 1e-10
+        errors.append(abs(records.temperature[-1, 0].max() / marched - 1))
     assert errors[1] < 0.5 * errors[0] < 0.02
 
 
 def run(folder: Path, count: int, *, resume: bool = False) -> xarray.Dataset:
     settings = [*SMALL, FAST, "output.report=false", "run.integration='explicit'", f"run.half_cycles={count}"]
-    case = load_case("fretting-partial-slip", [*settings, "stick.step_tolerance=1"])
+    case = load_case("fretting-partial-slip", settings)
     summary, _ = run_case(case, "warm", folder, lambda _: None, resume=resume, progress="none")
     assert summary["largest_heat_balance_error"] < 1e-8
     assert summary["max_temperature_K"] > 0

@@ -6,16 +6,17 @@ from collections.abc import Iterator
 
 import pytest
 
-from fenwear.stick.cycle import Records, Rig
+from fenwear import Tribosystem, march
+from fenwear.stick.cycle import Records
 from fenwear.stick.heat import balance_error
-from fenwear.stick.jump import march
 
 
-def half_cycles_whose_work_is_heat(warm: Rig) -> Iterator[Records]:
+def half_cycles_whose_work_is_heat(warm: Tribosystem) -> Iterator[Records]:
     """Yield the half-cycles of two cycles, each with all its friction work as heat and both its balances kept."""
-    for cycle in march(warm, 2):
-        for part in cycle.half_cycles:
-            assert part.heat[:, 0].sum() == pytest.approx(part.energy(warm.weights), rel=1e-10)
+    weights = warm.pair.weights
+    for block in march(warm, 4):
+        for part in (steps.records for steps in block.steps):
+            assert part.heat[:, 0].sum() == pytest.approx(part.energy(weights), rel=1e-10)
             assert balance_error(part.heat) < 1e-10
-            assert part.balance_error(warm.weights) < 1e-10
+            assert part.balance_error(weights) < 1e-10
             yield part

@@ -36,6 +36,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Basis, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
 from fenwear.heat.side import Fineness, Side, StepPlan
+from fenwear.heat.stage import Ledger, PreparedStage, Stage
 from fenwear.heat.step_map import PreparedStep, StepMap
 from fenwear.parallel import Team
 
@@ -111,6 +112,8 @@ class HeatExchange:
         self._flux_maps: dict[tuple[int, int, bytes], Fluxes] = {}
         self._flux_factors: dict[tuple[int, int], FluxFactor] = {}  # the last one of each step
         self._prepared: dict[tuple[int, int], PreparedStep] = {}
+        self._few: dict[tuple[int, int, bytes], Stage] = {}
+        self._prepared_few: dict[tuple[int, int], PreparedStage] = {}
 
     @property
     def reduced(self) -> bool:
@@ -266,6 +269,8 @@ class HeatExchange:
             pressure: (n,), or its changes (n, k).
             sources: Whether there is more than changes.
         """
+        if self.reduced and len(conductance) <= FEW:
+            return self._conduct_few(values, phase, pressure, conductance, sources=sources)
         terms: Array = np.zeros((len(TERMS), *pressure.shape[1:]))
         heated: Array = np.zeros_like(pressure)
         entered: Array = np.zeros_like(pressure)
@@ -292,6 +297,49 @@ class HeatExchange:
         if sources and any(side.field.contact_responses is not None for side in self.sides):
             surfaces = self._read(phase, values, fluxes)
         return values, terms, surfaces
+
+    def _conduct_few(
+        self, values: Array, phase: int, pressure: Array, conductance: Array, *, sources: bool
+    ) -> tuple[Array, Array, tuple[Array, Array] | None]:
+        """Return the same on small bases and of few nodes, whose stages are matrices."""
+        heated = (self.friction[phase] * pressure.T).T
+        speeds = sum(self._stages) * sum(plan.speed for plan in self.plans[phase])
+        terms = self._made(speeds * heated, np.zeros_like(pressure))
+        for plan in self.plans[phase]:
+            stage = self._stage_of((plan.punch, plan.strip), conductance)
+            entering = stage.entering(plan.speed * heated, sources=sources)
+            for counts in self._stages:
+                begun = values
+                ends, gained = stage.of(begun, entering, sources=sources)
+                terms += counts * gained
+                values = ends if counts == 1 else begun + counts * (ends - begun)
+        if sources and any(side.field.contact_responses is not None for side in self.sides):
+            return values, terms, self._read(phase, values, np.split(stage.fluxes(begun, entering), 2))
+        return values, terms, None
+
+    def _stage_of(self, kinds: tuple[int, int], conductance: Array) -> Stage:
+        """Return a stage of few nodes on small bases; kept for conductances met before."""
+        key = (*kinds, conductance.tobytes())
+        if key not in self._few:
+            if len(self._few) > max(LEAST, MEMORY // (48 * len(conductance) ** 2)):
+                self._few.clear()
+            if kinds not in self._prepared_few:
+                self._prepared_few[kinds] = self._prepared_stage(kinds)
+            self._few[key] = self._prepared_few[kinds].at(FluxMap.made(self._exchanged(kinds, conductance)))
+        return self._few[key]
+
+    def _prepared_stage(self, kinds: tuple[int, int]) -> PreparedStage:
+        """Return a stage on small bases, whatever conducts."""
+        of_kinds = list(zip(self.sides, kinds, strict=True))
+        motions = [one for side, kind in of_kinds if (one := side.field.propagation(kind)) is not None]
+        every = np.eye(sum(len(basis) for basis in self.bases))
+        none = np.zeros_like(every)
+        by_start, by_end = (self._kept([(kinds, *ends)], sources=False) for ends in ((every, none), (none, every)))
+        each = np.eye(len(self.weights))
+        by_flux = self._made(np.zeros((len(each), 2 * len(each))), np.hstack([each, each]))
+        constant = np.asarray(self._kept([(kinds, none[0], none[0])], sources=True) / sum(self._stages), dtype=float)
+        ledger = Ledger(by_start, by_end, by_flux, constant)
+        return PreparedStage(motions, [side.contacts[kind] for side, kind in of_kinds], ledger, self.heat.ambient)
 
     @property
     def _stages(self) -> tuple[float, ...]:

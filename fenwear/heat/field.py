@@ -220,6 +220,28 @@ class Functional:
         return self if factor == 1 else replace(self, rows=self.rows * factor, constant=self.constant * factor)
 
 
+@dataclass(frozen=True)
+class Propagation:
+    """A step of coordinates that every rank has: s' = D s + b + R (q + h_b (theta_c - theta_a)).
+
+    Attributes:
+        decay: D, or its diagonal (dim,).
+        source: b (dim,).
+        response: R, from fluxes at the interface nodes (dim, n).
+        given_back: h_b, what is given back there for each kelvin above the surroundings, mW/(mm² K).
+    """
+
+    decay: Array
+    source: Array
+    response: Array
+    given_back: float = 0.0
+
+    def free(self, coordinates: Array, *, sources: bool = True) -> Array:
+        """Return D s + b, or D s for changes (dim,) or (dim, k)."""
+        moved: Array = self.decay @ coordinates if self.decay.ndim == 2 else (self.decay * coordinates.T).T
+        return moved + self.source if sources else moved
+
+
 class Field(Protocol):
     """A body's temperature, with the steps that advance it numbered as they were given."""
 
@@ -243,6 +265,9 @@ class Field(Protocol):
             coordinates: (dim,), or without sources (dim,) or (dim, k).
             sources: False for what it makes of changes.
         """
+
+    def propagation(self, step: int) -> Propagation | None:
+        """Return a step of coordinates that every rank has; None of those that are spread over the ranks."""
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional rows . theta; collective.
@@ -271,6 +296,9 @@ class FullField:
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Solve one step."""
         return self.steps[step].advance(coordinates, sources=sources)
+
+    def propagation(self, step: int) -> None:
+        """Return none: the coordinates are spread over the ranks."""
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional, summed over the ranks."""
@@ -359,9 +387,12 @@ class ReducedField:
         return total(self.basis.body.body.mesh.comm, partial)
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
-        """Apply the dense step."""
-        moved: Array = self._propagators[step] @ coordinates
-        return moved + self._sources[step] if sources else moved
+        """Apply the step."""
+        return self.propagation(step).free(coordinates, sources=sources)
+
+    def propagation(self, step: int) -> Propagation:
+        """Return the dense step."""
+        return Propagation(self._propagators[step], self._sources[step], self.responses[step])
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the projected functional; collective to make, not to call."""

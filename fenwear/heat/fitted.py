@@ -6,14 +6,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
+from fenwear.arrays import Array
 from fenwear.errors import HeatError
 from fenwear.heat.certificate import Trial, certificate
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.contact_response import contact_responses
 from fenwear.heat.field import ReducedBasis, ReducedField
 from fenwear.heat.kept_basis import Way
+from fenwear.heat.modal import ModalField, modal_basis
 from fenwear.heat.reduction import PASSES, ROUNDING, reduced_basis
 from fenwear.parallel import once
 
@@ -75,8 +77,7 @@ def fitted_field(
         passes = PASSES * 2 ** min(tries - 1, TRIES)
         make = partial(reduced_basis, body, *settings, lasting=lasting is not None, passes=passes)
         basis = _shared(body, make, partial(wish.way, make, steps)) if shared else wish.way(make, steps)
-        one_way = min(speeds) * max(speeds) >= 0 and any(step.moves for step in steps)
-        field = ReducedField(steps, inflow, basis, exact, one_way=one_way)
+        field = _on(basis, steps, wish, inflow, exact)
         growth, difference = field.spectral_radius(wish.cycle), 0.0
         if growth <= 1 + NEUTRAL:
             hold = partial(certificate, steps[0], own[0], wish.surroundings, field, trial)
@@ -92,6 +93,16 @@ def fitted_field(
             )
         tolerance = max(tolerance / 10, ROUNDING)  # more fields: nearer to the full steps
     return field, difference
+
+
+def _on(
+    basis: ReducedBasis, steps: Sequence[HeatStep], wish: Wish, inflow: csc_array, exact: Sequence[Array] | None
+) -> ReducedField:
+    """Return the field on a basis, of material at rest on its modes; collective."""
+    if len(steps) == 1 and not any(wish.velocities):
+        return ModalField(steps[0], inflow, modal_basis(basis, steps[0], wish.duration)[0], exact)
+    one_way = min(wish.velocities) * max(wish.velocities) >= 0 and any(step.moves for step in steps)
+    return ReducedField(steps, inflow, basis, exact, one_way=one_way)
 
 
 def _shared(body: HeatBody, make: partial[ReducedBasis], way: Callable[[], ReducedBasis]) -> ReducedBasis:

@@ -7,62 +7,20 @@ same step: with C the transfer of a step's places, W the nodes' areas and A = M 
 
     (A - h C^T W C) theta = B theta_before + f - h C^T W theta_a + C^T W q,
 
-which Woodbury's formula solves with A alone, the same for all places. On a small basis A is diagonal, as M and K are
-symmetric: theta_k' = -lambda_k theta_k + b_k, and steps of any length need a division for each mode.
+which Woodbury's formula solves with A alone, the same for all places. On its modes A is diagonal, see
+`fenwear.heat.modal`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse import csr_array, diags_array
 
 from fenwear.arrays import Array
-from fenwear.heat.conduction import HeatStep
-from fenwear.heat.field import FullField, Functional, ReducedBasis, ReducedField
-from fenwear.parallel import total
-
-
-def modal_basis(basis: ReducedBasis, step: HeatStep, duration: float) -> tuple[ReducedBasis, Array]:
-    """Return the basis on which a step of material at rest is diagonal, and the rates lambda (dim,), 1/s; collective.
-
-    Args:
-        basis: Orthonormal in the heat capacity.
-        step: A step of the body, not moving.
-        duration: Its duration, s.
-    """
-    projected = total(basis.body.body.mesh.comm, basis.columns.T @ step.apply(basis.columns)[0])
-    values, vectors = np.linalg.eigh((projected + projected.T) / 2)
-    modes = ReducedBasis(basis.body, basis.lift, np.asarray(basis.columns @ vectors))
-    return modes, np.maximum(values - 1 / duration, 0.0)
-
-
-class ModalField(ReducedField):
-    """The reduced temperature of a body at rest on its modes: one step, which is a factor for each."""
-
-    def __init__(
-        self,
-        step: HeatStep,
-        inflow: csc_array,
-        basis: ReducedBasis,
-        contact_responses: Sequence[Array] | None = None,
-    ) -> None:
-        """Project the step; collective.
-
-        Args:
-            step: Of the body.
-            inflow: Loads of unit fluxes (owned, n), mm.
-            basis: Of `modal_basis`.
-            contact_responses: See `ReducedField`.
-        """
-        super().__init__([step], inflow, basis, contact_responses)
-        self._decay = np.diag(self._propagators[0]).copy()
-
-    def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
-        """Let each mode decay."""
-        moved: Array = (self._decay * coordinates.T).T
-        return moved + self._sources[step] if sources else moved
+from fenwear.heat.field import FullField, Functional, Propagation, ReducedField
 
 
 class PassingField:
@@ -92,7 +50,7 @@ class PassingField:
             convection: h, mW/(mm² K).
             ambient: theta_a, K.
         """
-        self.inner, self.basis, self._ambient = inner, inner.basis, ambient
+        self.inner, self.basis, self._ambient, self._convection = inner, inner.basis, ambient, convection
         at_nodes = inner.observe(nodes)
         exact = None if inner.contact_responses is None else inner.contact_responses[0]
         self._at_nodes, self._exact = at_nodes, exact
@@ -121,6 +79,11 @@ class PassingField:
         contact = self.contacts[step]
         above = contact(free) - self._ambient if sources else contact.of_changes(free)
         return np.asarray(free + self._returns[step] @ above)
+
+    def propagation(self, step: int) -> Propagation | None:
+        """Return the step over its places; None on the nodes of a mesh."""
+        inner = self.inner.propagation(0)
+        return inner and replace(inner, response=self.responses[step], given_back=self._convection)
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional; collective."""

@@ -18,8 +18,8 @@ from fenwear.heat.field import ReducedBasis
 from fenwear.heat.fitted import TRIES
 from fenwear.heat.halving import HeatedCycle, chosen
 from fenwear.heat.kept_basis import Way
+from fenwear.heat.modal import ModalField, modal_basis
 from fenwear.heat.passage import Passage
-from fenwear.heat.passing import ModalField, modal_basis
 from fenwear.heat.reduction import reduced_basis
 from fenwear.heat.side import Fineness, StepPlan
 from fenwear.parallel import total

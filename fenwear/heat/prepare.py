@@ -19,8 +19,9 @@ from fenwear.heat.field import FullField, Functional, ReducedField
 from fenwear.heat.fitted import Wish, fitted_field
 from fenwear.heat.halving import STEPS, HeatedPassage, chosen
 from fenwear.heat.kept_basis import Way, kept_basis, made
+from fenwear.heat.modal import ModalField
 from fenwear.heat.passage import Passage
-from fenwear.heat.passing import ModalField, PassingField
+from fenwear.heat.passing import PassingField
 from fenwear.heat.passing_strip import MANY, PassingStrip
 from fenwear.heat.section import section_modes
 from fenwear.heat.side import Fineness, Reading, Side, StepPlan

@@ -27,7 +27,7 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.case import Track
 from fenwear.heat.conduction import HeatStep
-from fenwear.heat.field import Functional, ReducedField, TrackBasis
+from fenwear.heat.field import Functional, Propagation, ReducedField, TrackBasis
 from fenwear.heat.section import Section
 from fenwear.heat.side import Side
 from fenwear.parallel import total
@@ -121,6 +121,11 @@ class TrackField:
         gained[: self._inlets] += one.leaves @ free
         track = one.takes @ (gained + one.constant if sources else gained)
         return np.concatenate([free + one.enters @ track[-self._inlets :], track])
+
+    def propagation(self, step: int) -> Propagation:
+        """Return the step as one matrix."""
+        every, none = np.eye(len(self.basis)), np.zeros(len(self.basis))
+        return Propagation(self.advance(step, every, sources=False), self.advance(step, none), self.responses[step])
 
     def observe(self, rows: Array | csr_array) -> Functional:
         """Return the functional of the mesh's temperatures; collective."""

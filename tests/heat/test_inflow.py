@@ -178,6 +178,7 @@ def test_heat_out_of_bounds_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     field = system.exchange.sides[1].field
     list(march(system, 10, implicit=True))
     field._propagators = [4 * p for p in field._propagators]
+    system.exchange._forget()
     with pytest.raises(HeatError, match=r"half-cycle \d+: the heat has failed, not the contact"):
         list(march(system, 200, implicit=True))
 

@@ -1,0 +1,156 @@
+"""A stage of both bodies on small bases at given conductances, through what the contact meets of them.
+
+Of the coordinates s of a body the contact meets its temperature without flux, theta_c = C (D s + b), alone, from which
+and from the friction heat the fluxes follow, see `fenwear.heat.fluxes`:
+
+    s' = D s + b + R (q + h_b (theta_c - theta_a)),
+
+where h_b gives back what a strip convects under the contact (see `fenwear.heat.passing`; else it is zero). With D
+diagonal, or of one body, and C D kept, a stage takes a few products with matrices of as many rows as there are nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.heat.field import Functional, Propagation
+from fenwear.heat.fluxes import FluxMap
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """The heat terms of a stage, per thickness.
+
+    Attributes:
+        by_start, by_end: From both bodies' coordinates at its ends (terms, dim).
+        by_flux: From the fluxes q (terms, 2 n).
+        constant: Without any (terms,).
+    """
+
+    by_start: Array
+    by_end: Array
+    by_flux: Array
+    constant: Array
+
+
+class PreparedStage:
+    """What a stage is, whatever conducts.
+
+    Args:
+        motions: Of punch and strip.
+        contacts: Their temperatures at the interface nodes over its places.
+        ledger: Its heat terms.
+        ambient: theta_a, K.
+
+    Attributes:
+        motions: The same.
+        given_back: h_b of both bodies' nodes (2 n,), mW/(mm² K).
+    """
+
+    def __init__(
+        self, motions: Sequence[Propagation], contacts: Sequence[Functional], ledger: Ledger, ambient: float
+    ) -> None:
+        self.motions, self._ambient = motions, ambient
+        self._split, n = len(motions[0].source), contacts[0].rows.shape[0]
+        self.given_back = np.repeat([one.given_back for one in motions], n)
+        self._bare = np.eye(2 * n)  # temperature without q, above theta_a, from theta_c - theta_a
+        self._terms_by_flux = ledger.by_flux.copy()
+        self._rows, self._constants = [], []  # of theta_c - theta_a, and then of the terms
+        ends = np.split(np.arange(len(ledger.by_end[0])), [self._split])
+        for k, (contact, one, own) in enumerate(zip(contacts, motions, ends, strict=True)):
+            nodes, end = np.arange(k * n, (k + 1) * n), ledger.by_end[:, own]
+            decay = np.diag(one.decay) if one.decay.ndim == 1 else one.decay
+            met, above = contact.of_changes(decay), contact(one.source) - ambient
+            returned = ledger.by_flux[:, nodes] * one.given_back  # q is what enters less what is given back
+            terms = ledger.by_start[:, own] + end @ decay - returned @ met
+            constant = end @ one.source - returned @ above + (ledger.constant if k == 0 else 0.0)
+            self._rows.append(np.vstack([met, terms]))
+            self._constants.append(np.append(above, constant))
+            self._terms_by_flux[:, nodes] += end @ one.response
+            self._bare[np.ix_(nodes, nodes)] += one.given_back * contact.of_changes(one.response)
+        self._decay = None
+        if all(one.decay.ndim == 1 for one in motions):
+            self._decay = np.concatenate([one.decay for one in motions])
+        self._source = np.concatenate([one.source for one in motions])
+
+    def at(self, fluxes: FluxMap) -> Stage:
+        """Return the stage with these fluxes."""
+        level = fluxes.by_temperature.sum(axis=1) + fluxes.by_ambient
+        into = fluxes.by_temperature @ self._bare + np.diag(self.given_back)
+        return Stage(self, into, fluxes.by_heat, level * self._ambient)
+
+    def met(self, values: Array, *, sources: bool) -> tuple[Array, Array]:
+        """Return theta_c - theta_a (2 n,), K, and the terms without what enters (terms,); or their changes (., k)."""
+        n = len(self.given_back) // 2
+        first, second = self._rows[0] @ values[: self._split], self._rows[1] @ values[self._split :]
+        if sources:
+            first += self._constants[0]
+            second += self._constants[1]
+        return np.concatenate([first[:n], second[:n]]), first[n:] + second[n:]
+
+    def ends(self, values: Array, into: Array, *, sources: bool) -> Array:
+        """Return the coordinates at the end, with what enters (2 n,) or (2 n, k)."""
+        n = len(into) // 2
+        if self._decay is None:
+            parts = zip(self.motions, (values[: self._split], values[self._split :]), strict=True)
+            ends: Array = np.concatenate([one.free(part, sources=sources) for one, part in parts])
+        else:
+            ends = (self._decay * values.T).T
+            if sources:
+                ends += self._source
+        ends[: self._split] += self.motions[0].response @ into[:n]
+        ends[self._split :] += self.motions[1].response @ into[n:]
+        return ends
+
+    def terms(self, into: Array) -> Array:
+        """Return the terms of what enters (2 n,) or (2 n, k)."""
+        return np.asarray(self._terms_by_flux @ into)
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A stage at given conductances.
+
+    Attributes:
+        prepared: What it is whatever conducts.
+        by_contact: What enters, q + h_b (theta_c - theta_a), from theta_c - theta_a (2 n, 2 n).
+        by_heat: From the friction heat (2 n, n).
+        constant: At the ambient temperature without any (2 n,).
+    """
+
+    prepared: PreparedStage
+    by_contact: Array
+    by_heat: Array
+    constant: Array
+
+    def entering(self, heat: Array, *, sources: bool) -> Array:
+        """Return what enters at the ambient temperature (2 n,) or (2 n, k), mW/mm².
+
+        Args:
+            heat: Of friction (n,), or (n, k), mW/mm².
+            sources: Whether there is more than changes.
+        """
+        found: Array = self.by_heat @ heat
+        return found + self.constant if sources else found
+
+    def of(self, values: Array, entering: Array, *, sources: bool) -> tuple[Array, Array]:
+        """Return the coordinates of both bodies at the end (dim,) and the heat terms (terms,), or their changes.
+
+        Args:
+            values: Coordinates at the start (dim,), or without sources their changes (dim, k).
+            entering: Of `entering`.
+            sources: Whether there is more than changes.
+        """
+        met, terms = self.prepared.met(values, sources=sources)
+        into = self.by_contact @ met + entering
+        terms += self.prepared.terms(into)
+        return self.prepared.ends(values, into, sources=sources), terms
+
+    def fluxes(self, values: Array, entering: Array) -> Array:
+        """Return the fluxes q of the same (2 n,), mW/mm²."""
+        met, _ = self.prepared.met(values, sources=True)
+        return np.asarray(self.by_contact @ met + entering - self.prepared.given_back * met)

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
+from fenwear.arrays import Array
 from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, panels, shades
 from fenwear.results.sheet import BODIES
 
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+MAP_ROWS = 600  # of a map over the run: as many as its picture has
 DRAWN = 0.2  # of a round contact's size: its largest depth as it is drawn
 
 
@@ -92,7 +95,8 @@ def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     figure, axes = panels(len(surfaces), 3.0, look=look)
     course = look.course(history)
     for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
-        rows, values = np.concatenate([[0.0], course]), np.vstack([np.zeros(len(x)), 1e3 * depth.values])
+        shown = _told_apart(course)
+        rows, values = np.append(0.0, course[shown]), np.vstack([np.zeros(len(x)), 1e3 * depth.values[shown]])
         drawn = ax.pcolormesh(x, rows, values, shading="gouraud", cmap="Blues", vmin=0, rasterized=True)
         bar = figure.colorbar(drawn, ax=ax)
         bar.set_label(f"worn depth of\nthe {body} (µm)", size=ax.yaxis.label.get_fontsize())
@@ -102,3 +106,9 @@ def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     axes[-1].set_xlim(left, right)
     contact_axis(axes[-1])
     return figure
+
+
+def _told_apart(course: Array) -> NDArray[np.int64]:
+    """Return the rows of a run that a map can tell apart, the first and the last among them."""
+    wanted = np.linspace(course[0], course[-1], MAP_ROWS)
+    return np.unique(np.searchsorted(course, wanted).clip(max=len(course) - 1))

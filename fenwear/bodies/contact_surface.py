@@ -20,7 +20,6 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
@@ -128,6 +127,8 @@ def profiled(surface: ContactSurface, points: Array) -> ContactSurface:
     Raises:
         CaseError: the points do not reach over the whole surface, or two of them are at one place.
     """
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator  # which takes long to load
+
     key, axis = f"{surface.body}.profile.points", int(np.abs(surface.weights @ surface.outward).argmax())
     places, depth, x = points[:, :-1], points[:, -1], np.delete(surface.x, axis, axis=1)
     if places.shape[1] != x.shape[1]:

@@ -19,7 +19,6 @@ import scipy.linalg
 import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
-from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.sparse import coo_array, csr_array
 
 from fenwear.arrays import Array
@@ -145,6 +144,8 @@ def _in_section(sliding: SlidingField, x: Array) -> Array:
 
 def _carried_over(places: Array, modes: Array, to: Array) -> Array:
     """Return modes (k, m) that are known at places (k, 2) of the section at others (l, 2)."""
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator  # which takes long to load
+
     if not modes.shape[1]:
         return np.zeros((len(to), 0))
     wide = np.ptp(places, axis=0)

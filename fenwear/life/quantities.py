@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
 from fenwear.arrays import Array
@@ -399,6 +398,8 @@ def _until(
 
 def _crossing(taken: Array, level: float) -> float:
     """Return where values (cycle, value, growth in a cycle) first reach a level; infinite if they do not."""
+    from scipy.interpolate import CubicHermiteSpline  # which takes long to load
+
     cycles, values, rates = taken.T
     beyond = np.flatnonzero(values >= level)
     if not len(beyond):

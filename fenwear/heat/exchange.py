@@ -23,7 +23,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import scipy.linalg
@@ -325,7 +325,8 @@ class HeatExchange:
                 self._few.clear()
             if kinds not in self._prepared_few:
                 self._prepared_few[kinds] = self._prepared_stage(kinds)
-            self._few[key] = self._prepared_few[kinds].at(FluxMap.made(self._exchanged(kinds, conductance)))
+            fluxes = cast("FluxMap", self._flux_map(kinds, conductance))  # which those of few nodes are
+            self._few[key] = self._prepared_few[kinds].at(fluxes)
         return self._few[key]
 
     def _prepared_stage(self, kinds: tuple[int, int]) -> PreparedStage:

@@ -109,7 +109,9 @@ def _shared(body: HeatBody, make: partial[ReducedBasis], way: Callable[[], Reduc
     """Return the basis of all stages of a program: the one that the stage before has made; collective."""
     inflow, speeds, duration, tolerance, around = make.args[1:]
     exposed = None if around.exposed is None else around.exposed.tobytes()
-    key = (inflow.data.tobytes(), tuple(sorted(set(speeds))), duration, tolerance, around.renewed, exposed)
+    ordered = inflow.sorted_indices()  # products leave them in an order that the first who asks for them changes
+    loads = ordered.indices.tobytes(), ordered.data.tobytes()
+    key = (loads, tuple(sorted(set(speeds))), duration, tolerance, around.renewed, exposed)
 
     def another() -> ReducedBasis:
         if len(body.shared_bases) >= TRIES:

@@ -28,7 +28,7 @@ from fenwear.life.sensitivity import Method, Sensitivity, sensitivity
 from fenwear.life.unknowns import parse_unknown
 from fenwear.parallel import on_root
 from fenwear.results.disk import write_text
-from fenwear.results.history import CASE, free_directory, make_directory
+from fenwear.results.history import CASE, free_directory, make_directory, write_case
 
 Log = Callable[[str], None]
 
@@ -59,10 +59,6 @@ def _tell_of_stick(case: Case, log: Log, comm: MPI.Comm) -> None:
     asked = case.contact.law == "gross-sliding" or bool(case.against_stick)
     for line in on_root(comm, lambda: Model(case).stick_left_out() if asked else []):
         log(f"warning: {line}")
-
-
-def _write_case(folder: Path, case: Case) -> None:
-    write_text(folder / CASE, case.to_toml())
 
 
 def _counter(log: Log, what: str) -> Callable[[int, int], None]:
@@ -97,7 +93,7 @@ def run_sensitivity(
     folder = _folder(output, "sensitivity", name, comm)
 
     def write() -> None:
-        _write_case(folder, case)
+        write_case(folder, case)
         write_text(folder / "sensitivity.json", json.dumps([one.as_json() for one in found], indent=1))
         if spread > 0:
             save(tornado(found), folder / "tornado.png")
@@ -130,7 +126,7 @@ def run_calibrate(
     folder = _folder(output, "calibrate", name, comm)
 
     def write() -> None:
-        _write_case(folder, case)
+        write_case(folder, case)
         write_text(folder / "calibration.json", json.dumps(found.as_json(), indent=1))
         write_text(folder / "residuals.csv", _residual_table(found))
         save(residuals(found), folder / "residuals.png")
@@ -180,7 +176,7 @@ def run_calibrate_each(
     folder = _folder(output, "calibrate", name, comm)
 
     def write() -> None:
-        _write_case(folder, case)
+        write_case(folder, case)
         write_text(folder / "calibration.json", json.dumps(each_as_json(found, scatter), indent=1))
         for one, calibration in zip(data, found, strict=True):
             save(residuals(calibration), folder / f"residuals_{Path(one.name).stem}.png")
@@ -251,7 +247,7 @@ def run_life(
     folder = output if resume and output is not None else _folder(output, "life", name, comm)
     if resume:
         on_root(comm, lambda: _check_folder(folder, case))
-    on_root(comm, lambda: _write_case(folder, case))
+    on_root(comm, lambda: write_case(folder, case))
     for line in scatter.text:
         log(line)
     found = lifetime(

@@ -27,12 +27,10 @@ if TYPE_CHECKING:
 
 BODIES = ("punch", "strip")
 AXES = ("x", "y", "z")
-FIGURES = "figures"
 COLOURS = 16
 FLAT = 1e-4  # of the contact's length: how far a surface that counts as flat may be from a plane
 FADES = 0.1  # of the contact's length: over which wear, as it is drawn, fades into the bodies
 NEAR = (0.72, 0.5, 0.75)  # of the length: half of the section that is shown, and most of it below and above the contact
-MARGIN = 0.05  # of the length: around bodies that end within the section
 PIXELS = 900
 MARGIN, ASPECTS = 0.04, (0.2, 0.62)  # of a picture of whole bodies: left free around them; height over width
 OPEN, AROUND = 1.5 * np.pi, 54  # of rings: how far they are turned, and in how many parts
@@ -66,10 +64,6 @@ class SolidView:
     def across(self) -> Array:
         """The normal of the section (3,), towards the half that is cut off."""
         return np.asarray(np.cross(self.along, self.normal), dtype=np.float64)
-
-    def in_section(self, x: Array) -> Array:
-        """Return places along the sliding and along the normal (n, 2), mm, from the contact's centre."""
-        return (x - self.centre) @ np.column_stack([self.along, self.normal])
 
     @property
     def box(self) -> tuple[float, float, float, float]:

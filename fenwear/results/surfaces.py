@@ -72,15 +72,6 @@ def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     return cells[(cells >= 0).all(axis=1)]
 
 
-def border_nodes(surface: ContactSurface) -> NDArray[np.int64]:
-    """Return the pressure nodes at the border of a surface: edges, or ends of them, that belong to one facet."""
-    cells = surface_cells(surface)
-    ends = [cells] if surface.dim == 2 else [cells, np.roll(cells, -1, axis=1)]
-    edges = np.sort(np.stack(ends, axis=-1).reshape(-1, surface.dim - 1), axis=1)
-    single, counts = np.unique(edges, axis=0, return_counts=True)
-    return np.unique(single[counts == 1])
-
-
 def surface_columns(placed: Placed) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
     return columns_of_pair(placed.pair, placed.sliding.field, with_strip=placed.strip_wears)

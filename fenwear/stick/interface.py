@@ -19,7 +19,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array, Mask
+from fenwear.arrays import Array
 from fenwear.assembly import Bodies, Needs, Sliding, body_needs, settle
 from fenwear.assembly.needs import condensed
 from fenwear.bodies.operators import SurfaceOperator, operators_for
@@ -168,10 +168,6 @@ class OppositeBodies:
         """Displacement of the strip at the nodes of its operator by a unit bulk strain (q, d), mm: none."""
         return np.zeros_like(self.strip.by_load)
 
-    def held_nodes(self) -> Mask:
-        """Return which contact nodes a support of the punch holds along any axis (n,)."""
-        return np.zeros(len(self.middle.pair.weights), dtype=bool)
-
     def position(self, offset: float) -> Position:
         """Return the place of the strip moved by this amount of its motion: its one place."""
         del offset
@@ -267,14 +263,6 @@ class StickInterface(OppositeBodies):
             names = set() if self.case is None else set(self.case.strip.regions.values())
             found[:, 1] = -x[:, 1] * (materials[names.pop()].poisson if len(names) == 1 else 0.0)
         return found
-
-    def held_nodes(self) -> Mask:
-        """Return which contact nodes a support of the punch holds along any axis (n,); collective."""
-        punch = self.bodies.punch
-        held = np.zeros(len(punch.load))
-        held[punch.supported] = 1.0
-        at_trace = punch.trace.pick(held[:, None])[:, :, 0].max(axis=1)
-        return np.asarray(at_trace[punch.surface.nodes] > 0)
 
     def position(self, offset: float) -> Position:
         """Return the place of the strip moved by this amount of its motion; collective, or for rank 0 that leads."""

@@ -16,7 +16,6 @@ from fenwear.cli.partial_slip import check_text, final_of, final_text
 from fenwear.report.page import write_report
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
-from fenwear.results.surfaces import border_nodes
 from fenwear.run import run_case
 from fenwear.stick.cycle import Records, Rig
 from fenwear.stick.setup import make_rig
@@ -141,14 +140,6 @@ def test_strains_of_linear_displacements_are_exact() -> None:
         slopes = np.array([[1e-3, 4e-4], [2e-4, -5e-4], [0.0, 0.0]])  # du_c / dx, du_c / dy
         found = surface_strain(position, gradient, x[:, :2] @ slopes.T)
         assert found == pytest.approx(np.tile(expected, (len(x), 1)), abs=1e-6)
-
-
-def test_border_nodes_are_those_around() -> None:
-    """Of a square of nodes."""
-    surface = rig().interface.middle.pair.punch
-    x = surface.x[:, :2]
-    outermost = np.abs(x).max(axis=1) > 0.2 - 1e-6
-    assert set(border_nodes(surface)) == set(np.flatnonzero(outermost))
 
 
 def test_bulk_stress_of_a_solid_strains_it_both_ways() -> None:

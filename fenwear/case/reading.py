@@ -14,7 +14,7 @@ import pydantic
 from fenwear.case.keys import find_keys
 from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
-from fenwear.case.profile import with_profiles
+from fenwear.case.profile import BODIES, with_profiles
 from fenwear.case.program import check_length, half_cycles_of, with_program
 from fenwear.case.schema import Case, Written
 from fenwear.case.units import shown
@@ -82,7 +82,30 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
         below["run"].pop("half_cycles", None)  # the program tells how far the run goes
     _take_away(below, [] if unset is None else unset)
     own_geometry = "file" in data.get("geometry", {})
+    below, data = _anchored(below, base_folder), _anchored(data, folder)
     return _laid_over(below, data), folder if own_geometry or base_folder is None else base_folder
+
+
+def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
+    """Return the tables with the files of profiles and of the program where they are: beside the case that names them.
+
+    The geometry's own file is left: ready ones have names without a place.
+    """
+    if folder is None:
+        return data
+    found = dict(data)
+    for name, table in data.items():
+        if name == "program":
+            found[name] = _beside(table, folder)
+        elif name in BODIES and isinstance(table, dict) and "profile" in table:
+            found[name] = {**table, "profile": _beside(table["profile"], folder)}
+    return found
+
+
+def _beside(table: Any, folder: Path) -> Any:
+    if not (isinstance(table, dict) and isinstance(table.get("file"), str)):
+        return table
+    return {**table, "file": str((folder / table["file"]).absolute())}
 
 
 def _take_away(data: dict[str, Any], unset: Any) -> None:

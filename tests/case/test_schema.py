@@ -63,6 +63,26 @@ def test_base_and_overrides(tmp_path: Path) -> None:
     assert case.materials == load_case("example1").materials
 
 
+@pytest.mark.parametrize("named", ["shapes/base.toml", "../shapes/base.toml"])
+def test_files_lie_beside_the_case_that_names_them(tmp_path: Path, named: str) -> None:
+    """Profiles and programs of a base in another folder are read there, those of the case itself beside it."""
+    place = tmp_path / "own" if named.startswith("..") else tmp_path
+    shapes = tmp_path / "shapes"
+    place.mkdir(exist_ok=True)
+    shapes.mkdir()
+    (shapes / "worn.csv").write_text("x (mm),depth (um)\n-5,1\n5,3\n")
+    (shapes / "steps.csv").write_text("cycles,load_factor\n0,1\n4,2\n")
+    base = 'base = "example1"\nprogram.file = "steps.csv"\n[punch.profile]\nfile = "worn.csv"\n'
+    (shapes / "base.toml").write_text(base)
+    (place / "case.toml").write_text(f'base = "{named}"\n[strip.profile]\nfile = "counter.csv"\n')
+    (place / "counter.csv").write_text("x (mm),depth (um)\n-9,2\n9,2\n")
+    case = load_case(place / "case.toml")
+    assert case.punch.profile == load_case(shapes / "base.toml").punch.profile
+    assert case.program == load_case(shapes / "base.toml").program
+    assert case.strip.profile is not None
+    assert case.strip.profile.points[0] == (-9, 2e-3)
+
+
 def test_keys_of_a_base_are_taken_away(tmp_path: Path) -> None:
     """A case without them is the case that never had them; what is taken away twice, or is none, is refused by name."""
     base = tmp_path / "base.toml"

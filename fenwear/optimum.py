@@ -41,7 +41,7 @@ HALVINGS = 60  # of an interval that holds a pressure
 def motion_words(mode: str) -> str:
     """Return what a body does that moves by a rigid mode of this name."""
     name, kind, part = mode.split("_", maxsplit=1)[0], mode.split("_")[1], mode.split("_")[2:]
-    return MOVES[f"{name}_{kind}"] + (f" (part {part[0]})" if part else "")
+    return MOVES[f"{name}_{kind}"] + (f" ({'_'.join(part)})" if part else "")
 
 
 @dataclass(frozen=True, repr=False)

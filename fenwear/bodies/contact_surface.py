@@ -22,7 +22,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.errors import CaseError, InputError
@@ -50,6 +50,8 @@ class ContactSurface:
         spread: Forces at the trace nodes from a unit force at each pressure node (N, n).
         profile: By how much the surface lies deeper in the body than its mesh at the pressure nodes (n,), mm; None
             where they are the same.
+        names: Of the contacts that the surface is of; none where it is one.
+        contact: Which of them each pressure node belongs to (n,); None where it is one.
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, x in its middle; else None.
     """
 
@@ -64,6 +66,8 @@ class ContactSurface:
     spread: csr_array
     profile: Array | None = None
     arc: Array | None = None
+    names: tuple[str, ...] = ()
+    contact: NDArray[np.int64] | None = None
 
     @cached_property
     def abscissa(self) -> Array:
@@ -74,6 +78,11 @@ class ContactSurface:
     def x(self) -> Array:
         """Coordinates of the pressure nodes (n, d), mm."""
         return self.trace[self.nodes]
+
+    def nodes_of(self, name: str) -> Mask:
+        """Return which pressure nodes belong to a named contact (n,)."""
+        assert self.contact is not None
+        return self.contact == self.names.index(name)
 
     @property
     def unworn(self) -> Array:
@@ -215,9 +224,8 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     local = np.take_along_axis(local, _in_reference_order(local, points, cell, degree), axis=1)
     own = space.dofmap.index_map.local_to_global(local.ravel()).astype(np.int64).reshape(local.shape)
     inner = points[space.dofmap.list[cells]].mean(axis=1)
-    facets, coordinates, inner = (
-        np.concatenate(parts) for parts in zip(*mesh.comm.allgather((own, points[local], inner)), strict=True)
-    )
+    gathered = mesh.comm.allgather((own, points[local], inner, _contact_numbers(body)))
+    facets, coordinates, inner, contact = (np.concatenate(parts) for parts in zip(*gathered, strict=True))
     blocks, first, inverse = np.unique(facets, return_index=True, return_inverse=True)
     trace = coordinates.reshape(-1, dim)[first]
     arc = arc_length(trace, inverse.reshape(facets.shape), inner, body.name == "strip") if dim == 2 else None
@@ -226,7 +234,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
     rank[order] = np.arange(len(order))
     facets = rank[inverse.reshape(facets.shape)]
     by_nodes = np.lexsort(facets.T[::-1])  # the same on any number of ranks
-    facets, inner = facets[by_nodes], inner[by_nodes]
+    facets, inner, contact = facets[by_nodes], inner[by_nodes], contact[by_nodes]
     trace, blocks = trace[order], blocks[order]
     if cell == "triangle":
         surface = vertex_surface(body.name, trace, facets, degree, inner)
@@ -236,6 +244,10 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
         spread = csr_array((np.ones(len(nodes)), (nodes, np.arange(len(nodes)))), shape=(len(trace), len(nodes)))
         surface = ContactSurface(body.name, trace, facets, cell, degree, nodes, weights[nodes], outward[nodes], spread)
         surface = replace(surface, arc=None if arc is None else arc[order])
+    if body.contacts:
+        of_trace = np.zeros(len(trace), dtype=np.int64)
+        of_trace[facets] = contact[:, None]
+        surface = replace(surface, names=tuple(body.contacts), contact=of_trace[surface.nodes])
     return surface, Trace(surface, space, blocks)
 
 
@@ -261,14 +273,29 @@ def facet_dofs(body: BodyMesh, space: fem.FunctionSpace) -> tuple[NDArray[np.int
     topology, fdim = body.mesh.topology, body.mesh.topology.dim - 1
     topology.create_connectivity(fdim, fdim + 1)
     topology.create_connectivity(fdim + 1, fdim)
-    facets = body.facet_tags.find(contact_tag(body))
-    facets = facets[facets < topology.index_map(fdim).size_local]
+    facets = _own_facets(body)
     to_cell, to_facet = topology.connectivity(fdim, fdim + 1), topology.connectivity(fdim + 1, fdim)
     closures = space.element.basix_element.entity_closure_dofs[fdim]
     cells = np.array([to_cell.links(facet)[0] for facet in facets], dtype=np.int32)
     numbers = [int(np.flatnonzero(to_facet.links(c) == f)[0]) for c, f in zip(cells, facets, strict=True)]
     found = [space.dofmap.cell_dofs(c)[sorted(closures[k])] for c, k in zip(cells, numbers, strict=True)]
     return np.array(found, dtype=np.int32).reshape(-1, len(closures[0])), cells
+
+
+def _own_facets(body: BodyMesh) -> NDArray[np.int32]:
+    """Return the contact facets that this rank owns (f,)."""
+    facets = body.facet_tags.find(contact_tag(body))
+    topology = body.mesh.topology
+    return np.asarray(facets[facets < topology.index_map(topology.dim - 1).size_local])
+
+
+def _contact_numbers(body: BodyMesh) -> NDArray[np.int64]:
+    """Return the number of the named contact that each of this rank's own contact facets belongs to (f,)."""
+    facets = _own_facets(body)
+    number = np.zeros(len(facets), dtype=np.int64)
+    for k, named in enumerate(body.contacts.values()):
+        number[np.isin(facets, named)] = k
+    return number
 
 
 def _in_reference_order(local: NDArray[np.int32], points: Array, cell: str, degree: int) -> NDArray[np.int64]:

@@ -2,8 +2,9 @@
 
 The contract of a geometry, a .geo or a .msh: physical groups whose names start with the body they
 belong to, punch_ or strip_; surfaces are the material regions; punch_contact and strip_contact are
-the curves that meet; further curves and points are for supports, loads and thermal conditions. In a
-solid the regions are volumes and what meets are surfaces. An axisymmetric model has r along x.
+the curves that meet, or several of them each with a name of its own, punch_contact_NAME; further curves
+and points are for supports, loads and thermal conditions. In a solid the regions are volumes and what
+meets are surfaces. An axisymmetric model has r along x.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -48,6 +50,7 @@ class BodyMesh:
         regions: Tag in `cell_tags` of each material region.
         curves: Tag in `facet_tags` of each group of facets.
         points: Coordinates (count, gdim) of each group of points, mm.
+        contacts: Facets of this rank, ghosts too, of each named contact of NAME_contact; none where it has one alone.
     """
 
     name: str
@@ -57,6 +60,7 @@ class BodyMesh:
     regions: dict[str, int]
     curves: dict[str, int]
     points: dict[str, NDArray[np.float64]]
+    contacts: Mapping[str, NDArray[np.int32]] = MappingProxyType({})
 
     def curve(self, group: str, key: str) -> int:
         """Return the tag of a group of facets.
@@ -262,11 +266,12 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[
 
 def _too_large(gmsh: Any, geometry: Geometry) -> str:
     """Say that the contact of the meshed surfaces alone would not fit into memory, before the bodies are meshed."""
-    tag, free = _groups(gmsh, 2).get("punch_contact"), free_memory()
-    if tag is None or free is None:
+    free = free_memory()
+    if free is None:
         return ""
     nodes = 0.0
-    for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag):
+    tags = [tag for name, tag in _groups(gmsh, 2).items() if name == "punch_contact" or _contact_name("punch", name)]
+    for entity in (entity for tag in tags for entity in gmsh.model.getEntitiesForPhysicalGroup(2, tag)):
         for cell, cells in zip(*gmsh.model.mesh.getElements(2, entity)[:2], strict=True):
             nodes += len(cells) * (0.5 if cell == TRIANGLE else geometry.degree**2)
     least = MATRICES * 8 * nodes**2
@@ -330,8 +335,15 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
         regions = [name for name in _groups(gmsh, whole) if name.startswith(f"{body}_")]
         if not regions:
             problems.append(f"{path.name} has no physical {region} named {body}_...; {_named(gmsh, whole)}")
-        if f"{body}_contact" not in _groups(gmsh, whole - 1):
+        facets = _groups(gmsh, whole - 1)
+        named = [name for name in facets if _contact_name(body, name)]
+        if f"{body}_contact" not in facets and not named:
             problems.append(f"{path.name} has no physical {facet} named {body}_contact; {_named(gmsh, whole - 1)}")
+        if f"{body}_contact" in facets and named:
+            problems.append(
+                f"{path.name} has {body}_contact and {', '.join(sorted(named))}; expected one or the others"
+            )
+        problems += _shared(gmsh, path, whole - 1, named)
     if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
         problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
     for dim in (whole, whole - 1):
@@ -349,6 +361,23 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
         problems = [f"{path.name}: {text}" for text in found]
     if problems:
         raise CaseError([InputError("geometry.file", text) for text in problems])
+
+
+def _contact_name(body: str, group: str) -> str:
+    """Return NAME of a group BODY_contact_NAME, "" of any other."""
+    head, _, name = group.partition(f"{body}_contact_")
+    return "" if head else name
+
+
+def _shared(gmsh: Any, path: Path, dim: int, named: list[str]) -> list[str]:
+    """Return in words which named contacts meet: what a node carries has to belong to one of them."""
+    groups = _groups(gmsh, dim)
+    nodes = {name: gmsh.model.mesh.getNodesForPhysicalGroup(dim, groups[name])[0] for name in sorted(named)}
+    return [
+        f"{path.name}: {first} and {second} share {len(both)} nodes; expected named contacts that lie apart"
+        for first, second in combinations(nodes, 2)
+        if len(both := np.intersect1d(nodes[first], nodes[second]))
+    ]
 
 
 def _element_types(gmsh: Any, dim: int, tag: int) -> set[int]:
@@ -390,7 +419,23 @@ def _distribute(gmsh: Any, body: str, owner: int | None, comm: MPI.Comm, kind: K
     if gmsh is not None:
         gmsh.model.remove()
         gmsh.model.setCurrent(both)
-    return BodyMesh(body, mesh, cell_tags, facet_tags, regions, curves, points)
+    return _with_contacts(BodyMesh(body, mesh, cell_tags, facet_tags, regions, curves, points))
+
+
+def _with_contacts(body: BodyMesh) -> BodyMesh:
+    """Return the body with one contact, whose facets its named contacts share among them."""
+    named = {name: tag for group, tag in body.curves.items() if (name := _contact_name(body.name, group))}
+    if not named:
+        return body
+    tags, whole = body.facet_tags, min(named.values())
+    values = np.where(np.isin(tags.values, list(named.values())), whole, tags.values).astype(np.int32)
+    curves = {group: tag for group, tag in body.curves.items() if not _contact_name(body.name, group)}
+    return replace(
+        body,
+        facet_tags=meshtags(body.mesh, tags.dim, tags.indices, values),
+        curves={**curves, f"{body.name}_contact": whole},
+        contacts={name: tags.find(tag) for name, tag in sorted(named.items())},
+    )
 
 
 def _isolate(gmsh: Any, body: str, groups: list[dict[str, int]]) -> None:

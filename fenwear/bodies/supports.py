@@ -50,7 +50,7 @@ class Supports:
         modes: Columns of R on the owned degrees of freedom; the displacement of each for a unit velocity.
         names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx" and
             "lambda_Fy" where the contact wraps around the body or is wrapped by it; of a body of several parts that
-            share no node with the number of the part, as "lambda_F_2".
+            share no node with the name of the part's contact, as "lambda_F_left", or its number, as "lambda_F_2".
     """
 
     def __init__(self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: Trace) -> None:
@@ -168,11 +168,20 @@ class Supports:
         for k in range(count):
             found = self._modes_of(owned == k, surface.outward[of_nodes == k], held, guided)
             modes += found[0]
-            names += [name if count == 1 else f"{name}_{k + 1}" for name in found[1]]
+            names += [name if count == 1 else f"{name}_{self._part_name(of_nodes, k)}" for name in found[1]]
             loose += found[2]
             if found[0] and not (of_nodes == k).any():
                 raise CaseError(InputError(f"{self.body.name}.supports", self._untouched(k)))
         return modes, names, loose
+
+    def _part_name(self, part: NDArray[np.int64], k: int) -> str:
+        """Return the name of the one contact that part k of the contact nodes (n,) has for itself, else its number."""
+        surface = self._trace.surface
+        if surface.contact is not None:
+            named = np.unique(surface.contact[part == k])
+            if len(named) == 1 and (part[surface.contact == named[0]] == k).all():
+                return surface.names[named[0]]
+        return str(k + 1)
 
     def _parts(self) -> tuple[NDArray[np.int64], int]:
         """Return the part of each owned node (owned,), and how many there are; collective."""

@@ -56,6 +56,7 @@ def run(
     as_json: JsonOption = False,
 ) -> None:
     """Run a case: pressure, wear and shape over the half-cycles."""
+    from fenwear.results.contacts import contact_text
     from fenwear.results.sheet import sheet_text
     from fenwear.run import run_case
 
@@ -73,7 +74,7 @@ def run(
         print_json(summary)
     else:
         if not quiet:
-            show(sheet_text(summary))
+            show("\n\n".join(text for text in (sheet_text(summary), contact_text(summary)) if text))
         say(f"results in {directory}")
 
 

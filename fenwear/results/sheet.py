@@ -15,7 +15,7 @@ In the plane worn area is volume over thickness.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -189,6 +189,11 @@ class Line(NamedTuple):
     unit: str
     factor: float = 1.0
 
+    @property
+    def heading(self) -> str:
+        """Its words with the unit."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
+
 
 LINES = {
     "half_cycles": Line("half-cycles", ""),
@@ -329,6 +334,15 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
     heads = [" " * wide + "".join(f"  {name:>{COLUMN}}" for name in names) for names in (bodies, ways)]
     told = [*lines[:first], heads[0], *lines[first : len(rows)]]
     return "\n".join([*told, heads[1], *lines[len(rows) :]] if contact else told)
+
+
+def columns_text(names: Sequence[str], rows: Sequence[tuple[str, Sequence[float | None]]]) -> str:
+    """Return rows of numbers with their labels as lines, under the names of their columns; "" without rows."""
+    wide = max((len(label) for label, _ in rows), default=0)
+    column = max((len(name) for name in names), default=0)
+    column = max(column, COLUMN)
+    told = [(" " * wide, names), *((f"{label:{wide}}", [_number(value) for value in row]) for label, row in rows)]
+    return "\n".join(label + "".join(f"  {cell:>{column}}" for cell in cells) for label, cells in told) if rows else ""
 
 
 def _number(value: float | None) -> str:

@@ -11,6 +11,7 @@ from fenwear.assembly import Placed, Tribosystem
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
 from fenwear.results import sheet, steps
+from fenwear.results.contacts import CONTACTS, contact_sheets
 from fenwear.results.degrees import degrees_of
 from fenwear.results.scar import conforming
 from fenwear.results.zone import ContactNet, contact_net, without_noise
@@ -36,6 +37,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
         **steps.numbers(last),
         **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
+        **({CONTACTS: contacts} if (contacts := contact_sheets(last)) else {}),
         "periodicity": float(last.periodicity[-1]),
         **{name: value for name, value in extremes.items() if name != HOTTEST},
         "contact_nodes": len(system.pair.x),

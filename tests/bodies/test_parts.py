@@ -16,7 +16,7 @@ from fenwear.case import Geometry
 
 # Two pads on one plate; joined = 1 has a bridge over them.
 PADS = """
-DefineConstant[ joined = 0, apart = 0 ];
+DefineConstant[ joined = 0, apart = 0, named = 0, meet = 0 ];
 For k In {0 : 1}
   x = 4 * k;
   a = newp; Point(a) = {x, 0, 0}; Point(a + 1) = {x + 2, 0, 0}; Point(a + 2) = {x + 2, 1, 0}; Point(a + 3) = {x, 1, 0};
@@ -36,7 +36,16 @@ m = newl; Line(m) = {p, p + 1}; Line(m + 1) = {p + 1, p + 2}; Line(m + 2) = {p +
 c = newll; Curve Loop(c) = {m, m + 1, m + 2, m + 3}; plate = news; Plane Surface(plate) = {c};
 Transfinite Curve{m, m + 2} = 13; Transfinite Curve{m + 1, m + 3} = 4; Transfinite Surface{plate};
 Recombine Surface{plate};
-Physical Surface("punch_body") = pads[]; Physical Curve("punch_contact") = lower[];
+Physical Surface("punch_body") = pads[];
+If(named)
+  Physical Curve("punch_contact_right") = lower[1]; Physical Curve("punch_contact_left") = lower[0];
+  If(meet)
+    Physical Curve("punch_contact_side") = inner[0];
+  EndIf
+EndIf
+If(!named || meet > 1)
+  Physical Curve("punch_contact") = lower[];
+EndIf
 If(apart)
   Physical Curve("punch_left") = upper[0]; Physical Curve("punch_right") = upper[1];
 Else

@@ -1,0 +1,87 @@
+"""Sheets of named contacts: two pads on a plate, each under a load of its own."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from fenwear import CaseError, assemble, make_case
+from fenwear.results.contacts import contact_text
+from fenwear.run import run_case
+from tests.bodies.test_parts import tables
+
+LOADS = {"left": -300.0, "right": -900.0}
+
+
+def two_pads(folder: Path, **parameters: float) -> dict[str, Any]:
+    found = tables(folder, apart=1.0, **parameters)
+    groups = [f"punch_{name}" for name in LOADS]
+    found["punch"]["supports"] = [{"on": group, "fix": ["x"]} for group in groups]
+    found["punch"]["loads"] = [{"on": g, "force": [0.0, f]} for g, f in zip(groups, LOADS.values(), strict=True)]
+    found["punch"]["no_turning_about"] = ["y"]
+    found["run"] = {"half_cycles": 40}
+    found["output"] = {}
+    return found
+
+
+def ran(found: dict[str, Any], folder: Path) -> dict[str, Any]:
+    folder = MPI.COMM_WORLD.bcast(folder)
+    summary, directory = run_case(make_case(found), "pads", folder, lambda _message: None)
+    MPI.COMM_WORLD.barrier()
+    assert json.loads((directory / "summary.json").read_text())["contacts"] == summary["contacts"]
+    return summary
+
+
+@pytest.mark.mpi
+def test_each_contact_has_its_own(tmp_path: Path) -> None:
+    """Each carries its load, and wears and rubs in proportion to it; together they are the whole."""
+    summary = ran(two_pads(tmp_path, named=1.0), tmp_path / "run")
+    contacts = summary["contacts"]
+    assert list(contacts) == ["left", "right"]
+    for name, load in LOADS.items():
+        assert contacts[name]["pressure_integral_N"] == pytest.approx(-load, rel=1e-9)
+        assert contacts[name]["contact_area_mm2"] <= 20 * (1 + 1e-12)
+    total = {key: sum(one[key] for one in contacts.values()) for key in ("pressure_integral_N", "friction_work_mJ")}
+    assert total["pressure_integral_N"] == pytest.approx(summary["sliding"]["pressure_integral_N"], rel=1e-9)
+    assert total["friction_work_mJ"] == pytest.approx(summary["sliding"]["friction_work_mJ"], rel=1e-9)
+    left, right = (contacts[name] for name in LOADS)
+    assert right["friction_work_mJ"] == pytest.approx(3 * left["friction_work_mJ"], rel=1e-9)
+    volumes = [one["punch"]["worn_volume_mm3"] for one in (left, right)]
+    assert sum(volumes) == pytest.approx(summary["punch"]["worn_volume_mm3"], rel=1e-12)
+    assert volumes[1] == pytest.approx(3 * volumes[0], rel=1e-9)  # k F s
+    assert right["punch"]["largest_depth_mm"] == summary["punch"]["largest_depth_mm"]
+    assert [one["punch"]["scar_width_1_percent_mm"] for one in (left, right)] == pytest.approx([2, 2])
+    assert left["punch"]["at_x_mm"] <= 2 < 4 <= right["punch"]["at_x_mm"]
+    text = contact_text(summary).splitlines()
+    assert text[0].split() == ["left", "right"]
+    assert text[1].split()[-2:] == ["300", "900"]
+
+
+@pytest.mark.mpi
+def test_names_change_nothing_else(tmp_path: Path) -> None:
+    """Motions have the contacts' names, as lambda_F_left; pressures are those of a contact without names."""
+    named, bare = (assemble(make_case(two_pads(tmp_path, named=k))) for k in (1.0, 0.0))
+    assert named.rigid.mode_names == ("lambda_F_left", "lambda_F_right")
+    assert bare.rigid.mode_names == ("lambda_F_1", "lambda_F_2")
+    np.testing.assert_array_equal(named.pair.punch.nodes_of("left"), named.pair.x < 3)
+    pressures = [one.contact((1,)).solve(one.pair.initial_gap).pressure for one in (named, bare)]
+    np.testing.assert_allclose(*pressures, rtol=1e-12)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("meet", "told"),
+    [
+        (1.0, "punch_contact_left and punch_contact_side share 1 nodes; expected named contacts that lie apart"),
+        (2.0, "has punch_contact and punch_contact_left, punch_contact_right, punch_contact_side; expected one or"),
+    ],
+)
+def test_contacts_that_overlap(meet: float, told: str, tmp_path: Path) -> None:
+    """They are refused by their names."""
+    with pytest.raises(CaseError, match=told):
+        assemble(make_case(two_pads(tmp_path, named=1.0, meet=meet)))

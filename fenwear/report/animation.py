@@ -11,6 +11,7 @@ import xarray
 
 from fenwear.report.course import directions_present, is_conforming, mean_pressure
 from fenwear.report.figures import FOLDER, read_history
+from fenwear.report.gaps import gaps_of, parted
 from fenwear.report.shapes import surfaces_of, worn_range
 from fenwear.report.style import (
     BODY_COLOURS,
@@ -47,7 +48,7 @@ class HistoryFrames:
     def __init__(self, history: xarray.Dataset, half_cycles: Sequence[int]) -> None:
         self.history = history
         self.figure: Figure
-        self._surfaces = surfaces_of(history)
+        self._surfaces, self._gaps = surfaces_of(history), gaps_of(history)
         self.figure, (self._above, *below) = panels(1 + len(self._surfaces), 2.4)
         self._pressure = {}
         for d in directions_present(history):
@@ -78,10 +79,11 @@ class HistoryFrames:
             if len(rows):
                 values = until.pressure.values[rows[-1]]
                 highest = max(highest, float(values.max()))
-                line.set_data(until.x.values, values)
+                line.set_data(*parted(until.x.values, values, self._gaps))
         self._above.set_ylim(0, 1.1 * highest)
         for body, (x, depth, _) in self._surfaces.items():
-            self._depths[body].set_data(x, 1e3 * depth.sel(half_cycle=slice(None, half_cycle)).values[-1])
+            worn = 1e3 * depth.sel(half_cycle=slice(None, half_cycle)).values[-1]
+            self._depths[body].set_data(*parted(x, worn, self._gaps))
         self._title.set_text(f"after half-cycle {half_cycle:,} of {int(self.history.half_cycle[-1]):,}")
 
 

@@ -16,6 +16,7 @@ from fenwear.report.compare_stick import has_stick, stick_comparison
 from fenwear.report.compare_surfaces import surface_comparison
 from fenwear.report.course import directions_present, mark_few
 from fenwear.report.figures import of_half_cycles
+from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
 from fenwear.report.shapes import worn_range
 from fenwear.report.style import (
@@ -228,6 +229,7 @@ def _plane_comparison(comparison: Comparison) -> Figure:
         ax.set_xlabel("half-cycle n")
     for ax in (*axes, *([] if strip is None else [strip])):
         legend_beside(ax, "run")
+    part_lines([figure], np.concatenate([gaps_of(history) for history in comparison.histories]))
     return figure
 
 

@@ -11,6 +11,7 @@ import xarray
 from fenwear.report.boundary import boundary_figure
 from fenwear.report.captions import caption
 from fenwear.report.figures import FOLDER, all_figures, read_history
+from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.key_numbers import read_case
 from fenwear.report.sections import geometry_figure, stress_figure
 from fenwear.report.style import STANDARD, Look
@@ -49,6 +50,7 @@ def draw_figures(
         drawn = all_figures(history, half_cycles, look) | field_figures(directory, read_case(directory), look)
     else:
         drawn = surface_figures(history, half_cycles, look)
+    part_lines(drawn.values(), gaps_of(history))
     folder.mkdir(exist_ok=True)
     paths = []
     for name, figure in drawn.items():

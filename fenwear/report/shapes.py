@@ -10,6 +10,7 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
+from fenwear.report.gaps import gaps_of, parted
 from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, panels, shades
 from fenwear.results.sheet import BODIES
 
@@ -97,7 +98,8 @@ def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
         shown = _told_apart(course)
         rows, values = np.append(0.0, course[shown]), np.vstack([np.zeros(len(x)), 1e3 * depth.values[shown]])
-        drawn = ax.pcolormesh(x, rows, values, shading="gouraud", cmap="Blues", vmin=0, rasterized=True)
+        at, values = parted(x, values, gaps_of(history))
+        drawn = ax.pcolormesh(at, rows, values, shading="gouraud", cmap="Blues", vmin=0, rasterized=True)
         bar = figure.colorbar(drawn, ax=ax)
         bar.set_label(f"worn depth of\nthe {body} (µm)", size=ax.yaxis.label.get_fontsize())
         bar.ax.tick_params(labelsize=ax.yaxis.label.get_fontsize())

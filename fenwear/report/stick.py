@@ -12,6 +12,7 @@ import xarray
 
 from fenwear.report import stick_heat, stick_maps
 from fenwear.report.figures import FOLDER
+from fenwear.report.gaps import gaps_of, part_lines, parted
 from fenwear.report.html_page import picture, render
 from fenwear.report.key_numbers import read_summary
 from fenwear.report.stick_course import course_axis, cycle_name, first_and_last, title, traction_panels
@@ -99,7 +100,9 @@ def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         cycle = history.isel(cycle=place)
         state = np.where(cycle.stick.values == 1, 2, np.where(cycle.pressure.values > 0, 1, 0))
         steps = np.arange(1, cycle.sizes["step"] + 1)
-        ax.pcolormesh(x, steps, state, cmap=ListedColormap(colours), vmin=0, vmax=2, shading="nearest", rasterized=True)
+        shades_of = ListedColormap(colours)
+        at, states = parted(x, state, gaps_of(history))
+        ax.pcolormesh(at, steps, states, cmap=shades_of, vmin=0, vmax=2, shading="nearest", rasterized=True)
         ax.set_ylabel(f"{title(history, place, look)}:\ntime step")
         for colour, name in ((BLUE, "stick"), (RED, "slip")):
             ax.plot([], [], marker="s", linestyle="", color=colour, label=name)
@@ -254,6 +257,7 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look:
         for name, (draw, caption, alt) in figures_of(history).items():
             path = folder / f"{name}.png"
             figure = draw(history, look)
+            part_lines([figure], gaps_of(history))
             figure.savefig(path, dpi=150)
             paths += [path, *further(figure, path, formats)]
             pictures.append(picture(path.read_bytes(), "png", caption, alt))

@@ -25,7 +25,7 @@ from fenwear.results import sheet, steps
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.scar import conforming
-from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, surface_columns
+from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, part_columns, surface_columns
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
@@ -126,7 +126,7 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
     pair = system.pair
     if system.case.model.kind != "plane":
-        return {**surface_columns(system), **steps.columns(system)}
+        return {**surface_columns(system), **part_columns(system, plane=False), **steps.columns(system)}
     arc = pair.punch.arc is not None
     text = "arc length along the contact" if arc else "position along the contact, from the centre of the geometry"
     columns = {
@@ -140,7 +140,7 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
         columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
     if arc:
         columns["place"] = Column(("x",), pair.punch.x[:, 0], {"units": "mm", "long_name": "x of the contact node"})
-    return {**columns, **steps.columns(system)}
+    return {**columns, **part_columns(system, plane=True), **steps.columns(system)}
 
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:

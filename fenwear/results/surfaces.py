@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
@@ -82,6 +84,31 @@ def columns_of_pair(pair: ContactPair, field: SlidingField, *, with_strip: bool)
     chart = sliding_chart(field, pair)
     columns = _columns(chart, pair.punch, "")
     return columns | _columns(chart, pair.strip, "_strip") if with_strip else columns
+
+
+def part_columns(placed: Placed, plane: bool) -> dict[str, Column]:
+    """Return the named contact that each node of the surfaces is of, and in the plane its part where there are more."""
+    ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.strip_wears else {})
+    found = {}
+    for end, surface in ends.items():
+        over = (f"{'x' if plane else 'node'}{end}",)
+        if surface.contact is not None:
+            flags = {"flag_values": np.arange(len(surface.names)), "flag_meanings": " ".join(surface.names)}
+            text = {"units": "1", "long_name": f"contact that each node of the {surface.body} belongs to"}
+            found[f"contact{end}"] = Column(over, surface.contact, {**text, **flags})
+        part = _parts(surface)
+        if plane and part.max() > 0:
+            text = {"units": "1", "long_name": f"part of the {surface.body}'s surface that each node belongs to"}
+            found[f"part{end}"] = Column(over, part, text)
+    return found
+
+
+def _parts(surface: ContactSurface) -> NDArray[np.int64]:
+    """Return the number of the connected part that each pressure node belongs to (n,)."""
+    cells, n = surface_cells(surface), len(surface.nodes)
+    first = np.repeat(cells[:, 0], cells.shape[1])
+    graph = csr_array((np.ones(cells.size), (first, cells.ravel())), shape=(n, n))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def coordinate_names(end: str, dim: int) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray
 from mpi4py import MPI
 
 from fenwear import CaseError, assemble, make_case
@@ -57,6 +58,10 @@ def test_each_contact_has_its_own(tmp_path: Path) -> None:
     assert right["punch"]["largest_depth_mm"] == summary["punch"]["largest_depth_mm"]
     assert [one["punch"]["scar_width_1_percent_mm"] for one in (left, right)] == pytest.approx([2, 2])
     assert left["punch"]["at_x_mm"] <= 2 < 4 <= right["punch"]["at_x_mm"]
+    with xarray.open_dataset(tmp_path / "run" / "history.nc", engine="h5netcdf") as history:
+        np.testing.assert_array_equal(history.contact, history.x > 3)
+        np.testing.assert_array_equal(history.part, history.x > 3)
+        assert history.contact.attrs["flag_meanings"] == "left right"
     text = contact_text(summary).splitlines()
     assert text[0].split() == ["left", "right"]
     assert text[1].split()[-2:] == ["300", "900"]

@@ -213,6 +213,12 @@ LINES = {
         for unit, shown in (("K", "K"), ("degC", "°C"))
         for name, when in (("max_temperature", "at the end"), ("largest_temperature", "over the run"))
     },
+    "heat_mJ.friction": Line("heat of friction in the last half-cycle", "J", 1e-3),
+    "heat_mJ.debris": Line("... carried off by debris", "J", 1e-3),
+    "heat_mJ.stored": Line("... gained by the bodies", "J", 1e-3),
+    "heat_mJ.convected": Line("... lost to the surroundings", "J", 1e-3),
+    "heat_mJ.held": Line("... lost where temperature is held", "J", 1e-3),
+    "heat_mJ.carried": Line("... carried out by the strip's material", "J", 1e-3),
     "largest_force_N": Line("largest tangential force in the last cycle", "N"),
     "largest_torque_N_mm": Line("largest torque in the last cycle", "N m", 1e-3),
     "largest_pressure_in_cycle_MPa": Line("largest pressure in it", "MPa"),
@@ -302,9 +308,10 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
         summary: Of a run, with what `sheet` gave.
     """
     bodies = [summary[body] for body in BODIES if body in summary]
+    heat = {f"heat_mJ.{term}": value for term, value in summary.get("heat_mJ", {}).items() if value}
     rows = []
     for key, line in LINES.items():
-        found = next(([one] for one in (summary.get("sliding", {}), summary) if key in one), bodies)
+        found = next(([one] for one in (summary.get("sliding", {}), heat, summary) if key in one), bodies)
         if any(key in one for one in found):
             rows.append((line.label, line.unit, [shown(one.get(key), line) for one in found]))
     return rows

@@ -16,7 +16,7 @@ from fenwear.case.templates import write_case_of
 from fenwear.cycle import Block, follow
 from fenwear.interface.placement import in_model
 from fenwear.results.reading import load_history
-from fenwear.results.sheet import sheet, sheet_text, values, variables
+from fenwear.results.sheet import sheet, sheet_rows, sheet_text, values, variables
 from fenwear.results.zone import without_noise
 from fenwear.run import run_case
 
@@ -261,3 +261,13 @@ def test_rounding_of_a_mesh_is_no_place() -> None:
     for size in (1e-3, 1.0, 1e3):
         places = size * np.array([[4e-9, -20.0, 1e-3], [-4e-9, 1.23456789, 0.0]])
         np.testing.assert_array_equal(without_noise(places, 40 * size), places * (np.abs(places) > 1e-6 * size))
+
+
+def test_where_the_heat_went() -> None:
+    """The heat of the last half-cycle, in J; what there is none of is not told."""
+    terms = {"friction": 7500.0, "debris": 3750.0, "stored": 3593.0, "convected": 157.0, "held": 0.0, "carried": 0.0}
+    rows = {label: values for label, unit, values in sheet_rows({"heat_mJ": terms}) if unit == "J"}
+    assert len(rows) == 4
+    made, *gone = (value for (value,) in rows.values())
+    assert made == 7.5
+    assert sum(gone) == pytest.approx(made, rel=1e-12)

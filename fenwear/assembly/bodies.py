@@ -91,7 +91,8 @@ class Bodies:
         """What is to be said of loads where supports hold what they push: nothing else feels them."""
         texts = []
         for body in (self.punch, self.strip):
-            lost = np.abs(body.swallowed) > SWALLOWED * np.abs(body.given).max(initial=0.0)
+            least = max(np.abs(body.given).max(initial=0.0), SWALLOWED * body.acting)
+            lost = np.abs(body.swallowed) > SWALLOWED * least
             names = ("x", "z") if body.dim == 2 else ("x", "y", "z")
             parts = [
                 f"{lost_force:.4g} of {force:.4g} N along {axis}"

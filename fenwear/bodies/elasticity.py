@@ -52,6 +52,7 @@ class ElasticBody:
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         given: Resultant of the loads (d,), N.
+        acting: Sum of the loads' sizes, N: of a moment, whose resultant is none, too.
         swallowed: What of it acts where supports hold that very component (d,), N: it reaches nothing else.
         operator: Name of how its contact surface answers to forces.
         setup: How it is condensed.
@@ -116,6 +117,7 @@ class ElasticBody:
         onto = [load.reshape(-1, self.dim).sum(axis=0), np.zeros(self.dim)]
         np.add.at(onto[1], self.supported % self.dim, load[self.supported])
         self.given, self.swallowed = (self.thickness * total(comm, part) for part in onto)
+        self.acting = float(self.thickness * total(comm, np.array([np.abs(load).sum()]))[0])
         load += self._moved_supports
         load[self.supported] = 0.0
         self.load = load
@@ -293,10 +295,49 @@ class ElasticBody:
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
             facets = compiled(measure(mesh, self.law.kind) * ds(tag))
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))
-            resultant = load.force if load.traction is None else [area * component for component in load.traction]
-            traction = np.array(resultant) / area
-            total += self.surface_integral(fem.Constant(mesh, traction.astype(PETSc.ScalarType)), tag)
+            even = load.traction or np.array(load.force or np.zeros(self.dim)) / area
+            traction: Any = fem.Constant(mesh, np.asarray(even, dtype=PETSc.ScalarType))
+            if load.through is not None or load.moment is not None:
+                traction += self._turning_traction(load, ds(tag), area)
+            total += self.surface_integral(traction, tag)
         return total
+
+    def _turning_traction(self, load: Load, ds: Any, area: float) -> Any:
+        """Return w x (x - c), whose moment about the centroid c of the facets is that of the load; collective.
+
+        The force acts through a point p: J w = M + (p - c) x F, J the facets' second moments of area about c.
+
+        Args:
+            load: Its resultant, the point and the moment.
+            ds: The facets' measure.
+            area: Theirs, mm².
+        """
+        mesh, x = self.body.mesh, ufl.SpatialCoordinate(self.body.mesh)
+
+        def integral(integrand: Any) -> float:
+            form = compiled(integrand * measure(mesh, self.law.kind) * ds)
+            return float(self.thickness * mesh.comm.allreduce(fem.assemble_scalar(form)))
+
+        centre = np.array([integral(x[i]) for i in range(self.dim)]) / area
+        arm = x - fem.Constant(mesh, centre.astype(PETSc.ScalarType))
+        turns = [ufl.as_vector(turn) for turn in _turned(arm, self.dim)]
+        second = np.array([[integral(ufl.inner(a, b)) for b in turns] for a in turns])
+        moment = np.array(load.moment or np.zeros(len(turns)))
+        if load.through is not None and load.force is not None:
+            lever = _turned(np.array(load.through) - centre, self.dim)
+            moment += np.array(lever, dtype=float) @ np.array(load.force)
+        spin = fem.Constant(mesh, np.linalg.solve(second, moment).astype(PETSc.ScalarType))
+        return sum((spin[k] * turn for k, turn in enumerate(turns)), start=0 * arm)
+
+
+def _turned(r: Any, dim: int) -> list[list[Any]]:
+    """Return e x r for each axis e about which bodies of `dim` dimensions turn, y in the plane.
+
+    Its product with a force F is e . (r x F), the moment of F at r about that axis.
+    """
+    if dim == 2:
+        return [[r[1], -r[0]]]
+    return [[0 * r[0], -r[2], r[1]], [r[2], 0 * r[0], -r[0]], [-r[1], r[0], 0 * r[0]]]
 
 
 def _quadrature(mesh: Mesh, degree: int) -> dict[str, int]:

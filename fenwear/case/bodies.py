@@ -13,6 +13,7 @@ from fenwear.case.quantities import (
     Forces,
     Kind,
     Length,
+    Moments,
     Number,
     Part,
     Point,
@@ -113,11 +114,20 @@ class Support(Part):
 
 
 class Load(Part):
-    """A load spread evenly over a named group: its resultant, or a traction; (x, z), in a solid (x, y, z)."""
+    """A load over a named group: its resultant, or a traction; (x, z), in a solid (x, y, z); and a moment.
+
+    It is spread evenly, or with a moment linearly: t = F / A + w x (x - c) with c the group's centroid.
+    """
 
     on: str = Field(description="group of the geometry")
     force: Forces | None = Field(default=None, description="resultant [x, z], in a solid [x, y, z], spread evenly")
     traction: Stresses | None = Field(default=None, description="or the traction itself")
+    through: Point | None = Field(
+        default=None, description="point [x, z], in a solid [x, y, z], that the force acts through; else the centroid"
+    )
+    moment: Moments | None = Field(
+        default=None, description="a moment besides, or alone: [about y], in a solid [about x, y, z]"
+    )
     over_cycle: tuple[tuple[Number, Number], ...] | None = Field(
         default=None,
         description="[fraction of the cycle, factor] pairs from 0 to 1: the load varies linearly between them",
@@ -125,13 +135,27 @@ class Load(Part):
 
     @model_validator(mode="after")
     def _one_kind(self) -> Self:
-        if (self.force is None) == (self.traction is None):
+        if self.force is not None and self.traction is not None:
             raise ValueError("give either force or traction")
+        if self.force is None and self.traction is None and self.moment is None:
+            raise ValueError("expected a force, a traction or a moment")
+        if self.through is not None and self.force is None:
+            raise ValueError("through: expected a force, which acts through this point")
         if self.over_cycle is not None:
             fractions = [fraction for fraction, _ in self.over_cycle]
             if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
                 raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
         return self
+
+    def moment_problems(self, key: str, model: str) -> list[str]:
+        """Return what of it does not go with a plane, an axisymmetric or a solid model."""
+        if model == "axisymmetric":
+            wrong = [name for name in ("through", "moment") if getattr(self, name) is not None]
+            return [f"{key}.{name}: expected none in rings: what acts on them is the same all around" for name in wrong]
+        told = {"plane": (1, "[about y]"), "solid": (3, "[about x, about y, about z]")}[model]
+        if self.moment is None or len(self.moment) == told[0]:
+            return []
+        return [f"{key}.moment: expected {told[0]} component(s) {told[1]} in a {model} model, got {len(self.moment)}"]
 
     def times(self, factor: float) -> Load:
         """Return the load times a factor at every time."""
@@ -151,11 +175,12 @@ class Load(Part):
         return self._scaled(float(np.diff(fractions) @ (factors[1:] + factors[:-1]) / 2))
 
     def _scaled(self, factor: float) -> Load:
-        force, traction = (
-            None if vector is None else tuple(factor * component for component in vector)
-            for vector in (self.force, self.traction)
-        )
-        return Load(on=self.on, force=force, traction=traction)
+        scaled = {
+            name: tuple(factor * component for component in vector)
+            for name in ("force", "traction", "moment")
+            if (vector := getattr(self, name)) is not None
+        }
+        return self.model_copy(update={**scaled, "over_cycle": None})
 
 
 class Prescribed(Part):

@@ -52,6 +52,7 @@ Kind = Literal["stress", "strain", "axisymmetric", "solid"]  # of a model: what 
 # With as many components as the model has axes.
 Point = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 Forces = Annotated[tuple[Force, ...], Field(min_length=2, max_length=3)]
+Moments = Annotated[tuple[Annotated[float, *quantity("N*mm")], ...], Field(min_length=1, max_length=3)]
 Stresses = Annotated[tuple[Stress, ...], Field(min_length=2, max_length=3)]
 
 

@@ -132,6 +132,8 @@ class Case(Part):
             for number, load in enumerate(part.loads):
                 vectors[f"{body}.loads.{number}.force"] = load.force
                 vectors[f"{body}.loads.{number}.traction"] = load.traction
+                vectors[f"{body}.loads.{number}.through"] = load.through
+                problems += load.moment_problems(f"{body}.loads.{number}", kind)
             problems += [
                 f"{key}: expected {len(axes)} components ({', '.join(axes)}) in a {kind} model, got {len(vector)}"
                 for key, vector in vectors.items()

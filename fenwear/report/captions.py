@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray
 
 from fenwear.report.style import Look, direction_words, strip_moves
-from fenwear.report.surface import model_of
+from fenwear.report.surface import model_of, surface_of
 from fenwear.results.sheet import BODIES
 
 TEXTS = {
@@ -68,10 +68,19 @@ OF_SURFACES = {  # of solids and rings
 }
 
 
+def _first_part(history: xarray.Dataset) -> str:
+    """Say which contact of a solid the cuts are of, where its parts lie behind each other."""
+    surface = surface_of(history) if model_of(history) == "solid" else None
+    if surface is None or not surface.overlaps:
+        return ""
+    return "Of the first part." if surface.contact is None else f"Of the contact {surface.contact[0]}."
+
+
 def caption(name: str, history: xarray.Dataset, look: Look) -> str:
     """Return the caption of a figure of a run."""
     if name not in TEXTS or model_of(history) != "plane":
-        return OF_SURFACES.get(name, name.replace("_", " "))
+        text = OF_SURFACES.get(name, name.replace("_", " "))
+        return f"{text} {_first_part(history)}".strip() if name.startswith("cuts") else text
     bodies = [body for body, end in BODIES.items() if f"wear{end}" in history]
     words, moves = direction_words(history), strip_moves(history)
     moving = "turning" if "turns" in moves else "moving"

@@ -122,6 +122,8 @@ def _map_panels(surface: Surface, count: int, look: Look) -> tuple[Figure, list[
         ax.set_visible(False)
     for ax in axes.ravel()[:count]:
         ax.add_collection(LineCollection(list(surface.border), colors=GREY, linewidths=0.8))
+        for name, (across, up) in surface.labels:
+            ax.text(across, up, name, ha="center", va="center", fontsize="small", color=GREY)
         ax.set_aspect("equal")
         ax.margins(0.03)
         ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from fenwear.arrays import Array
 
@@ -16,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.tri import Triangulation
 
 POINTS = 301  # along a cut
+BESIDE = 1.1  # of the parts' size: how far apart they are laid
 AXES = ("x", "y", "z")
 ARROWS = "→↗↑↖←↙↓↘"
 
@@ -35,6 +39,9 @@ class Surface:
         cells: Nodes around each part of the surface (f, 3 or 4).
         sliding: Places along and across the sliding (n, 2), mm.
         seen: The two axes that are left when it is seen along its normal.
+        contact: Name of the contact that each node belongs to (n,); None where it has none.
+
+    Parts that would lie over each other, as both faces of a disc, are laid beside each other on maps.
     """
 
     body: str
@@ -42,6 +49,25 @@ class Surface:
     cells: NDArray[np.int64]
     sliding: Array
     seen: tuple[int, int]
+    contact: NDArray[np.str_] | None = None
+
+    @cached_property
+    def part(self) -> NDArray[np.int64]:
+        """Number of the connected part that each node belongs to (n,)."""
+        first, n = np.repeat(self.cells[:, 0], self.cells.shape[1]), len(self.x)
+        graph = csr_array((np.ones(self.cells.size), (first, self.cells.ravel())), shape=(n, n))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+    @cached_property
+    def overlaps(self) -> bool:
+        """Whether two of its parts would lie over each other on a map."""
+        seen = self.x[:, list(self.seen)]
+        boxes = [
+            (seen[self.part == k].min(axis=0), seen[self.part == k].max(axis=0)) for k in range(self.part.max() + 1)
+        ]
+        return any(
+            (np.minimum(one[1], other[1]) > np.maximum(one[0], other[0])).all() for one, other in combinations(boxes, 2)
+        )
 
     @cached_property
     def triangles(self) -> NDArray[np.int64]:
@@ -51,12 +77,31 @@ class Surface:
     @cached_property
     def map(self) -> Array:
         """Coordinates on a map (n, 2), mm."""
-        return self.x[:, list(self.seen)]
+        seen = self.x[:, list(self.seen)].copy()
+        if self.overlaps:
+            seen[:, self._beside] += BESIDE * np.ptp(seen[:, self._beside]) * self.part
+        return seen
+
+    @cached_property
+    def _beside(self) -> int:
+        """The axis of the map along which parts are laid beside each other: the shorter one."""
+        return int(np.ptp(self.x[:, list(self.seen)], axis=0).argmin())
 
     @property
     def names(self) -> tuple[str, str]:
         """Names of the map's axes."""
-        return AXES[self.seen[0]], AXES[self.seen[1]]
+        first, second = (
+            AXES[axis] + (" of the first part" if self.overlaps and k == self._beside else "")
+            for k, axis in enumerate(self.seen)
+        )
+        return first, second
+
+    @cached_property
+    def labels(self) -> list[tuple[str, Array]]:
+        """Names of contacts and where they stand on the map (2,), mm: in the middle of their parts."""
+        if self.contact is None:
+            return []
+        return [(name, self.map[self.contact == name].mean(axis=0)) for name in np.unique(self.contact)]
 
     @cached_property
     def border(self) -> Array:
@@ -103,6 +148,7 @@ class Surface:
         size = np.ptp(self.sliding[self.triangles, 0], axis=1)
         whole = size < 0.5 * max(float(np.ptp(self.sliding[:, 0])), 1e-300)
         kept = self.triangles[whole] if whole.any() else self.triangles
+        kept = kept[self.part[kept[:, 0]] == 0] if self.overlaps else kept  # what lies behind cannot be seen, too
         plane = Triangulation(self.sliding[:, free], self.sliding[:, fixed], kept)
         places = np.linspace(self.sliding[:, free].min(), self.sliding[:, free].max(), POINTS)
         found: Any = LinearTriInterpolator(plane, values)(places, np.full(POINTS, at[fixed]))
@@ -117,7 +163,11 @@ def surface_of(history: xarray.Dataset, body: str = "punch") -> Surface:
     of_punch = np.column_stack([history[axis].values for axis in AXES])
     seen_along = int(np.argmin(np.ptp(of_punch, axis=0)))
     first, second = (k for k in range(3) if k != seen_along)
-    return Surface(body, x, history[f"facets{end}"].values, sliding, (first, second))
+    contact = None
+    if f"contact{end}" in history:
+        known = history[f"contact{end}"]
+        contact = np.array(known.attrs["flag_meanings"].split())[known.values]
+    return Surface(body, x, history[f"facets{end}"].values, sliding, (first, second), contact)
 
 
 def centre_of_wear(history: xarray.Dataset) -> Array:

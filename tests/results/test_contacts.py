@@ -11,7 +11,8 @@ import pytest
 import xarray
 from mpi4py import MPI
 
-from fenwear import CaseError, assemble, make_case
+from fenwear import CaseError, assemble, load_case, make_case
+from fenwear.report.surface import surface_of
 from fenwear.results.contacts import contact_text
 from fenwear.run import run_case
 from tests.bodies.test_parts import tables
@@ -90,3 +91,37 @@ def test_contacts_that_overlap(meet: float, told: str, tmp_path: Path) -> None:
     """They are refused by their names."""
     with pytest.raises(CaseError, match=told):
         assemble(make_case(two_pads(tmp_path, named=1.0, meet=meet)))
+
+
+COARSE = {"across": 2, "along": 3, "around": 12, "hub_elements": 1, "pad_layers": 1, "disc_layers": 2}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("back", [50, 40])
+def test_both_faces_of_a_disc(back: int, tmp_path: Path) -> None:
+    """Equal pads have the same pressures, node by node; a shorter one has the same load, and wears deeper."""
+    settings = [f"geometry.parameters.{name}={value}" for name, value in COARSE.items()]
+    case = load_case(
+        "disc-brake-two-pads", [*settings, f"geometry.parameters.back_angle={back}", "run.half_cycles=2000"]
+    )
+    summary, directory = run_case(case, "disc", tmp_path / "run", lambda _message: None, progress="none")
+    front, rear = summary["contacts"]["front"], summary["contacts"]["back"]
+    for one in (front, rear):
+        assert one["pressure_integral_N"] == pytest.approx(5000, rel=1e-9)
+        assert one["punch"]["worn_volume_mm3"] == pytest.approx(1e-5 * one["friction_work_mJ"] / 0.35 / 1e3, rel=1e-9)
+    with xarray.open_dataset(directory / "history.nc", engine="h5netcdf") as history:
+        names = np.array(history.contact.attrs["flag_meanings"].split())[history.contact.values]
+        surface, last = surface_of(history), history.isel(half_cycle=-1)
+        faces = [np.flatnonzero(names == name) for name in ("front", "back")]
+        if back == 50:
+            faces = [face[np.lexsort(np.round([history.y[face], history.x[face]], 6))] for face in faces]
+            pressures = [last.pressure.values[face] for face in faces]
+            np.testing.assert_allclose(*pressures, rtol=1e-7)
+        else:
+            assert rear["punch"]["largest_depth_mm"] > 1.1 * front["punch"]["largest_depth_mm"]
+        assert surface.overlaps
+        spans = [(surface.map[face].min(axis=0), surface.map[face].max(axis=0)) for face in faces]
+        assert max(low[0] for low, _ in spans) > min(high[0] for _, high in spans)  # beside each other
+    text = (directory / "figures" / "captions.txt").read_text()
+    assert "Of the contact" in text
+    assert (directory / "report.html").is_file()

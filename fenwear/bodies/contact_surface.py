@@ -10,8 +10,10 @@ is zero there: no pressure lives on it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from typing import Any
 
 import basix
@@ -215,6 +217,9 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
         body: The body.
         space: Vector Lagrange space of the displacement.
         measure: Of the surface by that of the mesh, in UFL: 2 pi r for axisymmetric bodies.
+
+    Raises:
+        CaseError: two named contacts meet.
     """
     mesh, fdim = body.mesh, body.mesh.topology.dim - 1
     degree, dim = space.ufl_element().degree, mesh.geometry.dim
@@ -245,6 +250,7 @@ def contact_surface(body: BodyMesh, space: fem.FunctionSpace, measure: Any = 1.0
         surface = ContactSurface(body.name, trace, facets, cell, degree, nodes, weights[nodes], outward[nodes], spread)
         surface = replace(surface, arc=None if arc is None else arc[order])
     if body.contacts:
+        _check_apart(body, [np.unique(facets[contact == k]) for k in range(len(body.contacts))])
         of_trace = np.zeros(len(trace), dtype=np.int64)
         of_trace[facets] = contact[:, None]
         surface = replace(surface, names=tuple(body.contacts), contact=of_trace[surface.nodes])
@@ -296,6 +302,14 @@ def _contact_numbers(body: BodyMesh) -> NDArray[np.int64]:
     for k, named in enumerate(body.contacts.values()):
         number[np.isin(facets, named)] = k
     return number
+
+
+def _check_apart(body: BodyMesh, nodes: Sequence[NDArray[np.int64]]) -> None:
+    """Raise where two named contacts, with these trace nodes, meet: a node has to belong to one of them."""
+    for (first, own), (second, other) in combinations(zip(body.contacts, nodes, strict=True), 2):
+        if len(both := np.intersect1d(own, other)):
+            text = f"shares {len(both)} nodes with {body.name}_contact_{second}; expected named contacts that lie apart"
+            raise CaseError(InputError(f"{body.name}_contact_{first}", text))
 
 
 def _in_reference_order(local: NDArray[np.int32], points: Array, cell: str, degree: int) -> NDArray[np.int64]:

@@ -13,7 +13,6 @@ import difflib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -95,7 +94,7 @@ def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]
             raise CaseError(InputError(group, f"no facet on the boundary of the {name} belongs to it"))
         facets.append(found)
         values.append(np.full(len(found), tag, dtype=np.int32))
-    if f"{name}_contact" not in groups:
+    if f"{name}_contact" not in groups and not any(_contact_name(name, group) for group in groups):
         raise CaseError(InputError(f"{name}_contact", f"missing, but required{_known(groups)}"))
     order = np.argsort(np.concatenate(facets), kind="stable")
     every, first = np.unique(np.concatenate(facets)[order], return_index=True)
@@ -103,7 +102,7 @@ def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]
     cells = np.arange(mesh.topology.index_map(fdim + 1).size_local, dtype=np.int32)
     cell_tags = meshtags(mesh, fdim + 1, cells, np.ones(len(cells), dtype=np.int32))
     curves = {group: tag for tag, group in enumerate(groups, start=1)}
-    return BodyMesh(name, mesh, cell_tags, facet_tags, {f"{name}_body": 1}, curves, {})
+    return _with_contacts(BodyMesh(name, mesh, cell_tags, facet_tags, {f"{name}_body": 1}, curves, {}))
 
 
 def _known(groups: object) -> str:
@@ -343,7 +342,6 @@ def _check_groups(gmsh: Any, path: Path, kind: Kind) -> None:
             problems.append(
                 f"{path.name} has {body}_contact and {', '.join(sorted(named))}; expected one or the others"
             )
-        problems += _shared(gmsh, path, whole - 1, named)
     if problems and whole == 2 and any(name.startswith(BODIES) for name in _groups(gmsh, 3)):
         problems.append(f"{path.name} has physical volumes: expected model.kind = 'solid' with it")
     for dim in (whole, whole - 1):
@@ -367,17 +365,6 @@ def _contact_name(body: str, group: str) -> str:
     """Return NAME of a group BODY_contact_NAME, "" of any other."""
     head, _, name = group.partition(f"{body}_contact_")
     return "" if head else name
-
-
-def _shared(gmsh: Any, path: Path, dim: int, named: list[str]) -> list[str]:
-    """Return in words which named contacts meet: what a node carries has to belong to one of them."""
-    groups = _groups(gmsh, dim)
-    nodes = {name: gmsh.model.mesh.getNodesForPhysicalGroup(dim, groups[name])[0] for name in sorted(named)}
-    return [
-        f"{path.name}: {first} and {second} share {len(both)} nodes; expected named contacts that lie apart"
-        for first, second in combinations(nodes, 2)
-        if len(both := np.intersect1d(nodes[first], nodes[second]))
-    ]
 
 
 def _element_types(gmsh: Any, dim: int, tag: int) -> set[int]:

@@ -83,7 +83,7 @@ def test_names_change_nothing_else(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("meet", "told"),
     [
-        (1.0, "punch_contact_left and punch_contact_side share 1 nodes; expected named contacts that lie apart"),
+        (1.0, "punch_contact_left: shares 1 nodes with punch_contact_side; expected named contacts that lie apart"),
         (2.0, "has punch_contact and punch_contact_left, punch_contact_right, punch_contact_side; expected one or"),
     ],
 )

@@ -56,9 +56,7 @@ def _split(arguments: list[str]) -> tuple[list[str], list[str]]:
 
 
 def _call(arguments: list[str], comm: MPI.Comm) -> int:
-    import typer
-
-    from fenwear.cli import UsageError, app
+    from fenwear.cli import UsageError, app, typer
     from fenwear.signals import ignore_from_now_on
 
     try:

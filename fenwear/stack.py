@@ -55,6 +55,19 @@ def importing() -> Iterator[None]:
         raise StackError(f"a library is missing ({error}): on Debian, gmsh needs {LIBRARIES}") from error
 
 
+@contextmanager
+def without(package: str) -> Iterator[None]:
+    """Let what is imported meanwhile go without a package that it would load if it were there."""
+    loaded = package in sys.modules
+    if not loaded:
+        sys.modules[package] = None  # type: ignore[assignment]  # importing it fails, as where it is missing
+    try:
+        yield
+    finally:
+        if not loaded:
+            del sys.modules[package]
+
+
 def check_numbers() -> None:
     """Make sure that PETSc computes with real numbers.
 

@@ -1,7 +1,12 @@
 """The command line: parses, calls, prints; nothing else."""
 
+from fenwear.stack import without
+
+with without("rich"):  # typer would load it to draw boxes that are drawn nowhere: a tenth of a second of each command
+    import typer
+
 # In the order in which the help lists their commands.
 from fenwear.cli import cases, states, shape, folders, studies, about  # noqa: I001
 from fenwear.cli.base import UsageError, app
 
-__all__ = ["UsageError", "about", "app", "cases", "folders", "shape", "states", "studies"]
+__all__ = ["UsageError", "about", "app", "cases", "folders", "shape", "states", "studies", "typer"]

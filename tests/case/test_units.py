@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from fenwear.case.units import convert, quantity_text
+from fenwear.case.units import USUAL_UNITS, convert, quantity_text, registry
 
 
 @pytest.mark.parametrize(
@@ -81,3 +81,16 @@ def test_text_reads_back_to_the_last_bit(value: float) -> None:
 def test_units_as_results_have_them(written: str, unit: str, value: float) -> None:
     """The units that history.nc and exports write are read as they stand."""
     assert convert(written, unit) == pytest.approx(value, rel=1e-12)
+
+
+def test_usual_units_are_those_of_the_whole_list() -> None:
+    """Every prefix with every unit, so that none means another one there."""
+    lines = [line.split("=") for line in USUAL_UNITS.splitlines() if line]
+    names = [[part.strip() for part in (line[0], *line[2:])] for line in lines]
+    prefixes = [name.removesuffix("-") for group in names for name in group if name.endswith("-")]
+    known = [name for group in names for name in group if not name.endswith("-")]
+    usual, whole = registry(usual=True), registry(usual=False)
+    for name in [*known, *(f"{prefix}{unit}" for prefix in prefixes for unit in known if "C" not in unit)]:
+        there = [one.Quantity(3.0, one.parse_units(name)).to_root_units() for one in (usual, whole)]
+        assert f"{there[0].units:C}" == f"{there[1].units:C}", name
+        assert there[0].magnitude == pytest.approx(there[1].magnitude, rel=1e-14), name

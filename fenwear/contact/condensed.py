@@ -154,7 +154,8 @@ class CondensedContact:
         self._elastic: Operator | None = None
         self._operator: Operator | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
-        self.inequality = Inequality(lower, np.full(m * size, np.inf), self._residual, self._jacobian, PREFIX, NAME)
+        upper, functions = np.full(m * size, np.inf), (self._residual, self._jacobian)
+        self.inequality = Inequality(lower, upper, *functions, PREFIX, NAME, self._rounding)
 
     def _slide(self, phases: Iterable[int]) -> None:
         """Take the friction of phases."""
@@ -217,6 +218,13 @@ class CondensedContact:
             pressure = x.reshape(m, -1)[:, :n] * self._pressure_scale
             f.reshape(m, -1)[:, :n] += self._wearing.opening(pressure) / self._gap_scale
         return f
+
+    def _rounding(self) -> float:
+        """Return what a step wears at the mean pressure over the elastic gap: thousands where bodies are stiff."""
+        if self._wearing is None:
+            return 1.0
+        mean = np.full(self.shape, self._pressure_scale)
+        return float(np.abs(self._wearing.opening(mean)).max()) / self._gap_scale
 
     @property
     def _linear(self) -> Operator:

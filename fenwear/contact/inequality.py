@@ -25,6 +25,7 @@ from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
+EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 
 
@@ -84,6 +85,8 @@ class Inequality:
         jacobian: Returns dF/dx as an operator; the same object as before where it has not changed.
         prefix: Of the PETSc options.
         name: What is solved, for error messages.
+        rounding: Returns how large the parts are that the residual adds up, which leave that much rounding; asked for
+            where Newton's method has not come to `TOLERANCE` at once.
 
     Attributes:
         iterations: Newton iterations of the last solve.
@@ -98,11 +101,12 @@ class Inequality:
         jacobian: Callable[[Array], Operator],
         prefix: str,
         name: str,
+        rounding: Callable[[], float] = lambda: 1.0,
     ) -> None:
         self.iterations = 0
         self.residual: Array = np.zeros(len(lower))
         self.name = name
-        self._function, self._jacobian, self._prefix = residual, jacobian, prefix
+        self._function, self._jacobian, self._prefix, self._rounding = residual, jacobian, prefix, rounding
         self._lower, self._upper = lower, upper
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: _Kept | None = None
@@ -192,7 +196,7 @@ class Inequality:
             for iteration in range(STEPS + 1):
                 f = self._function(x)
                 rest = f[kept.free]
-                if rest @ rest < TOLERANCE**2:
+                if rest @ rest < (self._tolerance if iteration > 1 else TOLERANCE) ** 2:
                     break
                 if iteration == STEPS or (iteration and self._free(x) != key):
                     return None
@@ -207,6 +211,11 @@ class Inequality:
             return None
         self.iterations, self.residual = iteration, f
         return x
+
+    @property
+    def _tolerance(self) -> float:
+        """Of the residual, where rounding leaves more than `TOLERANCE`."""
+        return max(TOLERANCE, EPSILON * self._rounding())
 
     def _free(self, x: Array) -> bytes:
         """Return which unknowns are within their bounds, as bytes."""
@@ -226,6 +235,7 @@ class Inequality:
         snes = self._searching if line_search else self._full_steps
         x: Array = start.copy()
         self.singular = False
+        snes.setTolerances(atol=self._tolerance)
         try:
             snes.solve(None, PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF))
         except (np.linalg.LinAlgError, PETSc.Error) as error:  # PETSc passes on what its callbacks raise, or wraps it
@@ -268,6 +278,7 @@ class _Solver:
     def setUp(self, pc: PETSc.PC) -> None:
         """Take the factor; a set without one ends SNES: what is raised in here may bring petsc4py down."""
         context = pc.getOperators()[1].getPythonContext()
+        pc.setFailedReason(PETSc.PC.FailedReason.NOERROR)  # else a set without a factor would end all later solves
         try:
             self.solve = context.inequality.factor(context.kept)
         except np.linalg.LinAlgError:

@@ -17,6 +17,7 @@ from fenwear.contact.krylov import NotSolvedError, iterative
 Indices = NDArray[np.int32]
 Solve = Callable[[Array], Array]
 SINGULAR = 1e-14  # of the largest entry: a pivot that is rounding
+TINY = 1e-300
 LARGE = 300  # unknowns above which a factor follows its set; below it a new one costs as little
 UPDATES = 0.1  # of the unknowns of a factor: what may have come and gone before a new one is made
 ITERATED = 1000  # unknowns from which on a set that is far from the factor's may be solved by iterations
@@ -248,10 +249,29 @@ def eliminate(matrix: Array) -> Solve:
         return np.zeros_like
     lu, pivots, _ = dgetrf(matrix)
     if not np.abs(np.diagonal(lu)).min() > SINGULAR * np.abs(matrix).max():
-        raise np.linalg.LinAlgError("singular matrix")
+        return _equilibrated(matrix)
 
     def solve(b: Array) -> Array:
         x: Array = dgetrs(lu, pivots, b)[0]
+        return x
+
+    return solve
+
+
+def _equilibrated(matrix: Array) -> Solve:
+    """Return the same by a matrix whose rows and columns are scaled to 1.
+
+    Where steps wear far more than bodies give way, as rigid ones do, a pivot of the balance of forces is small against
+    the wear of a node, and no rounding.
+    """
+    row = 1 / np.maximum(np.abs(matrix).max(axis=1), TINY)
+    column = 1 / np.maximum((np.abs(matrix) * row[:, None]).max(axis=0), TINY)
+    lu, pivots, _ = dgetrf(row[:, None] * matrix * column)
+    if not np.abs(np.diagonal(lu)).min() > SINGULAR:
+        raise np.linalg.LinAlgError("singular matrix")
+
+    def solve(b: Array) -> Array:
+        x: Array = (dgetrs(lu, pivots, (b.T * row).T)[0].T * column).T
         return x
 
     return solve

@@ -141,6 +141,22 @@ def test_a_singular_set_is_told(kept_first: bool, near: bool) -> None:
         offset[:2] = -1.0
     with pytest.raises(ConvergenceError, match="the test did not converge: its Jacobian is singular"):
         solver.solve(np.ones(3), near=near)
+    offset[:2] = 1.0  # and what has a solution afterwards is solved
+    np.testing.assert_allclose(solver.solve(np.array([0.0, 0.0, 0.5])), [0, 0, 1], atol=1e-14)
+
+
+def test_large_parts_leave_rounding() -> None:
+    """A balance beside nodes that wear ten million times what they give way: solved, and not taken for singular."""
+    wear, n = 1e10, 4
+    matrix = np.zeros((n + 1, n + 1))
+    matrix[:n, :n] = compliance(n, 0.0, 1)[0] + wear * np.eye(n)
+    matrix[:n, n], matrix[n, :n] = 1.0, 1e-6
+    offset = np.append(0.3 * wear * np.arange(n), -1e-6)
+    operator, bounds = Dense(matrix), np.append(np.zeros(n), -np.inf)
+    parts = (lambda x: operator.multiply(x) + offset, lambda _: operator, "test_", "the test")
+    solver = Inequality(bounds, np.full(n + 1, np.inf), *parts, lambda: wear)
+    x = solver.solve(np.append(np.ones(n), 0.0))
+    np.testing.assert_allclose(x[:n], np.array([19, 10, 1, 0]) / 30, atol=1e-6)  # 1 in all, up to one level
 
 
 @given(SEEDS, st.integers(30, 90))

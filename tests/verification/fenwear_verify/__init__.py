@@ -1,6 +1,7 @@
 """Problems whose answer is known, solved by fenwear and compared: exact solutions and published results."""
 
 from fenwear_verify import (
+    bores,
     conduction,
     contact,
     curved,
@@ -31,6 +32,7 @@ __all__ = [
     "Result",
     "Row",
     "VerificationCase",
+    "bores",
     "conduction",
     "contact",
     "curved",

@@ -102,6 +102,7 @@ def run_case(
         OutputError: a file cannot be written; what was written before it is whole.
     """
     begin = time.perf_counter()
+    log = case.names.telling(log)
     found = decided(case, log, comm, heat=preparation_of(case), fresh=fresh)
     for line in found.system.bodies.solved_by:
         log(line)
@@ -137,7 +138,8 @@ def _run(
         warnings = [*run.all_warnings(), *run.watch.warnings(), *run.told_at_the_end()]
         seconds = time.perf_counter() - begin
         ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
-        return run.finish({**ended, "warnings": warnings, "retries": run.remedies}, report=report)
+        said = [system.names.told(text) for text in warnings]
+        return run.finish({**ended, "warnings": said, "retries": run.remedies}, report=report)
 
     with noted as signals:
         try:

@@ -18,6 +18,7 @@ from fenwear.bodies.operators import check_operators
 from fenwear.bodies.regions import contact_regions
 from fenwear.bodies.shape import follow_wear, movable_surface
 from fenwear.case import Body, Case
+from fenwear.case.names import told_by_name
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
 from fenwear.interface import pair
@@ -115,6 +116,7 @@ class Bodies:
         return replace(self, punch=punch, strip=strip)
 
 
+@told_by_name
 def build_bodies(
     case: Case,
     comm: MPI.Comm = MPI.COMM_WORLD,
@@ -136,7 +138,8 @@ def build_bodies(
     """
     check_operators(case)
     release(comm)  # what earlier systems have left
-    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, _owners(case, comm), case.diffusion)
+    known, owners = case.diffusion, _owners(case, comm)
+    meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, owners, known, case.names)
     moved = None if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (

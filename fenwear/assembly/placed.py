@@ -15,6 +15,7 @@ from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
+from fenwear.case.names import BY_ROLE, Names, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.passage import Passage
 from fenwear.interface import (
@@ -125,6 +126,11 @@ class Placed:
         if self.made_from is None:
             raise CaseError(InputError("", "expected bodies made from a case: those made in Python have none"))
         return self.made_from
+
+    @property
+    def names(self) -> Names:
+        """What the bodies are called."""
+        return BY_ROLE if self.made_from is None else self.made_from.names
 
     @property
     def motion(self) -> Motion:
@@ -321,6 +327,7 @@ class Placed:
         """The wear of all phases at the mean pressure and the initial temperature."""
         return self.wear.phases([self.conditions(k) for k in range(len(self.motion.phases))])
 
+    @told_by_name
     def optimum(self, direction: int, zone: Mask | None = None) -> Optimum:
         """Return the optimal pressure and wear velocity of one-way sliding at the mean wear rate.
 
@@ -358,6 +365,7 @@ class Placed:
         return optimum(self.rigid, ratio, WearRates((recession(some) / law.value(some),), laws), zone)
 
 
+@told_by_name
 def place(
     bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, solver: str = "condensed", case: Case | None = None
 ) -> Placed:
@@ -417,6 +425,7 @@ def place(
     return placed
 
 
+@told_by_name
 def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, case: Case | None = None) -> Placed:
     """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
 

@@ -22,6 +22,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator, operators_for
 from fenwear.bodies.response import Request, identity
 from fenwear.case import CONDENSED
+from fenwear.case.names import told_by_name
 from fenwear.case.program import speeds_of
 from fenwear.contact import CondensedContact, ContactSolver, SlidingContact
 from fenwear.contact.full import FullContact
@@ -131,6 +132,7 @@ class Tribosystem(Placed):
             return FullContact(self.bodies.punch, self.bodies.strip, phases[0].interface, phases[0].friction_ratio)
         return CondensedContact(phases, self.remedies, self.team)
 
+    @told_by_name
     def check_touching(self) -> None:
         """Make sure that the surfaces touch in some phase; collective.
 

@@ -1,10 +1,10 @@
 """gmsh geometry to distributed meshes, one for each body, with their named groups.
 
-The contract of a geometry, a .geo or a .msh: physical groups whose names start with the body they
-belong to, punch_ or strip_; surfaces are the material regions; punch_contact and strip_contact are
-the curves that meet, or several of them each with a name of its own, punch_contact_NAME; further curves
-and points are for supports, loads and thermal conditions. In a solid the regions are volumes and what
-meets are surfaces. An axisymmetric model has r along x.
+The contract of a geometry, a .geo or a .msh: physical groups whose names start with the body they belong to, punch_
+or strip_, or with the name that the case gives it; surfaces are the material regions; punch_contact and strip_contact
+are the curves that meet, or several of them each with a name of its own, punch_contact_NAME; further curves and points
+are for supports, loads and thermal conditions. In a solid the regions are volumes and what meets are surfaces. An
+axisymmetric model has r along x.
 """
 
 from __future__ import annotations
@@ -27,12 +27,13 @@ from fenwear.arrays import Array, Mask
 from fenwear.bodies.constants import constants
 from fenwear.bodies.mesh_check import element_problems
 from fenwear.case import Geometry, Kind
+from fenwear.case.names import BY_ROLE, ROLES, Names
 from fenwear.errors import CaseError, InputError, OutputError
 from fenwear.memory import free_memory, memory_size
 from fenwear.parallel import on_root
 from fenwear.stack import importing
 
-BODIES = ("punch", "strip")
+BODIES = ROLES
 ENTITIES = ("point", "curve", "surface", "volume")  # gmsh's words for groups of dimension 0 to 3
 TRIANGLE = 2  # gmsh's number of the cell
 MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, forces of three directions
@@ -145,6 +146,7 @@ def build_meshes(
     kind: Kind = "stress",
     owners: tuple[int, int] | None = None,
     known: Mapping[str, float] = NOTHING,
+    names: Names = BY_ROLE,
 ) -> tuple[BodyMesh, BodyMesh]:
     """Mesh the geometry and distribute it: the punch and the strip; collective.
 
@@ -155,6 +157,7 @@ def build_meshes(
         kind: Of the model: solids are meshed in volumes.
         owners: The ranks that have the whole punch and the whole strip; by default all have parts of both.
         known: Values of parameters that a geometry may have and does not set itself.
+        names: Of the bodies, which its groups may start with.
 
     Raises:
         CaseError: the geometry cannot be read or meshed, or a group of the contract is missing.
@@ -169,7 +172,7 @@ def build_meshes(
     owned = owners or (None, None)
     if comm.rank == 0:
         with _gmsh() as gmsh:
-            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind, known))
+            on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind, known, names))
             punch, strip = (_distribute(gmsh, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     else:
         on_root(comm, lambda: None)
@@ -187,6 +190,7 @@ def write_msh(
     path: Path,
     kind: Kind = "stress",
     known: Mapping[str, float] = NOTHING,
+    names: Names = BY_ROLE,
 ) -> None:
     """Mesh the geometry and write it as a .msh file (format 4.1); on one rank.
 
@@ -195,7 +199,8 @@ def write_msh(
         OutputError: there is no room for it.
     """
     with _gmsh() as gmsh:
-        _load(gmsh, geometry, find_geometry(geometry, folder), kind, known)
+        _load(gmsh, geometry, find_geometry(geometry, folder), kind, known, names)
+        _name_groups(gmsh, names.by_name)
         try:
             path.touch()
         except OSError as error:
@@ -235,8 +240,8 @@ def _gmsh() -> Iterator[Any]:
             gmsh.finalize()
 
 
-def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[str, float]) -> None:
-    """Read and mesh the geometry in the current gmsh model, and check the contract."""
+def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[str, float], names: Names) -> None:
+    """Read and mesh the geometry in the current gmsh model, name its groups by roles, and check the contract."""
     gmsh.parser.clear()
     defined = _checked_parameters(geometry, path)
     asked_for = {name: value for name, value in known.items() if name in defined}
@@ -246,6 +251,7 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[
     too_large = ""
     try:
         _merge(gmsh, path)
+        _by_roles(gmsh, path, names)
         if path.suffix == ".geo":
             if kind == "solid":
                 gmsh.model.mesh.generate(2)
@@ -256,11 +262,35 @@ def _load(gmsh: Any, geometry: Geometry, path: Path, kind: Kind, known: Mapping[
                 factor = gmsh.option.getNumber(SCALING)  # gmsh itself would apply it to files alone
                 gmsh.model.mesh.affineTransform([factor, 0, 0, 0, 0, factor, 0, 0, 0, 0, factor, 0])
                 gmsh.option.setNumber(SCALING, 1.0)
+    except CaseError:
+        raise
     except Exception as error:  # gmsh raises bare Exception only
         raise CaseError(InputError("geometry.file", f"gmsh on {path.name}: {error}")) from None
     if too_large:
         raise CaseError(InputError("geometry", too_large))
     _check_groups(gmsh, path, kind)
+
+
+def _by_roles(gmsh: Any, path: Path, names: Names) -> None:
+    """Name the groups of bodies by their roles.
+
+    Raises:
+        CaseError: a body has groups of both names.
+    """
+    groups = {name for dim in range(4) for name in _groups(gmsh, dim)}
+    both = sorted(f"{name} and {names.by_role(name)}" for name in groups if {names.by_role(name)} & (groups - {name}))
+    if both:
+        raise CaseError(InputError("geometry.file", f"{path.name} has {', '.join(both)}: expected one of each"))
+    _name_groups(gmsh, names.by_role)
+
+
+def _name_groups(gmsh: Any, change: Callable[[str], str]) -> None:
+    """Give the groups of the current gmsh model other names."""
+    for dim in range(4):
+        for name, tag in _groups(gmsh, dim).items():
+            if (new := change(name)) != name:
+                gmsh.model.removePhysicalName(name)
+                gmsh.model.setPhysicalName(dim, tag, new)
 
 
 def _too_large(gmsh: Any, geometry: Geometry) -> str:

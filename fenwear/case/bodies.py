@@ -204,6 +204,11 @@ class Profile(Part):
 class Body(Part):
     """One body: the material of each of its regions, its supports, loads and held temperatures."""
 
+    name: str | None = Field(
+        default=None,
+        description="what the body is called in messages, results and reports, such as 'pad'; its groups in the "
+        "geometry may start with it, pad_contact. By default punch or strip",
+    )
     regions: dict[str, str] = Field(default={}, description="name of the material of each region")
     supports: tuple[Support, ...] = Field(default=(), description="where displacement is held")
     loads: tuple[Load, ...] = Field(default=(), description="forces on the body")

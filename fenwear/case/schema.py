@@ -20,6 +20,7 @@ from fenwear.case.diffusion import diffusion_of
 from fenwear.case.laws import Contact, Dependence, Stick, Wear
 from fenwear.case.materials import Material
 from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
+from fenwear.case.names import Names, renamed
 from fenwear.case.quantities import Part
 from fenwear.case.setup import Setup
 from fenwear.case.thermal import Heat
@@ -69,9 +70,19 @@ class Case(Part):
     _written: Written = Written()
     _diffusion: dict[str, float] | None = None  # of a stage: that of its program
 
+    @model_validator(mode="before")
+    @classmethod
+    def _groups_by_role(cls, data: Any) -> Any:
+        """Return the tables with groups of the geometry by the bodies' roles; see `names`."""
+        if not isinstance(data, Mapping):
+            return data
+        names = Names.of(data)
+        return renamed(data, names.by_role) if names.given and not names.problems else data
+
     @model_validator(mode="after")
     def _materials_known(self) -> Self:
-        problems = [
+        problems = [*self.names.problems]
+        problems += [
             f"{body}.regions.{region}: no material {name!r}; known are {', '.join(sorted(self.materials))}"
             for body, part in (("punch", self.punch), ("strip", self.strip))
             for region, name in part.regions.items()
@@ -102,7 +113,7 @@ class Case(Part):
                 "punch.loads: expected at least one load that presses the punch on the strip, or a support moved `by`"
             )
         if problems:
-            raise ValueError("\n".join(problems))
+            raise ValueError(self.names.told("\n".join(problems)))
         return self
 
     def _operator_problems(self) -> list[str]:
@@ -151,6 +162,11 @@ class Case(Part):
         if kind != "plane" and self.contact.solver == "full" and not self.sticks:
             problems.append("contact.solver: expected 'condensed' but in plane models and with contact.law = 'coulomb'")
         return problems
+
+    @property
+    def names(self) -> Names:
+        """What the bodies are called."""
+        return Names(self.punch.name or "punch", self.strip.name or "strip")
 
     @property
     def in_degrees(self) -> bool:
@@ -366,7 +382,7 @@ class Case(Part):
                 data["wear"][body] = law.resolved(data["wear"][body])
         if self.geometry.follow_wear is None:
             data["geometry"]["follow_wear"] = "never"
-        return data
+        return dict(renamed(data, self.names.by_name)) if self.names.given else data
 
     def to_toml(self) -> str:
         """Return the resolved case as a case file that reads back as the same case, without keys that say nothing."""

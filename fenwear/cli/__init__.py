@@ -7,6 +7,6 @@ with without("rich"):  # typer would load it to draw boxes that are drawn nowher
 
 # In the order in which the help lists their commands.
 from fenwear.cli import cases, states, shape, folders, studies, about  # noqa: I001
-from fenwear.cli.base import UsageError, app
+from fenwear.cli.base import UsageError, app, told
 
-__all__ = ["UsageError", "about", "app", "cases", "folders", "shape", "states", "studies", "typer"]
+__all__ = ["UsageError", "about", "app", "cases", "folders", "shape", "states", "studies", "told", "typer"]

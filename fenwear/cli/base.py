@@ -10,6 +10,7 @@ import typer
 from mpi4py import MPI
 
 from fenwear.case import Case, load_case
+from fenwear.case.names import BY_ROLE
 from fenwear.cli import suggestions
 from fenwear.parallel import on_root
 
@@ -46,14 +47,25 @@ FreshOption = Annotated[bool, typer.Option("--fresh", help="Set up anew, whateve
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 
 
+class _Spoken:
+    """What the case that a command has read calls its bodies: all that it prints for people has these names."""
+
+    names = BY_ROLE
+
+
+def told(text: str) -> str:
+    """Return a text with the names of the bodies."""
+    return _Spoken.names.told(text)
+
+
 def log(message: str) -> None:
     """Print to standard error; every rank but 0 has it closed."""
-    _write(sys.stderr, message)
+    _write(sys.stderr, told(message))
 
 
 def show(text: str) -> None:
     """Print what was asked for to standard output."""
-    _write(sys.stdout, text)
+    _write(sys.stdout, told(text))
 
 
 def _write(stream: TextIO, text: str) -> None:
@@ -65,9 +77,15 @@ def _write(stream: TextIO, text: str) -> None:
 def load(case: str, settings: list[str]) -> Case:
     """Return a case that rank 0 has read, on every rank."""
     loaded = on_root(MPI.COMM_WORLD, lambda: (c := load_case(case, settings), c.folder))
+    _Spoken.names = loaded[0].names
     return loaded[0].at(loaded[1])
 
 
 def print_json(data: dict[str, Any]) -> None:
     """Print one JSON object in a line."""
-    show(json.dumps(data))
+    _write(sys.stdout, json.dumps(data))
+
+
+def print_case(case: Case) -> None:
+    """Print a case with all defaults, as a case file."""
+    _write(sys.stdout, case.to_toml())

@@ -21,6 +21,7 @@ from fenwear.cli.base import (
     app,
     load,
     log,
+    print_case,
     print_json,
     show,
 )
@@ -113,7 +114,7 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     warnings += [*heat_warnings(heat_gain(warm)), *fineness_warnings(warm)]
     for warning in warnings:
         log(f"warning: {warning}")
-    show(loaded.to_toml())
+    print_case(loaded)
     if warm.exchange is not None:
         log(fineness_text(warm))
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
@@ -132,7 +133,7 @@ def _check_stick(case: Case, system: Tribosystem | None = None) -> None:
     text = check_text(case, system)
     for warning in doubts(case):
         log(f"warning: {warning}")
-    show(case.to_toml())
+    print_case(case)
     log(text)
 
 
@@ -179,6 +180,6 @@ def mesh_command(
     loaded = load(case, settings)
     if output.suffix != ".msh":
         raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
-    meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion)
+    meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion, loaded.names)
     on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
     log(f"mesh in {output}")

@@ -154,7 +154,8 @@ class _Stretches:
         while True:
             until = next(end for end in self._ends if end > state.half_cycle)
             try:
-                after, recorded = self.step(state, until)
+                with self.system.names.told_in_errors():
+                    after, recorded = self.step(state, until)
             except (ConvergenceError, InterruptedRunError) as error:
                 failure: Exception = error
                 if isinstance(error, ConvergenceError):

@@ -38,6 +38,7 @@ from fenwear.assembly import (
     warming_key,
     with_reduced_heat,
 )
+from fenwear.case.names import told_by_name
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
@@ -129,6 +130,7 @@ class Steady:
         return f"<Steady: {n} contact nodes, {len(self.directions)} half-cycles, largest pressure {most:.5g} MPa>"
 
 
+@told_by_name
 def steady(system: Tribosystem, *, properties_within: float | None = None) -> Steady:
     """Solve for the cyclic steady state; collective.
 

@@ -230,7 +230,7 @@ def run_life(
 ) -> tuple[Lifetime, Path]:
     """Compute lives; write samples.csv, life.json and life.png; collective."""
     _need("openturns", "life")
-    quantity = parse_quantity(until, "--until")
+    quantity = parse_quantity(until, "--until", case.names)
     scatter: Scatter | None = None if calibration is None else load_scatter(calibration, case)
     for text in scatters:
         one = parse_scatter(case, text)

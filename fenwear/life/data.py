@@ -164,9 +164,10 @@ class _Reader:
 
     def _body(self) -> str:
         default = "strip" if self.case.wear.punch is None else "punch"
-        body = self.directives.get("body", default)
+        names = self.case.names
+        body = names.role_of(self.directives.get("body", default))
         if body not in ("punch", "strip"):
-            raise self._fail("# body", f"expected punch or strip, got {body!r}")
+            raise self._fail("# body", names.told(f"expected punch or strip, got {body!r}"))
         return body
 
     def _headings(self, cells: Sequence[str]) -> tuple[list[str], dict[str, str]]:

@@ -187,7 +187,7 @@ def lifetime(
         ConvergenceError: more than 5 % of the runs did not converge; their samples are in samples.csv.
         OutputError: samples.csv cannot be written.
     """
-    quantity = parse_quantity(until, "--until") if isinstance(until, str) else until
+    quantity = parse_quantity(until, "--until", case.names) if isinstance(until, str) else until
     if quantity.kind != "life":
         raise CaseError(
             InputError("--until", f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}")

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.case.names import BY_ROLE, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 from fenwear.life.model import Model, Snapshot, WornSurface
@@ -57,10 +58,10 @@ LIVES = {"cycles": "", "distance": "mm", "time": "s"}
 WHOLE = {"run-in cycles": "", "run-in distance": "mm", "critical speed": "mm/s"}
 
 _PLAIN = re.compile(
-    r"(?P<steady>steady )?(?P<name>[A-Za-z_]+)( of (?P<body>\w+))?( at (?P<at>.+?))?( after (?P<after>.+))?"
+    r"(?P<steady>steady )?(?P<name>[A-Za-z_]+)( of (?P<body>[\w-]+))?( at (?P<at>.+?))?( after (?P<after>.+))?"
 )
 _UNTIL = re.compile(
-    r"((?P<life>\w+) until )?(?P<name>\w+)( of (?P<body>\w+))?( at (?P<at>.+?) to)? (?P<level>[\d.+-].*)"
+    r"((?P<life>\w+) until )?(?P<name>\w+)( of (?P<body>[\w-]+))?( at (?P<at>.+?) to)? (?P<level>[\d.+-].*)"
 )
 Kind = Literal["snapshot", "steady", "life", "whole"]
 
@@ -136,8 +137,13 @@ def parse_amount(text: str, option: str) -> tuple[float, str]:
     raise CaseError(InputError(option, f"expected cycles, a distance or a time such as '3600 m', got {text!r}"))
 
 
-def parse_quantity(text: str, option: str = "--of") -> Quantity:
+def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Quantity:
     """Return the quantity that a text names.
+
+    Args:
+        text: The text.
+        option: That gave it, for messages.
+        names: Of the bodies.
 
     Raises:
         CaseError: it names none; says what is known.
@@ -147,7 +153,7 @@ def parse_quantity(text: str, option: str = "--of") -> Quantity:
         return Quantity(words, words, "whole", WHOLE[words])
     match = _UNTIL.fullmatch(words)
     if match is not None and match["name"] in UNITS:
-        return _life(words, match, option)
+        return _life(words, match, option, names)
     match = _PLAIN.fullmatch(words)
     if match is None or match["name"] not in UNITS:
         known = ", ".join([*UNITS, *WHOLE])
@@ -158,18 +164,18 @@ def parse_quantity(text: str, option: str = "--of") -> Quantity:
         raise CaseError(InputError(option, f"{words!r}: a steady state lasts for ever; {name} is of a run"))
     if name.startswith("lambda_") and not is_steady:
         raise CaseError(InputError(option, f"expected 'steady {name}', got {words!r}"))
-    body, at = _place(name, match, words, option)
+    body, at = _place(name, match, words, option, names)
     after = None if match["after"] is None else parse_amount(match["after"], option)
     return Quantity(words, name, "steady" if is_steady else "snapshot", UNITS[name], body, at, after)
 
 
-def _life(words: str, match: re.Match[str], option: str) -> Quantity:
+def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quantity:
     name, life = match["name"], match["life"] or "cycles"
     if life not in LIVES:
         raise CaseError(InputError(option, f"expected cycles, distance or time until a level, got {words!r}"))
     if name not in GROWING:
         raise CaseError(InputError(option, f"expected one of {', '.join(GROWING)} with a level, got {words!r}"))
-    body, at = _place(name, match, words, option)
+    body, at = _place(name, match, words, option, names)
     try:
         level = convert(match["level"], UNITS[name])
     except ValueError as error:
@@ -181,11 +187,13 @@ def _life(words: str, match: re.Match[str], option: str) -> Quantity:
     return Quantity(words, name, "life", LIVES[life], body, at, None, level, life)
 
 
-def _place(name: str, match: re.Match[str], words: str, option: str) -> tuple[str, float | None]:
-    body = match["body"] or "punch"
+def _place(name: str, match: re.Match[str], words: str, option: str, names: Names) -> tuple[str, float | None]:
+    body = names.role_of(match["body"] or "punch")
     if body not in ("punch", "strip") or (match["body"] and name not in OF_A_BODY):
         raise CaseError(
-            InputError(option, f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
+            InputError(
+                option, names.told(f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
+            )
         )
     if match["at"] is None:
         return body, None

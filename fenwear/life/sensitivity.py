@@ -139,7 +139,7 @@ def sensitivity(
     """
     if not 0 <= spread < 1:
         raise CaseError(InputError("--spread", f"expected at least 0 and less than 1, got {spread:g}"))
-    wanted = [of_case(parse_quantity(q) if isinstance(q, str) else q, case) for q in quantities]
+    wanted = [of_case(parse_quantity(q, names=case.names) if isinstance(q, str) else q, case) for q in quantities]
     found = [find_key(case, key, "--to") for key in keys]
     if not wanted or not found:
         raise CaseError(InputError("--of" if not wanted else "--to", "expected at least one"))

@@ -12,6 +12,7 @@ import xarray
 from fenwear.report.course import directions_present, is_conforming, mean_pressure
 from fenwear.report.figures import FOLDER, read_history
 from fenwear.report.gaps import gaps_of, parted
+from fenwear.report.key_numbers import names_in
 from fenwear.report.shapes import surfaces_of, worn_range
 from fenwear.report.style import (
     BODY_COLOURS,
@@ -19,6 +20,7 @@ from fenwear.report.style import (
     direction_style,
     legend_beside,
     level_line,
+    name_bodies,
     panels,
     save_gif,
     strip_moves,
@@ -106,6 +108,7 @@ def draw_animation(directory: Path) -> Path:
     plane = model_of(history) == "plane"
     frames = HistoryFrames(history, half_cycles) if plane else SurfaceFrames(history, half_cycles)
     frames.figure.set_dpi(90)
+    name_bodies([frames.figure], names_in(directory))
     images = []
     for n in half_cycles:
         frames.show(n)

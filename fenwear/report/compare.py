@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
+from fenwear.case.names import BY_ROLE, Names
 from fenwear.errors import CaseError, InputError
 from fenwear.report.compare_stick import has_stick, stick_comparison
 from fenwear.report.compare_surfaces import surface_comparison
@@ -24,6 +25,7 @@ from fenwear.report.style import (
     contact_axis,
     direction_words,
     legend_beside,
+    name_bodies,
     panels,
     run_style,
     strip_moves,
@@ -51,6 +53,7 @@ class Comparison:
         numbers: The numbers and the words of the summaries.
         cases: Those keys of the cases that differ.
         versions: Those versions of the stack that differ.
+        bodies: What the first run calls its bodies.
     """
 
     names: list[str]
@@ -58,6 +61,7 @@ class Comparison:
     numbers: dict[str, list[Any]]
     cases: dict[str, list[Any]]
     versions: dict[str, list[Any]]
+    bodies: Names = BY_ROLE
 
     def as_json(self) -> dict[str, Any]:
         """Return the tables; what is no finite number is null."""
@@ -70,7 +74,7 @@ class Comparison:
         tables = {"differences of the cases": self.cases, "differences of the versions": self.versions}
         for title, table in {**self.named(), **tables}.items():
             if table:
-                parts.append(_columns(title, self.names, table))
+                parts.append(_columns(title, self.names, {self.bodies.told(key): row for key, row in table.items()}))
         if not self.cases:
             parts.append("the cases are equal")
         return "\n\n".join(parts)
@@ -161,6 +165,7 @@ def compare(directories: Sequence[Path]) -> Comparison:
         numbers=_rows([flat(s) for s in shown]),
         cases=_differing(_rows([flat(case) for _, _, case in read])),
         versions=_differing(_rows([s.get("versions", {}) for s in summaries])),
+        bodies=Names.of(read[0][2]),
     )
 
 
@@ -247,7 +252,9 @@ def draw_comparison(comparison: Comparison, path: Path) -> Path:
     except OSError as error:
         raise CaseError(InputError("-o", f"{path} cannot be written: {error.strerror}")) from None
     with writing(path):
-        comparison_figure(comparison).savefig(path, dpi=150)
+        figure = comparison_figure(comparison)
+        name_bodies([figure], comparison.bodies)
+        figure.savefig(path, dpi=150)
     return path
 
 

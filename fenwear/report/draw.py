@@ -12,9 +12,9 @@ from fenwear.report.boundary import boundary_figure
 from fenwear.report.captions import caption
 from fenwear.report.figures import FOLDER, all_figures, read_history
 from fenwear.report.gaps import gaps_of, part_lines
-from fenwear.report.key_numbers import read_case
+from fenwear.report.key_numbers import names_in, read_case
 from fenwear.report.sections import geometry_figure, stress_figure
-from fenwear.report.style import STANDARD, Look
+from fenwear.report.style import STANDARD, Look, name_bodies
 from fenwear.report.surface import model_of
 from fenwear.report.surface_figures import surface_figures
 from fenwear.results.disk import write_text
@@ -51,6 +51,7 @@ def draw_figures(
     else:
         drawn = surface_figures(history, half_cycles, look)
     part_lines(drawn.values(), gaps_of(history))
+    name_bodies(drawn.values(), names := names_in(directory))
     folder.mkdir(exist_ok=True)
     paths = []
     for name, figure in drawn.items():
@@ -58,5 +59,5 @@ def draw_figures(
             paths.append(folder / f"{name}.{ending}")
             figure.savefig(paths[-1], dpi=DPI)
     captions = folder / CAPTIONS
-    write_text(captions, "".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn))
+    write_text(captions, names.told("".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn)))
     return [*paths, captions]

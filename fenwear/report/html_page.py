@@ -9,6 +9,8 @@ from datetime import datetime
 import jinja2
 from markupsafe import Markup
 
+from fenwear.case.names import BY_ROLE, Names
+
 __all__ = ["Picture", "picture", "render", "time"]
 
 
@@ -49,6 +51,12 @@ _TEMPLATES = jinja2.Environment(
 _TEMPLATES.globals["time"] = time
 
 
-def render(template: str, **values: object) -> Markup:
-    """Return a template with its values; every text among them that is no Markup is escaped."""
-    return Markup(_TEMPLATES.get_template(template).render(values))
+def render(template: str, names: Names = BY_ROLE, **values: object) -> Markup:
+    """Return a template with its values; every text among them that is no Markup is escaped, and names the bodies."""
+
+    def told(value: object) -> object:
+        plain = isinstance(value, str) and not isinstance(value, Markup) and not value.startswith("data:")
+        return names.told(str(value)) if plain else value
+
+    templates = _TEMPLATES.overlay(finalize=told) if names.given else _TEMPLATES
+    return Markup(templates.get_template(template).render(values))

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fenwear.case.names import Names
 from fenwear.errors import CaseError, InputError
 from fenwear.results.history import CASE, SUMMARY
 
@@ -81,6 +82,15 @@ def read_summary(directory: Path) -> dict[str, Any]:
     if not isinstance(summary, dict):
         raise CaseError(InputError(str(path), "no summary of a run"))
     return summary
+
+
+def names_in(directory: Path) -> Names:
+    """Return the names of the bodies in the case of a run.
+
+    Raises:
+        CaseError: it cannot be read.
+    """
+    return Names.of(read_case(directory))
 
 
 def read_case(directory: Path) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from fenwear.report.captions import caption
 from fenwear.report.draw import draw_figures
 from fenwear.report.figures import FOLDER, chosen_half_cycles, read_history
 from fenwear.report.html_page import Picture, picture, render
-from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
+from fenwear.report.key_numbers import flat, label_of, names_in, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
 from fenwear.report.stick import write_stick_report
 from fenwear.report.style import STANDARD, Look
@@ -130,6 +130,7 @@ def page(directory: Path, look: Look = STANDARD) -> str:
     written = datetime.fromtimestamp((directory / HISTORY).stat().st_mtime).astimezone()
     return render(
         "report.html",
+        names_in(directory),
         title=str(history.attrs.get("title", "")) or "fenwear run",
         name=directory.resolve().name,
         half_cycles=int(history.half_cycle[-1]),

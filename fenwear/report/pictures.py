@@ -20,9 +20,10 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.report.course import shown_unit
+from fenwear.report.key_numbers import names_in
 from fenwear.report.magnification import magnification
 from fenwear.report.solid_pictures import draw_solids
-from fenwear.report.style import direction_words, further, save_gif, strip_moves
+from fenwear.report.style import direction_words, further, name_bodies, save_gif, strip_moves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -108,9 +109,9 @@ def draw_here(directory: Path, formats: Sequence[str] = ()) -> list[Path]:
     folder = directory / FIGURES
     folder.mkdir(exist_ok=True)
     paths = []
-    model = datasets[0].attrs.get("model", "plane")
+    model, names = datasets[0].attrs.get("model", "plane"), names_in(directory)
     if model != "plane":
-        paths = draw_solids(datasets, folder, SHOWN, formats)
+        paths = draw_solids(datasets, folder, SHOWN, formats, names)
         if model == "solid":
             return paths
     view = common_view(datasets)
@@ -120,6 +121,7 @@ def draw_here(directory: Path, formats: Sequence[str] = ()) -> list[Path]:
             paths.append(folder / f"bodies_{field}_{int(data.attrs['half_cycle']):06d}.png")
             figure = bodies_figure(data, field, view, bodies_image(data, field, view))
             png = paths[-1]
+            name_bodies([figure], names)
             figure.savefig(png, dpi=150)
             paths += further(figure, png, formats)
             with Image.open(png) as picture:

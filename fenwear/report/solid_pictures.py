@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
+from fenwear.case.names import BY_ROLE, Names
 from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
-from fenwear.report.style import GREY, further
+from fenwear.report.style import GREY, further, name_bodies
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,6 +83,7 @@ def draw_solids(
     folder: Path,
     shown: dict[str, tuple[str, str, str]],
     formats: Sequence[str] = (),
+    names: Names = BY_ROLE,
 ) -> list[Path]:
     """Draw the bodies in space at each half-cycle with fields; return the files.
 
@@ -90,6 +92,7 @@ def draw_solids(
         folder: For the pictures.
         shown: Name, unit and colours of each field.
         formats: In which the pictures are drawn beside PNG.
+        names: Of the bodies.
     """
     view = solid_view(datasets, shown)
     paths = []
@@ -98,6 +101,7 @@ def draw_solids(
             name = "solid" if data.attrs["model"] == "solid" else "turned"
             png = folder / f"{name}_{field}_{int(data.attrs['half_cycle']):06d}.png"
             figure = solid_figure(data, field, view, shown[field])
+            name_bodies([figure], names)
             figure.savefig(png, dpi=150)
             paths += [png, *further(figure, png, formats)]
     return paths

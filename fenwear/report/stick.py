@@ -14,7 +14,7 @@ from fenwear.report import stick_heat, stick_maps
 from fenwear.report.figures import FOLDER
 from fenwear.report.gaps import gaps_of, part_lines, parted
 from fenwear.report.html_page import picture, render
-from fenwear.report.key_numbers import read_summary
+from fenwear.report.key_numbers import names_in, read_summary
 from fenwear.report.stick_course import course_axis, cycle_name, first_and_last, title, traction_panels
 from fenwear.report.style import (
     BLUE,
@@ -25,6 +25,7 @@ from fenwear.report.style import (
     further,
     legend_beside,
     level_line,
+    name_bodies,
     panels,
     shades,
 )
@@ -249,7 +250,7 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look:
         CaseError: the folder holds no run, or the run has no such axis.
         OutputError: a figure or the page cannot be written.
     """
-    history = by_cycles(load_history(directory))
+    history, names = by_cycles(load_history(directory)), names_in(directory)
     folder = directory / FOLDER
     paths, pictures, captions = [], [], []
     with writing(directory):
@@ -258,10 +259,11 @@ def write_stick_report(directory: Path, formats: Sequence[str] = ("png",), look:
             path = folder / f"{name}.png"
             figure = draw(history, look)
             part_lines([figure], gaps_of(history))
+            name_bodies([figure], names)
             figure.savefig(path, dpi=150)
             paths += [path, *further(figure, path, formats)]
             pictures.append(picture(path.read_bytes(), "png", caption, alt))
-            captions.append(f"{name}: {caption}. {alt}\n\n")
+            captions.append(names.told(f"{name}: {caption}. {alt}\n\n"))
     write_text(folder / CAPTIONS, "".join(captions))
     report = directory / REPORT
     write_text(report, _page(directory, history, pictures))
@@ -276,6 +278,7 @@ def _page(directory: Path, history: xarray.Dataset, pictures: list[Any]) -> str:
     ]
     return render(
         "stick.html",
+        names_in(directory),
         title=str(history.attrs.get("title", "")) or "fenwear run",
         name=directory.resolve().name,
         cycles=int(history.cycle[-1]),

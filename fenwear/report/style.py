@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ import numpy as np
 import xarray
 
 from fenwear.arrays import Array
+from fenwear.case.names import Names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -163,6 +164,15 @@ def contact_axis(ax: Axes) -> None:
     ax.set_xlabel(ALONG_CONTACT)
     for shared in ax.get_shared_x_axes().get_siblings(ax):
         shared.margins(x=0.01)
+
+
+def name_bodies(figures: Iterable[Figure], names: Names) -> None:
+    """Let all that is written in figures have the names of the bodies."""
+    from matplotlib.text import Text
+
+    if names.given:
+        for text in (text for figure in figures for text in figure.findobj(Text)):
+            text.set_text(names.told(text.get_text()))
 
 
 def further(figure: Figure, png: Path, formats: Sequence[str]) -> list[Path]:

@@ -15,6 +15,7 @@ import numpy as np
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.case.names import Names
 from fenwear.cycle import Block
 from fenwear.results import sheet
 from fenwear.results.degrees import degrees_of
@@ -104,8 +105,9 @@ def contact_text(summary: Mapping[str, Any]) -> str:
         one | {f"{body}.{key}": value for body in sheet.BODIES for key, value in one.get(body, {}).items()}
         for one in contacts.values()
     ]
+    names = Names(**summary.get("names", {}))
     rows = [
-        (line.heading, [sheet.shown(one.get(key), line) for one in columns])
+        (names.told(line.heading), [sheet.shown(one.get(key), line) for one in columns])
         for key, line in LINES.items()
         if any(key in one for one in columns)
     ]

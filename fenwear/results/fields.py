@@ -261,6 +261,7 @@ def write_fields(
     attributes["directions"] = " ".join(system.direction_words.values())
     data.update(_contact_surfaces(system, worn, pressure))
     _in_degrees(data, system)
+    data = {name: (*values, system.names.meant(attributes)) for name, (*values, attributes) in data.items()}
     import xarray  # with pandas, half a second that runs without fields spare themselves
 
     on_root(comm, lambda: _write_nodal(xarray.Dataset(data, attrs=attributes), folder, stem))

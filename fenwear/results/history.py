@@ -117,6 +117,7 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
     variables = {**variables, **sheet.variables(system), **steps.variables(system)}
+    variables = {name: (axes, unit, case.names.told(text)) for name, (axes, unit, text) in variables.items()}
     if case.model.kind == "plane":
         return variables
     return on_surfaces(variables)
@@ -124,6 +125,11 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
 
 def columns_of(system: Tribosystem) -> dict[str, Column]:
     """Return, by name, what does not change in a run."""
+    told = system.names.meant
+    return {name: one._replace(attributes=told(one.attributes)) for name, one in _columns(system).items()}
+
+
+def _columns(system: Tribosystem) -> dict[str, Column]:
     pair = system.pair
     if system.case.model.kind != "plane":
         return {**surface_columns(system), **part_columns(system, plane=False), **steps.columns(system)}

@@ -22,6 +22,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Placed
+from fenwear.case.names import Names
 from fenwear.cycle import Block
 from fenwear.results.scar import scar_geometry
 from fenwear.results.zone import without_noise
@@ -324,15 +325,15 @@ def shown(value: Any, line: Line) -> Any:
 
 def sheet_text(summary: Mapping[str, Any]) -> str:
     """Return the sheet of a summary as lines for people."""
-    rows = sheet_rows(summary)
-    bodies = [body for body in BODIES if body in summary]
+    rows, names = sheet_rows(summary), Names(**summary.get("names", {}))
+    bodies = [names.by_roles[body] for body in BODIES if body in summary]
     ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "max_pressure_MPa" in one]
     contact = [
         (line.label, line.unit, [shown(summary[way].get(key), line) for way in ways])
         for key, line in OF_CONTACT.items()
         if any(key in summary[way] for way in ways)
     ]
-    labels = [f"{label} ({unit})" if unit else label for label, unit, _ in (*rows, *contact)]
+    labels = [names.told(f"{label} ({unit})" if unit else label) for label, unit, _ in (*rows, *contact)]
     wide = max(map(len, labels), default=0)
     lines = []
     for label, (_, _, row) in zip(labels, (*rows, *contact), strict=True):

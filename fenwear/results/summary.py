@@ -31,6 +31,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
     plane = system.case.model.kind == "plane"
     return {
         "title": system.case.title,
+        **({"names": system.names.by_roles} if system.names.given else {}),
         "half_cycles": int(last.half_cycle[-1]),
         **run,
         **sheet.sheet(last),

@@ -86,7 +86,7 @@ def gathered(case: Case, plan: Plan, outcomes: Mapping[Place, Outcome]) -> xarra
     for name in order:
         what = meaning(name, plan.of, case)
         scale = degrees_of(case) if what.unit == KELVIN.unit else None
-        attributes = {"units": what.unit if scale is None else scale.unit, "long_name": what.name}
+        attributes = {"units": what.unit if scale is None else scale.unit, "long_name": case.names.told(what.name)}
         arrays = {place: np.asarray(values[name]) for place, values in good.items() if name in values}
         if scale is not None:
             arrays = {place: scale.of(values) for place, values in arrays.items()}

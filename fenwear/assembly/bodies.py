@@ -110,8 +110,10 @@ class Bodies:
     def under(self, case: Case, fraction: float | None = None) -> Bodies:
         """Return the bodies under the loads of a case at a fraction of the cycle, or their mean; collective."""
         punch, strip = (
-            body.with_loads([load.mean() if fraction is None else load.at(fraction) for load in description.loads])
-            for body, description in ((self.punch, case.punch), (self.strip, case.strip))
+            body.with_loads(
+                [load.mean() if fraction is None else load.at(fraction) for load in case.loads_of(body.body.name)]
+            )
+            for body in (self.punch, self.strip)
         )
         return replace(self, punch=punch, strip=strip)
 
@@ -208,7 +210,7 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
     else:
         at = nodal_function(mesh, case.geometry.degree, theta)
         law = isotropic(mesh, regions, case.materials, kind, at)
-    at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in description.loads)})
+    at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in case.loads_of(mesh.name))})
     body = ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
     if description.profile is not None:
         body.surface = profiled(body.surface, np.array(description.profile.points))

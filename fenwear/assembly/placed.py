@@ -26,10 +26,11 @@ from fenwear.interface import (
     pass_material,
     rigid_equilibrium,
 )
-from fenwear.interface.placement import in_model, in_space
+from fenwear.interface.placement import HERE, in_model, in_space
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
+from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.track import on_closed_track
@@ -165,7 +166,22 @@ class Placed:
     @cached_property
     def slid(self) -> Array:
         """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
-        return np.array([self.sliding.field.rate(pair.opposite, pair.normal) for pair in self.pairs])
+        return np.array(
+            [self.field_of(phase).rate(pair.opposite, pair.normal) for phase, pair in enumerate(self.pairs)]
+        )
+
+    def field_of(self, phase: int) -> SlidingField:
+        """Return the sliding field of a phase, in its direction of the motion or as a step of a table."""
+        return self.motion.phases[phase].field or self.sliding.field
+
+    @cached_property
+    def path(self) -> Array:
+        """What each node slides in each phase (phases, n), mm."""
+        return np.array([phase.distance for phase in self.motion.phases])[:, None] * self.slid
+
+    def friction_in_space(self, phase: int, mu: Array) -> Array:
+        """Return tau of a phase in space (n, 3), as `phase_friction`."""
+        return self.friction.ratio(self.motion.phases[phase].direction, mu, self.pairs[phase], self.field_of(phase))
 
     @cached_property
     def wear(self) -> Wear:
@@ -180,7 +196,7 @@ class Placed:
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
         offsets, pair = np.unique([phase.offset for phase in self.motion.phases]), self.pair
-        moved = np.diff(offsets).max(initial=0.0) * self.slid.max()
+        moved = self.path.max() if self.motion.steps else np.diff(offsets).max(initial=0.0) * self.slid.max()
         # Among the nodes of a solid there is no order along the sliding.
         spacing = np.median(np.diff(pair.x)) if pair.punch.dim == 2 else np.sqrt(np.median(pair.weights))
         return float(moved / spacing)
@@ -246,7 +262,7 @@ class Placed:
         found = []
         for facing in (*self.pairs, self.pair):
             x = facing.punch.x
-            found.append((in_space(x), in_space(facing.placement.points_back(x))))
+            found.append((in_space(x), in_space(facing.material_place.points_back(x))))
         return tuple(found)
 
     @cached_property
@@ -257,8 +273,10 @@ class Placed:
         return punch, {name: onto @ share for name, share in strip.items()}
 
     def slid_after(self, half_cycles: float) -> float:
-        """Return how far the motion has gone after half-cycles from the start of the run, mm or rad."""
+        """Return how far the motion has gone after half-cycles from the start of the run, mm or rad; or cycles."""
         strokes, each = self.motion.half_cycles, sum(phase.distance for phase in self.motion.phases)
+        if self.motion.steps:
+            each = 1.0
         return self.clock.slid + (half_cycles - self.clock.half_cycles) / strokes * each
 
     def conditions(
@@ -280,11 +298,16 @@ class Placed:
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
-        if phase is None:
-            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.opposite, self.pair.normal)
-        else:
+        slid = self.slid[phase or 0]
+        if self.motion.steps:
+            slid = self.path.sum(axis=0)
+        if phase is not None:
             speed = self.motion.phases[phase].speed * self.slid[phase]
-        pair, slid = (self.pair, self.slid[0]) if phase is None else (self.pairs[phase], self.slid[phase])
+        elif self.motion.steps:
+            speed = slid / self.motion.period
+        else:
+            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.opposite, self.pair.normal)
+        pair = self.pair if phase is None else self.pairs[phase]
         none = np.zeros(n)
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
@@ -308,7 +331,7 @@ class Placed:
     def phase_friction(self, phase: int, mu: Array) -> Array:
         """Return tau of a phase (n, d), the traction of friction on the punch over the pressure, for mu (n,)."""
         pair = self.pairs[phase]
-        return in_model(self.friction.ratio(self.motion.phases[phase].direction, mu, pair), pair.punch.dim)
+        return in_model(self.friction_in_space(phase, mu), pair.punch.dim)
 
     def friction_ratios(self, conditions: Sequence[ContactConditions] | None = None) -> list[Array]:
         """Return tau of each phase (n, d), the traction of friction on the punch over the pressure.
@@ -339,9 +362,12 @@ class Placed:
             zone: Nodes in contact (n,) bool; by default all.
 
         Raises:
-            CaseError: a node of the contact lies on the axis of rotation.
+            CaseError: a node of the contact lies on the axis of rotation, or nothing slides one way.
             ConvergenceError: a pressure_threshold or a pressure_cap leaves no optimum.
         """
+        if self.motion.steps:
+            message = "is a table of changing directions and loads: no one pressure is the optimum of all; see `steady`"
+            raise CaseError(InputError("motion.kind", message))
         slides = self.sliding.field.rate(self.pair.opposite, self.pair.normal)
         if not (slides > ROUNDING * slides.max()).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"
@@ -391,24 +417,27 @@ def place(
     check_stays(middle, sliding)
     if sliding.track is not None:
         middle = on_closed_track(middle, sliding.field, sliding.track)
-    whole = heat is None
+    sliding = sliding.measured_on(middle)
+    # Round surfaces that slide along themselves stay; a whole strip is moved where it does not turn by a table.
+    whole = heat is None and not any(any(phase.place.turn) for phase in sliding.motion.phases)
+    places = [sliding.placement(phase) for phase in sliding.motion.phases]
     pairs = {
-        offset: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
-        for offset in sorted({phase.offset for phase in sliding.motion.phases} - {0.0})
-        for moved in [sliding.field.placement(offset)]
+        moved: pair(middle.punch, middle.strip, moved) if whole else pass_material(middle, moved)
+        for moved in dict.fromkeys(places)
+        if moved != HERE
     }
-    pairs[0.0] = middle
+    pairs[HERE] = middle
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
-    made = {0.0: rigid}  # phases there and back share theirs
+    made = {HERE: rigid}  # phases there and back share theirs
     rigids: list[RigidEquilibrium] = []
-    for phase, own in zip(sliding.motion.phases, loaded, strict=True):
+    for moved, own in zip(places, loaded, strict=True):
         if own is not bodies:
-            rigids.append(rigid_equilibrium(pairs[phase.offset], own.punch, own.strip))
+            rigids.append(rigid_equilibrium(pairs[moved], own.punch, own.strip))
             continue
-        if phase.offset not in made:
-            made[phase.offset] = rigid_equilibrium(pairs[phase.offset], bodies.punch, bodies.strip)
-        rigids.append(made[phase.offset])
+        if moved not in made:
+            made[moved] = rigid_equilibrium(pairs[moved], bodies.punch, bodies.strip)
+        rigids.append(made[moved])
     placed = Placed(
         bodies=bodies,
         sliding=sliding,
@@ -469,7 +498,6 @@ def _passage(middle: ContactPair, sliding: Sliding) -> Passage | None:
 
 def _loaded(bodies: Bodies, motion: Motion, case: Case | None) -> tuple[Bodies, ...]:
     """Return the bodies under the loads of each phase; collective."""
-    loads = [] if case is None else [*case.punch.loads, *case.strip.loads]
-    if case is None or all(load.over_cycle is None for load in loads):
+    if case is None or all(load.steady for body in ("punch", "strip") for load in case.loads_of(body)):
         return (bodies,) * len(motion.phases)
     return tuple(bodies.under(case, phase.fraction) for phase in motion.phases)

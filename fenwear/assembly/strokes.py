@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fenwear.case import Case, OneWay, Oscillation, Rotation, WearLaw
+from fenwear.case import Case, Cycle, OneWay, Oscillation, Rotation, WearLaw
 from fenwear.errors import CaseError, InputError
-from fenwear.interface import ContactPair
+from fenwear.interface import ContactPair, Placement
 from fenwear.interface.placement import in_space
 from fenwear.sliding.field import ALONG_X, ALONG_Y, SlidingField
 from fenwear.sliding.friction import Friction
-from fenwear.sliding.motion import Motion, make_motion
+from fenwear.sliding.motion import Motion, Phase, make_motion
 
 OUT_OF_SURFACE = 1e-2  # sine between the sliding of a strip that turns in place and its surface, as it is meshed
 FACET = 0.1  # the same at a single node, beside facets of no regular form
@@ -39,11 +39,25 @@ class Sliding:
     track: float | None = None
     to_and_fro: bool = False
 
+    def measured_on(self, middle: ContactPair) -> Sliding:
+        """Return the same, with the steps of a table counted by the mean of what the contact nodes slide, mm."""
+        if not self.motion.steps:
+            return self
+        areas = middle.weights / middle.weights.sum()
+        fields = [phase.field or self.field for phase in self.motion.phases]
+        return replace(
+            self, motion=self.motion.measured([float(areas @ f.rate(middle.opposite, middle.normal)) for f in fields])
+        )
+
+    def placement(self, phase: Phase) -> Placement:
+        """Return where the strip is in a phase."""
+        return phase.place if self.motion.steps else self.field.placement(phase.offset)
+
 
 def make_sliding(case: Case, parts: int = 1) -> Sliding:
     """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
     motion = make_motion(case.motion, strip_wears=case.wear.strip is not None and case.passes).in_parts(parts)
-    sliding_field = _sliding_field(case)
+    sliding_field = _sliding_field(case, motion)
     one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(
         motion,
@@ -55,13 +69,24 @@ def make_sliding(case: Case, parts: int = 1) -> Sliding:
     )
 
 
-def _sliding_field(case: Case) -> SlidingField:
+def _sliding_field(case: Case, made: Motion) -> SlidingField:
     motion = case.motion
+    if isinstance(motion, Cycle):
+        return _longest(made)
     if isinstance(motion, Oscillation | Rotation):
         return SlidingField(turn=_unit(motion.axis), centre=motion.centre)
     if motion.along is not None:
         return SlidingField(shift=_unit(motion.along))
     return ALONG_X if motion.axis == "x" else ALONG_Y
+
+
+def _longest(motion: Motion) -> SlidingField:
+    """Return the direction of the step that turns farthest, or of the longest one where none turns."""
+    fields = [phase.field for phase in motion.phases if phase.field is not None]
+    if any(any(one.turn) for one in fields):
+        farthest = max(fields, key=lambda one: float(np.linalg.norm(one.turn)))
+        return SlidingField(turn=_unit(farthest.turn), centre=farthest.centre)
+    return SlidingField(shift=_unit(max(fields, key=lambda one: float(np.linalg.norm(one.shift))).shift))
 
 
 def _closed_track(case: Case) -> float | None:
@@ -78,6 +103,9 @@ def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
 
 def check_stays(middle: ContactPair, sliding: Sliding) -> None:
     """Raise where a strip that turns in place is none of revolution about the axis, or a moving one leaves contact."""
+    if sliding.motion.steps:
+        _check_steps_stay(middle, sliding.motion)
+        return
     along = np.array(sliding.field.shift)
     if middle.punch.dim == 3 and along.any():
         normal = middle.weights @ middle.normal
@@ -96,3 +124,24 @@ def check_stays(middle: ContactPair, sliding: Sliding) -> None:
                 "motion.axis", "the strip's contact surface is none of revolution about it: it would not stay there"
             )
         )
+
+
+def _check_steps_stay(middle: ContactPair, motion: Motion) -> None:
+    """Raise where a step of a table would take the strip's surface out of the contact, or into the punch."""
+    for number, phase in enumerate(motion.phases):
+        if phase.field is None or not phase.distance:
+            continue
+        velocity, normal = phase.field.velocity(middle.opposite), in_space(middle.normal)
+        out = np.abs(np.einsum("ic,ic->i", velocity, normal))
+        if any(phase.field.turn):
+            leaves = out.mean() > OUT_OF_SURFACE * np.linalg.norm(velocity, axis=1).max()
+        else:
+            mean = middle.weights @ normal
+            leaves = abs(velocity[0] @ mean) > OUT_OF_SURFACE * np.linalg.norm(velocity[0]) * np.linalg.norm(mean)
+        if leaves:
+            message = (
+                f"from row {number + 1} to row {number + 2} the strip's surface does not slide along itself: it would "
+                "open the contact, or go into the punch. Expected turns about the middle of round surfaces "
+                "(motion.centre), and shifts along flat ones; what brings bodies together is the load"
+            )
+            raise CaseError(InputError("motion.rows", message))

@@ -24,7 +24,7 @@ from fenwear.assembly.tribosystem import (
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.case import Case, Heat, changed_case
+from fenwear.case import Case, Cycle, Heat, changed_case
 from fenwear.sliding.wear import Worn
 
 
@@ -137,7 +137,8 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     bodies, condensed, sliding = system.bodies, system.condensed, system.sliding
     if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
         sliding = make_sliding(case)
-    if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
+    tables = [one.motion if isinstance(one.motion, Cycle) else None for one in (before, case)]
+    if (before.punch.loads, before.strip.loads, tables[0]) != (case.punch.loads, case.strip.loads, tables[1]):
         bodies = bodies.under(case)
     conducts_alike = _same_conduction(before, case)
     if not conducts_alike:

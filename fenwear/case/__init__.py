@@ -5,7 +5,7 @@ from fenwear.case.course import Output, Run
 from fenwear.case.dependence import register_law
 from fenwear.case.laws import Contact, Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
-from fenwear.case.motions import Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
+from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.case.plausible import doubts
 from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
@@ -18,6 +18,7 @@ __all__ = [
     "Body",
     "Case",
     "Contact",
+    "Cycle",
     "Dependence",
     "Geometry",
     "Heat",

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
+from fenwear.arrays import Array
 from fenwear.case.quantities import (
     Axis,
     Forces,
@@ -147,6 +149,11 @@ class Load(Part):
                 raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
         return self
 
+    @property
+    def steady(self) -> bool:
+        """Whether it is the same over the whole cycle."""
+        return self.over_cycle is None
+
     def moment_problems(self, key: str, model: str) -> list[str]:
         """Return what of it does not go with a plane, an axisymmetric or a solid model."""
         if model == "axisymmetric":
@@ -181,6 +188,53 @@ class Load(Part):
             if (vector := getattr(self, name)) is not None
         }
         return self.model_copy(update={**scaled, "over_cycle": None})
+
+
+@dataclass(frozen=True)
+class CourseLoad:
+    """A force and a moment that change over a cycle by themselves, not in proportion: straight lines between rows.
+
+    Attributes:
+        on: Group of the geometry.
+        through: Point that the force acts through; None for the centroid.
+        fraction: Of the cycle, rising from 0 to 1 (k,).
+        force: (k, d), N; None for none.
+        moment: (k, 1), in a solid (k, 3), N mm; None for none.
+        factor: Of both.
+    """
+
+    on: str
+    through: tuple[float, ...] | None
+    fraction: Array
+    force: Array | None
+    moment: Array | None
+    factor: float = 1.0
+    steady: ClassVar[bool] = False
+
+    def times(self, factor: float) -> CourseLoad:
+        """Return the load times a factor at every time."""
+        return replace(self, factor=factor * self.factor)
+
+    def at(self, fraction: float) -> Load:
+        """Return the load at this fraction of the cycle."""
+        return self._load(
+            [None if given is None else [np.interp(fraction, self.fraction, part) for part in given.T]
+             for given in (self.force, self.moment)]
+        )  # fmt: skip
+
+    def mean(self) -> Load:
+        """Return the mean of the load over the cycle."""
+        return self._load(
+            [None if given is None else np.diff(self.fraction) @ (given[1:] + given[:-1]) / 2
+             for given in (self.force, self.moment)]
+        )  # fmt: skip
+
+    def _load(self, parts: Sequence[Any]) -> Load:
+        force, moment = (None if p is None else tuple(self.factor * float(c) for c in p) for p in parts)
+        through = None if force is None else self.through
+        return Load.model_construct(
+            on=self.on, force=force, traction=None, through=through, moment=moment, over_cycle=None
+        )
 
 
 class Prescribed(Part):

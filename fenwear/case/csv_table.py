@@ -59,7 +59,10 @@ def read_csv(path: Path, key: str, columns: Mapping[str, str], least: int) -> Cs
     if len(rows) < 1 + least:
         few = {1: "one row", 2: "two rows"}.get(least, f"{least} rows")
         raise _wrong(path, key, f"expected a row of headings and at least {few} of numbers, got {len(rows)} in all")
-    names, units = _headings(path, key, rows[0][1], columns)
+    try:
+        names, units = headings(rows[0][1], columns)
+    except ValueError as error:
+        raise _wrong(path, key, str(error)) from None
     values = [_numbers(path, key, line, row, names, units, columns) for line, row in rows[1:]]
     return CsvTable(path, key, names, [line for line, _ in rows[1:]], values)
 
@@ -68,7 +71,16 @@ def _wrong(path: Path, key: str, message: str) -> CaseError:
     return CaseError(InputError(key, f"{path}: {message}"))
 
 
-def _headings(path: Path, key: str, row: Sequence[str], columns: Mapping[str, str]) -> tuple[list[str], list[str]]:
+def headings(row: Sequence[str], columns: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Return the names of the columns under these headings, and their units.
+
+    Args:
+        row: A heading each, such as "load (N)".
+        columns: Units of the known columns by their names; "" for pure numbers.
+
+    Raises:
+        ValueError: a column is not known, or its unit is missing or of another kind; says which.
+    """
     names, units = [], []
     for cell in row:
         match = _HEADING.fullmatch(cell)
@@ -76,15 +88,15 @@ def _headings(path: Path, key: str, row: Sequence[str], columns: Mapping[str, st
         if name not in columns:
             close = difflib.get_close_matches(name, columns, 1)
             hint = f"did you mean {close[0]!r}?" if close else f"known are {', '.join(columns)}"
-            raise _wrong(path, key, f"the column {name!r} is not known; {hint}")
+            raise ValueError(f"the column {name!r} is not known; {hint}")
         unit = (match["unit"] if match else None) or ""
         wanted = columns[name]
         if wanted and not unit:
-            raise _wrong(path, key, f"the column {name} has no unit; expected such as '{name} ({wanted})'")
+            raise ValueError(f"the column {name} has no unit; expected such as '{name} ({wanted})'")
         try:
             convert(f"1 {unit}" if unit else 1.0, wanted)
         except ValueError as error:
-            raise _wrong(path, key, f"the column {name}: {error}") from None
+            raise ValueError(f"the column {name}: {error}") from None
         names.append(name)
         units.append(unit)
     return names, units

@@ -12,7 +12,7 @@ import numpy as np
 
 from fenwear.case.course import ProgramStep
 from fenwear.case.csv_table import CsvTable, read_csv
-from fenwear.case.motions import OneWay, Rotation, Tabulated
+from fenwear.case.motions import Cycle, OneWay, Rotation, Tabulated
 from fenwear.case.schema import Case
 from fenwear.errors import CaseError, InputError
 
@@ -280,7 +280,10 @@ def _cycles(case: Case, step: ProgramStep, ramps: Mapping[str, tuple[float, floa
 
 
 def cycle_of(case: Case) -> tuple[float, float, int]:
-    """Return the duration of a cycle in s, what it slides in mm or rad, and its number of half-cycles."""
+    """Return the duration of a cycle in s, what it slides in mm or rad, and its number of half-cycles.
+
+    What a table of places slides is told by the contact alone: it is counted in cycles.
+    """
     motion = case.motion
     if isinstance(motion, OneWay):
         return motion.duration, motion.speed * motion.duration, 1
@@ -290,6 +293,8 @@ def cycle_of(case: Case) -> tuple[float, float, int]:
         moved = np.diff(motion.displacements)
         ways = np.sign(moved[moved != 0])
         return motion.times[-1], float(np.abs(moved).sum()), 1 + int(np.count_nonzero(np.diff(ways)))
+    if isinstance(motion, Cycle):
+        return motion.course.duration, 1.0, 1
     return 2 * motion.half_period, 4 * motion.amplitude, 2
 
 

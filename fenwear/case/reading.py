@@ -11,6 +11,7 @@ from typing import Any
 
 import pydantic
 
+from fenwear.case.cycle_table import with_cycle
 from fenwear.case.keys import find_keys
 from fenwear.case.plausible import written
 from fenwear.case.problems import problems_of
@@ -87,7 +88,7 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
 
 
 def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
-    """Return the tables with the files of profiles and of the program where they are: beside the case that names them.
+    """Return the tables with the files of profiles, program and cycle where they are: beside the case that names them.
 
     The geometry's own file is left: ready ones have names without a place.
     """
@@ -95,7 +96,7 @@ def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
         return data
     found = dict(data)
     for name, table in data.items():
-        if name == "program":
+        if name in ("program", "motion"):
             found[name] = _beside(table, folder)
         elif name in BODIES and isinstance(table, dict) and "profile" in table:
             found[name] = {**table, "profile": _beside(table["profile"], folder)}
@@ -158,7 +159,7 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
     Raises:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
-    data = with_profiles(with_program(data, folder), folder)
+    data = with_profiles(with_program(with_cycle(data, folder), folder), folder)
     open_end = isinstance(data.get("program"), Mapping) and "half_cycles" not in data.get("run", {})
     if open_end and isinstance(data.get("run", {}), Mapping):  # a program tells itself how far a run goes
         data["run"] = {**data.get("run", {}), "half_cycles": PLACEHOLDER}

@@ -14,12 +14,13 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import CONDENSED, Body, Geometry, Model
+from fenwear.case.bodies import CONDENSED, Body, CourseLoad, Geometry, Load, Model
 from fenwear.case.course import Output, Program, Run
+from fenwear.case.cycle_table import PLACES
 from fenwear.case.diffusion import diffusion_of
 from fenwear.case.laws import Contact, Dependence, Stick, Wear
 from fenwear.case.materials import Material
-from fenwear.case.motions import Motions, OneWay, Oscillation, Rotation
+from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Rotation
 from fenwear.case.names import Names, renamed
 from fenwear.case.quantities import Part
 from fenwear.case.setup import Setup
@@ -108,7 +109,8 @@ class Case(Part):
             if not part.regions
         ]
         held = [*self.punch.supports, *self.strip.supports]
-        if not any(load.force or load.traction for load in self.punch.loads) and not any(one.moves for one in held):
+        pressed = any(load.force or load.traction for load in self.punch.loads) or self._course_load is not None
+        if not pressed and not any(one.moves for one in held):
             problems.append(
                 "punch.loads: expected at least one load that presses the punch on the strip, or a support moved `by`"
             )
@@ -155,13 +157,37 @@ class Case(Part):
                 problems.append("motion.axis: expected [0, 1, 0], out of the plane, in a plane model")
             if kind == "axisymmetric" and (any(motion.axis[:2]) or any(motion.centre[:2])):
                 problems.append("motion.axis: expected the axis z of the rings, through x = y = 0")
+        elif isinstance(motion, Cycle):
+            problems += self._cycle_problems(motion)
         elif kind == "axisymmetric":
-            problems.append("motion.kind: expected rotation or oscillation in an axisymmetric model")
+            problems.append("motion.kind: expected rotation or oscillation, or a cycle, in an axisymmetric model")
         elif kind == "plane" and motion.along is not None:
             problems.append("motion.along: belongs to solids; a plane model has axis = 'x' or 'y'")
         if kind != "plane" and self.contact.solver == "full" and not self.sticks:
             problems.append("contact.solver: expected 'condensed' but in plane models and with contact.law = 'coulomb'")
         return problems
+
+    def _cycle_problems(self, motion: Cycle) -> list[str]:
+        """Return what of a cycle's table does not go with the model, or with heat and other solvers."""
+        problems = motion.model_problems(self.model.kind, self.model.axes)
+        if self.heat is not None:
+            problems.append(
+                "heat: expected another motion.kind: where material slides through a contact in changing directions "
+                "its temperatures are not followed; the heat of a mean motion can be, by motion.kind = 'oscillation'"
+            )
+        if self.contact.solver == "full":
+            problems.append("contact.solver: expected 'condensed' with motion.kind = 'cycle'")
+        return problems
+
+    def loads_of(self, body: str) -> tuple[Load | CourseLoad, ...]:
+        """Return all loads of a body, "punch" or "strip": its own, and on the punch that of the cycle's table."""
+        own: tuple[Load | CourseLoad, ...] = getattr(self, body).loads
+        course = self._course_load if body == "punch" else None
+        return own if course is None else (*own, course)
+
+    @property
+    def _course_load(self) -> CourseLoad | None:
+        return self.motion.course_load(self.model.axes) if isinstance(self.motion, Cycle) else None
 
     @property
     def names(self) -> Names:
@@ -193,7 +219,11 @@ class Case(Part):
     @property
     def passes(self) -> bool:
         """Whether the sliding takes the strip's material past the punch within the model, not out of its plane."""
-        return self.model.kind == "solid" or (self.model.kind == "plane" and self.motion.axis != "y")
+        if self.model.kind != "plane":
+            return self.model.kind == "solid"
+        if isinstance(self.motion, Cycle):
+            return any(not name.endswith("shift_y") for name in self.motion.column_names if name in PLACES)
+        return self.motion.axis != "y"
 
     @property
     def diffusion(self) -> dict[str, float]:
@@ -218,7 +248,8 @@ class Case(Part):
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
-        if not self.passes and not isinstance(motion, OneWay | Rotation) and (motion.positions or 1) > 1:
+        several = not isinstance(motion, OneWay | Rotation | Cycle) and (motion.positions or 1) > 1
+        if not self.passes and (several or (isinstance(motion, Cycle) and motion.positions == "steps")):
             problems.append("motion.positions: expected 1 for sliding out of the plane")
         if self.heat is None:
             given = {"contact.friction": self.contact.friction}
@@ -269,6 +300,8 @@ class Case(Part):
                 known = key in type(motion).model_fields and not (key == "amplitude" and self.turns)
                 if getattr(step, key) is not None and not known:
                     problems.append(f"{at}.{key}: does not change with motion.kind = '{motion.kind}'")
+            if step.distance is not None and isinstance(motion, Cycle):
+                problems.append(f"{at}.distance: expected cycles or time: nodes slide different ways in a cycle")
             if step.ambient is not None and self.heat is None:
                 problems.append(f"{at}.ambient: expected a case with the table heat")
         told = self.program.radius is not None
@@ -290,8 +323,10 @@ class Case(Part):
         motion = self.motion
         if isinstance(motion, OneWay) and motion.track is None:
             return ["motion.track: missing, but required where the strip wears in one-way sliding"]
-        if not isinstance(motion, OneWay | Rotation) and motion.positions == 1:
+        if not isinstance(motion, OneWay | Rotation | Cycle) and motion.positions == 1:
             return ["motion.positions: expected 2 or more, since the strip's wear spreads over the stroke"]
+        if isinstance(motion, Cycle) and motion.positions == "middle":
+            return ["motion.positions: expected 'steps', since the strip's wear goes with its material"]
         return []
 
     def _stick_problems(self) -> list[str]:
@@ -313,7 +348,7 @@ class Case(Part):
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
             "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
-            "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation),
+            "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation | Cycle),
             "motion.axis: expected 'x'": not self.passes,
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)
@@ -325,9 +360,8 @@ class Case(Part):
     def varies(self) -> bool:
         """Whether a coefficient depends on the state, or a load on the time in the cycle."""
         laws = [law.coefficient for law in (self.wear.punch, self.wear.strip) if law is not None]
-        loads = [load.over_cycle for body in (self.punch, self.strip) for load in body.loads]
         dependent = any(isinstance(value, Dependence) for value in (self.contact.friction, *laws))
-        return dependent or any(table is not None for table in loads)
+        return dependent or not all(load.steady for body in ("punch", "strip") for load in self.loads_of(body))
 
     def _thermal_problems(self, heat: Heat) -> list[str]:
         needed = ("conductivity", "heat_capacity", "density", "expansion")

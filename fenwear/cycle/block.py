@@ -365,9 +365,10 @@ class Recorder:
     def _optimum(self, direction: int, pressure: Array) -> Array:
         """Return the optimal pressure on the present contact zone, NaN where there is none.
 
-        So where a threshold or cap leaves none, or nodes stick. Solved anew only when the zone changes.
+        So where a threshold or cap leaves none, nodes stick, or directions change. Solved anew only when the zone
+        changes.
         """
-        if self.system.sticks:
+        if self.system.sticks or self.system.motion.steps:
             return np.full(len(pressure), np.nan)
         zone = pressure > 0
         key = (direction, zone.tobytes())

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from fenwear.assembly import Clock, Placed, Tribosystem, with_case
-from fenwear.case import Case
+from fenwear.case import Case, Cycle
 from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import Loading, as_given
@@ -164,10 +165,14 @@ def _loaded(case: Case, factor: float) -> Case:
     """Return the case with all its loads times a factor."""
     if factor == 1:
         return case
-    bodies = {
+    bodies: dict[str, Any] = {
         name: body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
         for name, body in (("punch", case.punch), ("strip", case.strip))
     }
+    motion = case.motion
+    if isinstance(motion, Cycle) and motion.load is not None:
+        load = motion.load.model_copy(update={"factor": factor * motion.load.factor})
+        bodies["motion"] = motion.model_copy(update={"load": load})
     return case.model_copy(update=bodies)
 
 

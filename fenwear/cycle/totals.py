@@ -95,13 +95,13 @@ class PhaseMeter:
         first = phase // positions * positions
         whole = sum(one.distance for one in phases[first : first + positions])
         self._share = phases[phase].distance / whole if whole else 1 / positions  # at rest by the time
-        speed = np.linalg.norm(system.sliding.field.velocity(pair.opposite), axis=1)
+        speed = np.linalg.norm(system.field_of(phase).velocity(pair.opposite), axis=1)
         self._weights, self._speed = pair.weights, system.motion.phases[phase].distance * speed
         self._rows = np.zeros((len(SUMS), len(areas)))
         self._rows[SUMS.index("load_path")] = areas * path
         self._rows[SUMS.index("work")] = areas * self._energy
         self._load = areas * _along_approach(system, phase, mu)
-        friction = system.friction.ratio(system.motion.phases[phase].direction, mu, pair)
+        friction = system.friction_in_space(phase, mu)
         self._drag = areas[:, None] * friction
         self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
         for body, own, density in zip(

@@ -45,6 +45,7 @@ class ContactPair:
         wear_projection: Puts depths worn at the contact nodes on the strip's material (n_strip, n): areas kept, and
             no entry negative, so that no surface ever grows.
         initial_gap: Distance along e_n before any deformation and wear (n,), mm.
+        passed: Where the strip's material is, where it moves under a strip that stays; None where it is the strip.
     """
 
     punch: ContactSurface
@@ -56,6 +57,12 @@ class ContactPair:
     wear_interpolation: csr_array
     wear_projection: csr_array
     initial_gap: Array
+    passed: Placement | None = None
+
+    @property
+    def material_place(self) -> Placement:
+        """Where the strip's material is."""
+        return self.placement if self.passed is None else self.passed
 
     @property
     def x(self) -> Array:
@@ -135,7 +142,7 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     Raises:
         CaseError: the strip's contact surface does not reach below the whole punch there.
     """
-    if placement == middle.placement:
+    if placement == middle.material_place:
         return middle
     parts = patches(middle.punch, middle.strip, placement)
     _check_covered(parts, placement)
@@ -145,7 +152,7 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     gap = middle.initial_gap + _profiles(middle.punch, middle.strip, material)
     gap -= _profiles(middle.punch, middle.strip, middle.wear_interpolation)
     return replace(
-        middle, placement=placement, wear_interpolation=material, wear_projection=wear_projection, initial_gap=gap
+        middle, passed=placement, wear_interpolation=material, wear_projection=wear_projection, initial_gap=gap
     )
 
 

@@ -125,7 +125,7 @@ def _traction(system: Tribosystem, phase: int, pressure: Array, temperatures: tu
         )
         surfaces = (system.pair.punch.spread.T @ punch, system.pair.transfer @ strip)
     mu = friction.values(system.conditions(phase, pressure, surfaces))
-    return friction.ratio(system.motion.phases[phase].direction, mu, system.pairs[phase])
+    return system.friction_in_space(phase, mu)
 
 
 def _solve(

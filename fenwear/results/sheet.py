@@ -168,7 +168,7 @@ def values(block: Block) -> dict[str, Array]:
 
 def turns(placed: Placed) -> bool:
     """Return whether the strip turns, so that friction has a torque."""
-    return any(placed.sliding.field.turn)
+    return any(placed.sliding.field.turn) and not placed.motion.steps
 
 
 def _angles(block: Block) -> Array:

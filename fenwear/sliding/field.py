@@ -20,8 +20,8 @@ class SlidingField:
     """A rigid motion of unit amount, in space (x, y, z); a plane model lies at y = 0.
 
     Attributes:
-        shift: V, the direction of a translation; a unit vector, or zero.
-        turn: omega, the axis of a rotation; a unit vector, or zero.
+        shift: V, the direction of a translation; a unit vector, or zero, but of a step of a table.
+        turn: omega, the axis of a rotation; the same. With a translation it is a screw along its axis.
         centre: c, a point on the axis, mm.
     """
 
@@ -34,9 +34,17 @@ class SlidingField:
         return np.array(self.shift) + np.cross(self.turn, in_space(x) - self.centre)
 
     def __post_init__(self) -> None:
-        """Raise where it shifts and turns at once: its axis would have to move along."""
+        """Raise where it shifts across its axis, which would have to move along."""
         if ZERO not in (self.shift, self.turn):
-            raise CaseError(InputError("motion", "expected a translation or a rotation of the counter-body, not both"))
+            across = np.linalg.norm(np.cross(self.shift, self.turn))
+            if across > 1e-9 * np.linalg.norm(self.shift) * np.linalg.norm(self.turn):
+                message = "expected a translation, a rotation, or a rotation that advances along its own axis"
+                raise CaseError(InputError("motion", message))
+
+    def over(self, amount: float) -> SlidingField:
+        """Return the motion of which this is so many units."""
+        shift, turn = (_vector(np.array(part) / amount) for part in (self.shift, self.turn))
+        return SlidingField(shift, turn, self.centre)
 
     def rate(self, x: Array, normal: Array) -> Array:
         """Return what each point slides for a unit of the stroke's law (n,): 1, or mm/rad; e_n (n, d) its normal."""
@@ -68,6 +76,26 @@ class SlidingField:
             return Placement()
         (x, y, z), (a, b, c) = self.shift, self.turn
         return Placement((amount * x, amount * y, amount * z), (amount * a, amount * b, amount * c), self.centre)
+
+
+def screw(shift: Array, turn: Array, centre: Array) -> SlidingField:
+    """Return the field of the velocity V + omega x (x - c), about the axis that moves along itself only.
+
+    Args:
+        shift: V (3,), mm.
+        turn: omega (3,), rad.
+        centre: c (3,), mm.
+    """
+    size = float(turn @ turn)
+    if size == 0:
+        return SlidingField(shift=_vector(shift))
+    along = (shift @ turn) / size * turn
+    return SlidingField(_vector(along), _vector(turn), _vector(centre + np.cross(turn, shift) / size))
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(c) + 0.0 for c in values)
+    return x, y, z
 
 
 ALONG_X = SlidingField(shift=(1.0, 0.0, 0.0))

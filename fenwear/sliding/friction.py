@@ -102,14 +102,15 @@ class Friction:
             return mu.values(conditions.of("mean"), conditions.shape, 1.0, "contact.friction")
         return np.full(conditions.shape, float(mu))
 
-    def ratio(self, direction: int, mu: Array, pair: ContactPair) -> Array:
+    def ratio(self, direction: int, mu: Array, pair: ContactPair, field: SlidingField | None = None) -> Array:
         """Return tau, the traction of friction on the punch over the pressure, in space (n, 3).
 
         Args:
             direction: d, the sign of the sliding.
             mu: (n,).
             pair: The contact nodes.
+            field: Of the sliding; by default that of the whole motion.
         """
-        along = self.field.direction(pair.opposite, pair.normal)
+        along = (field or self.field).direction(pair.opposite, pair.normal)
         across = np.cross(in_space(pair.normal), along)
         return direction * mu[:, None] * along - self.contact.transverse_friction * across

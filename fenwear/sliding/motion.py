@@ -3,23 +3,37 @@
 A cycle is a sequence of half-cycles (strokes in one direction), and each half-cycle is cut into equal
 times, one for each position of the strip under the punch. Such a phase has one contact: a direction,
 an offset of the strip, and the sliding that is done there. Rotations are counted in rad in place of mm.
+
+A cycle that is a table is one half-cycle, whose phases are the steps between its rows. Each has a sliding field of its
+own, the constant screw that takes the strip from one row to the next,
+
+    R = R_1 R_0^T = exp(w),  s_1 - R s_0 = J(w) V,  J(w) = 1 + (1 - cos t) / t² [w] + (t - sin t) / t³ [w]²,  t = |w|,
+
+the velocity V + w x (x - c) for a unit of time (exponential of se(3); R. M. Murray et al., A Mathematical Introduction
+to Robotic Manipulation, 1994): what slides past a place in space is exact for steps of any size.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation as Turn
 from scipy.special import beta, betainc
 
 from fenwear.arrays import Array
-from fenwear.case import Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
+from fenwear.case import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.errors import CaseError, InputError
+from fenwear.interface.placement import HERE, Placement
+from fenwear.sliding.field import SlidingField, screw
 
+ROUNDING = 1e-14  # rad, and of the largest shift: what matrices leave of a motion that is none
+SMALL = 1e-4  # rad: a turn whose series ends after three terms
 DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
 
 
@@ -33,6 +47,8 @@ class Phase:
         duration: s.
         distance: Slid in it, mm.
         fraction: Of the cycle, at the middle of the phase.
+        field: Of a step of a table, in its direction; None where it is that of the whole motion.
+        place: Where the strip is in the middle of such a step.
     """
 
     direction: int
@@ -40,6 +56,8 @@ class Phase:
     duration: float
     distance: float
     fraction: float
+    field: SlidingField | None = None
+    place: Placement = HERE
 
     @property
     def speed(self) -> float:
@@ -123,6 +141,7 @@ class Motion:
     half_cycles: int
     _strokes: tuple[_Stroke, ...]
     _starts: tuple[float, ...]  # offset of the strip at the start of each stroke
+    _ends: tuple[float, ...] | None = None  # times of the phases' ends in the only stroke of a table, 0 first
 
     @property
     def directions(self) -> tuple[int, ...]:
@@ -153,14 +172,43 @@ class Motion:
         """Return the motion with each phase cut into parts of equal time at its position."""
         if parts == 1:
             return self
-        phases = []
+        phases, ends = [], self._cut(0, parts)
         for number, phase in enumerate(self.phases):
             stroke, place = self._strokes[number // self.positions], number % self.positions
-            edges = _edges(stroke, self.positions * parts)[place * parts : (place + 1) * parts + 1]
+            edges = self._cut(number // self.positions, parts)[place * parts : (place + 1) * parts + 1]
             for low, high in itertools.pairwise(edges):
                 distance = stroke.power(low, high, 1.0)
                 phases.append(replace(phase, duration=high - low, distance=distance))
-        return replace(self, phases=tuple(phases), positions=self.positions * parts)
+        cut = replace(self, phases=tuple(phases), positions=self.positions * parts)
+        return cut if self._ends is None else replace(cut, _ends=tuple(ends))
+
+    def _cut(self, stroke: int, parts: int) -> list[float]:
+        """Return the ends of equal parts of the phases of a half-cycle, s."""
+        if self._ends is None:
+            return _edges(self._strokes[stroke], self.positions * parts)
+        shares = np.arange(parts) / parts
+        inner = [a + share * (b - a) for a, b in itertools.pairwise(self._ends) for share in shares]
+        return [float(time) for time in (*inner, self._ends[-1])]
+
+    @property
+    def steps(self) -> bool:
+        """Whether it is a table, whose steps have sliding fields of their own."""
+        return self._ends is not None
+
+    def measured(self, amounts: Sequence[float]) -> Motion:
+        """Return the same motion, a table, with the distances of its phases times these amounts (phases,).
+
+        Their fields are divided by them: what slides stays as it is.
+        """
+        phases = tuple(
+            replace(phase, distance=phase.distance * amount, field=phase.field.over(amount))
+            if phase.field is not None and amount > 0
+            else phase
+            for phase, amount in zip(self.phases, amounts, strict=True)
+        )
+        speeds = tuple(phase.speed for phase in phases)
+        stroke = _PiecewiseLinear(self._ends or (), speeds, speeds)
+        return replace(self, phases=phases, _strokes=(stroke,))
 
     def time(self, half_cycle: NDArray[np.int64]) -> Array:
         """Return the time at the end of half-cycles, given by their numbers from 1, s."""
@@ -175,9 +223,8 @@ class Motion:
             CaseError: it is beyond all numbers.
         """
         powers = []
-        for stroke in self._strokes:
-            edges = itertools.pairwise(_edges(stroke, self.positions))
-            powers += [_power(stroke, a, b, exponent) for a, b in edges]
+        for number, stroke in enumerate(self._strokes):
+            powers += [_power(stroke, a, b, exponent) for a, b in itertools.pairwise(self._cut(number, 1))]
         return np.array(powers)
 
     def mean_speeds(self, steps: int) -> Array:
@@ -227,6 +274,9 @@ def make_motion(description: Motions, *, strip_wears: bool = False) -> Motion:
         speed = (description.speed if isinstance(description, OneWay) else description.angular_speed,)
         steady = _PiecewiseLinear((0.0, description.duration), speed, speed)
         return _motion(((1 if forward else -1, 0.0, steady),), 1)
+    if isinstance(description, Cycle):
+        moves = strip_wears if description.positions is None else description.positions == "steps"
+        return _table_motion(description, moves=moves)
     positions = description.positions or (DEFAULT_POSITIONS if strip_wears else 1)
     if isinstance(description, Tabulated):
         return _motion(_table_strokes(description), positions)
@@ -294,3 +344,60 @@ def _table_strokes(description: Tabulated) -> tuple[tuple[int, float, _Stroke], 
             (int(signs[a]), float(positions[a] - middle), _PiecewiseLinear(tuple(local.tolist()), speeds, speeds))
         )
     return tuple(strokes)
+
+
+def _table_motion(description: Cycle, *, moves: bool) -> Motion:
+    """Return the motion of a table of places, in steps of a unit of their own fields.
+
+    Args:
+        description: The table.
+        moves: Whether the strip is in its place in the middle of each step, not where it is meshed.
+    """
+    course, centre = description.course, np.array(description.centre)
+    times = course.fraction * course.duration
+    phases = []
+    for k in range(len(times) - 1):
+        turn, shift = course.turn[k : k + 2], course.shift[k : k + 2]
+        w = Turn.from_matrix(turn[1] @ turn[0].T).as_rotvec()
+        w = np.where(np.abs(w) < ROUNDING, 0.0, w)
+        v = np.linalg.solve(_advance(w), shift[1] - Turn.from_rotvec(w).apply(shift[0]))
+        v = np.where(np.abs(v) < ROUNDING * np.abs(course.shift).max(), 0.0, v)
+        rests = not (w.any() or v.any())
+        place = HERE
+        if moves:
+            half = Turn.from_rotvec(w / 2)
+            middle = half.apply(shift[0]) + _advance(w / 2) @ (v / 2)
+            turned = (half * Turn.from_matrix(turn[0])).as_rotvec()
+            # The same on the way there and back.
+            place = Placement(_rounded(middle), _rounded(turned), description.centre)
+            place = HERE if not (any(place.shift) or any(place.turn)) else place
+        begin, end = course.fraction[k : k + 2]
+        phases.append(
+            Phase(
+                1,
+                0.0,
+                float(times[k + 1] - times[k]),
+                0.0 if rests else 1.0,
+                float(begin + end) / 2,
+                screw(v, w, centre),
+                place,
+            )
+        )
+    speeds = tuple(phase.speed for phase in phases)
+    ends = tuple(float(time) for time in times)
+    return Motion(tuple(phases), len(phases), 1, (_PiecewiseLinear(ends, speeds, speeds),), (0.0,), ends)
+
+
+def _advance(w: Array) -> Array:
+    """Return J(w) (3, 3), by which a screw's turning bends its way."""
+    angle = float(np.linalg.norm(w))
+    cross = np.cross(np.eye(3), w)
+    if angle < SMALL:
+        return np.asarray(np.eye(3) + cross / 2 + cross @ cross / 6)
+    first, second = (1 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
+    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
+
+
+def _rounded(vector: Array) -> tuple[float, float, float]:
+    x, y, z = (float(c) + 0.0 for c in np.round(vector, 12))
+    return x, y, z

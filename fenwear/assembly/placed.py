@@ -99,8 +99,8 @@ class Placed:
     @property
     def normal_force(self) -> float:
         """The mean force of the loads on the contact, N; 0 where supports and not the contact carry it."""
-        force = self.rigid.mean_pressure * self.pair.weights.sum() * self.bodies.punch.thickness
-        return float(force) if self.rigid.translations else 0.0
+        force, both = self.rigid.carried * self.bodies.punch.thickness, (self.bodies.punch, self.bodies.strip)
+        return force if force > ROUNDING * max(body.acting for body in both) else 0.0
 
     def __repr__(self) -> str:
         """Say in a line what it is."""

@@ -23,6 +23,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_vector
@@ -31,6 +32,7 @@ from fenwear.errors import CaseError, InputError
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
 NO_WEIGHT = 1e-9  # of the largest: what rounding leaves
+BETWEEN = 0.1  # of the mean length of several curves: the gap between two of them
 REACH = 1e-6  # of the surface's size: how far it may reach beyond the points of its profile
 
 
@@ -54,7 +56,7 @@ class ContactSurface:
             where they are the same.
         names: Of the contacts that the surface is of; none where it is one.
         contact: Which of them each pressure node belongs to (n,); None where it is one.
-        arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, x in its middle; else None.
+        arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
     """
 
     body: str
@@ -70,6 +72,14 @@ class ContactSurface:
     arc: Array | None = None
     names: tuple[str, ...] = ()
     contact: NDArray[np.int64] | None = None
+
+    @cached_property
+    def part(self) -> NDArray[np.int64]:
+        """The number of the connected part of the surface that each pressure node belongs to (n,)."""
+        ring = np.roll(self.facets, -1, axis=1)
+        graph = csr_array((np.ones(ring.size), (self.facets.ravel(), ring.ravel())), shape=(len(self.trace),) * 2)
+        _, part = connected_components(graph, directed=False)
+        return np.asarray(np.unique(part[self.nodes], return_inverse=True)[1], dtype=np.int64)
 
     @cached_property
     def abscissa(self) -> Array:
@@ -336,10 +346,11 @@ def corner_functions(cell: str, points: Array) -> Array:
 
 
 def arc_length(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: bool) -> Array | None:
-    """Return the arc length of a curve's nodes (N,), mm; None of a graph over x, and of what is several curves.
+    """Return the arc length of the nodes of curves (N,), mm; None of graphs over x beside each other, and of branches.
 
-    It grows with x in the middle of the curve, where it is x. A closed curve is cut where it looks away from the other
-    body most, the punch being above the strip.
+    It grows with x in the middle of a curve, where it is x. A closed curve is cut where it looks away from the other
+    body most, the punch being above the strip. Several curves follow each other by the x of their middles, with gaps
+    between them and 0 in the middle of all.
 
     Args:
         trace: Coordinates of the trace nodes (N, 2), mm.
@@ -353,14 +364,38 @@ def arc_length(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: 
     grain = 1e-9 * float(np.ptp(trace, axis=0).max())
     if (high[order][:-1] <= low[order][1:] + grain).all() and (high - low > grain).all():
         return None
+    graph = csr_array((np.ones(len(facets)), facets[:, :2].T), shape=(len(trace), len(trace)))
+    _, curve = connected_components(graph, directed=False)
+    found, curves = np.zeros(len(trace)), []
+    for k in np.unique(curve[facets[:, 0]]):
+        own = np.flatnonzero(curve[facets[:, 0]] == k)
+        along = _along(trace, facets[own], inner[own], looks_up)
+        if along is None:
+            return None
+        nodes = np.unique(facets[own])
+        found[nodes] = along[nodes]
+        curves.append(nodes)
+    if len(curves) == 1:
+        return found
+    curves.sort(key=lambda nodes: tuple(np.round(trace[nodes].mean(axis=0) / grain)))
+    lengths = [float(np.ptp(found[nodes])) for nodes in curves]
+    gap = BETWEEN * sum(lengths) / len(lengths)
+    begin = -(sum(lengths) + gap * (len(lengths) - 1)) / 2
+    for nodes, length in zip(curves, lengths, strict=True):
+        found[nodes] += begin - found[nodes].min()
+        begin += length + gap
+    return found
+
+
+def _along(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: bool) -> Array | None:
+    """Return the arc length of the nodes of one curve (N,), 0 at all others; None where it branches."""
+    grain = 1e-9 * float(np.ptp(trace, axis=0).max())
     at: dict[int, list[int]] = {}  # the facets of each end
     for facet in range(len(facets)):
         for end in facets[facet, :2]:
             at.setdefault(int(end), []).append(facet)
-    if max(map(len, at.values())) > 2:
-        return None
     single = [node for node, own in at.items() if len(own) == 1]
-    if len(single) > 2:
+    if max(map(len, at.values())) > 2 or len(single) > 2:
         return None
     rounded = np.round(trace / grain)
     lowest, highest = (min(at, key=lambda end: (sign * rounded[end, 1], rounded[end, 0])) for sign in (1, -1))
@@ -368,19 +403,19 @@ def arc_length(trace: Array, facets: NDArray[np.int64], inner: Array, looks_up: 
     cut = lowest if hollow != looks_up else highest
     start = node = min(single, key=lambda end: tuple(rounded[end])) if single else cut
     local = np.argsort(_lagrange("interval", facets.shape[1] - 1).points[:, 0])
-    found, done, length = np.zeros(len(trace)), set[int](), 0.0
+    found, done, length, nodes = np.zeros(len(trace)), set[int](), 0.0, [start]
     while ways := [facet for facet in at[node] if facet not in done]:
         facet = min(ways, key=lambda way: trace[facets[way, :2], 0].sum())  # from a cut on towards smaller x
         done.add(facet)
         chain = facets[facet][local] if facets[facet, 0] == node else facets[facet][local[::-1]]
         sizes = np.linalg.norm(np.diff(trace[chain], axis=0), axis=1)
         found[chain[1:]] = length + np.cumsum(sizes)
+        nodes += chain[1:].tolist()
         length, node = length + float(sizes.sum()), int(chain[-1])
     found[start] = 0.0
-    if len(done) < len(facets):
-        return None
-    middle = int(np.abs(found - length / 2).argmin())
-    return np.asarray(found - found[middle] + trace[middle, 0])
+    middle = min(nodes, key=lambda one: abs(found[one] - length / 2))
+    found[nodes] += trace[middle, 0] - found[middle]
+    return found
 
 
 def _ascending(x: Array) -> NDArray[np.int64]:

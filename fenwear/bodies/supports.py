@@ -46,7 +46,7 @@ class Supports:
         conditions: All of them, as u = 0 on the degrees of freedom of a component.
         held: The owned degrees of freedom that they hold.
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
-        pivot: The point about which rotations are taken, mm.
+        pivot: The point about which rotations are taken, mm; of the first part where it has several.
         modes: Columns of R on the owned degrees of freedom; the displacement of each for a unit velocity.
         names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx" and
             "lambda_Fy" where the contact wraps around the body or is wrapped by it; of a body of several parts that
@@ -68,7 +68,9 @@ class Supports:
         """
         self.body, self.space, self.kind, self.contact, self._trace = body, space, kind, contact.local, contact
         self.dim = body.mesh.geometry.dim
-        self.pivot = _pivot(body, description)
+        self._part, self._count = self._parts()
+        self._pivots = self._pivots_of(description)
+        self.pivot = self._pivots[0]
         self.imposed = fem.Function(space)
         own = [*self._described(description.supports), *self._on_axis()]
         self.modes, self.names, self._loose = self._free_modes(self._owned(own), description.no_turning_about)
@@ -128,8 +130,10 @@ class Supports:
         high = np.array([comm.allreduce(x[:, i].max(initial=-np.inf), MPI.MAX) for i in range(3)])
         return float((high - low).max())
 
-    def rigid_basis(self) -> NDArray[np.float64]:
+    def rigid_basis(self, pivot: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Return the translations and the rotations omega x (x - x_O) on the owned dofs (owned, modes).
+
+        About a pivot x_O, by default that of the first part.
 
         A positive rotation about y lowers what lies at larger x:
         u = (z - z_O, -(x - x_O)). These are the paper's signs of lambda_M.
@@ -137,7 +141,7 @@ class Supports:
         owned = self.space.dofmap.index_map.size_local
         x = self.space.tabulate_dof_coordinates()[:owned]
         dim = self.dim
-        arm = x[:, :dim] - self.pivot
+        arm = x[:, :dim] - (self.pivot if pivot is None else pivot)
         if dim == 2:
             turns = np.stack([arm[:, 1], -arm[:, 0]], axis=1)[:, :, None]
         else:
@@ -160,13 +164,13 @@ class Supports:
             CaseError: a part is free to slide along the contact, or to spin about its normal; or it is free, and its
                 contact looks another way than z, or it has none.
         """
-        part, count = self._parts()
+        part, count = self._part, self._count
         modes, names, loose = [], [], []
         surface = self._trace.surface
         owned = np.repeat(part, self.dim)
         of_nodes = np.rint(self._trace.pick(owned[:, None].astype(float))[surface.nodes, 0, 0]).astype(np.int64)
         for k in range(count):
-            found = self._modes_of(owned == k, surface.outward[of_nodes == k], held, guided)
+            found = self._modes_of(k, owned == k, surface.outward[of_nodes == k], held, guided)
             modes += found[0]
             names += [name if count == 1 else f"{name}_{self._part_name(of_nodes, k)}" for name in found[1]]
             loose += found[2]
@@ -191,6 +195,28 @@ class Supports:
         node[self.space.dofmap.list[: len(part)]] = part[:, None]
         return node[: index_map.size_local], mesh.comm.allreduce(int(part.max(initial=0)), MPI.MAX) + 1
 
+    def _pivots_of(self, description: Body) -> list[NDArray[np.float64]]:
+        """Return the point about which rotations of each part are taken; collective.
+
+        By default the middle of the points at which the first support of points holds it, as a hinge does.
+        """
+        if description.pivot is not None:
+            return [np.array(description.pivot)] * self._count
+        body, comm, tolerance = self.body, self.body.mesh.comm, 1e-6 * self._size()
+        nodes = self.space.tabulate_dof_coordinates()[: len(self._part), : self.dim]
+        found: list[NDArray[np.float64] | None] = [None] * self._count
+        for number, support in enumerate(description.supports):
+            if support.on is not None and support.on not in body.points:
+                continue
+            points = _support_points(body, support, f"{body.name}.supports.{number}")
+            distance = np.linalg.norm(nodes[:, None] - points[None], axis=2)
+            parts = np.where(distance < tolerance, self._part[:, None], -1).max(axis=0, initial=-1)
+            parts = comm.allreduce(parts, MPI.MAX)
+            for k in range(self._count):
+                if found[k] is None and (parts == k).any():
+                    found[k] = points[parts == k].mean(axis=0)
+        return [np.zeros(self.dim) if point is None else point for point in found]
+
     def _untouched(self, k: int) -> str:
         """Say which part neither touches nor is held; collective."""
         part = connected_parts(self.body.mesh)
@@ -198,13 +224,13 @@ class Supports:
         return _parts_text(self.body.name, part_boxes(self.body.mesh, part, count), k)
 
     def _modes_of(
-        self, own: Mask, normal: NDArray[np.float64], held: NDArray[np.int32], guided: Sequence[str]
+        self, number: int, own: Mask, normal: NDArray[np.float64], held: NDArray[np.int32], guided: Sequence[str]
     ) -> tuple[list[NDArray[np.float64]], list[str], list[NDArray[np.float64]]]:
         """Return the same of one part: of its degrees of freedom (owned,) and normals of its contact nodes (k, d)."""
         names, forbidden = _balanced(self.kind, normal)
         columns = [*names, *forbidden]
         turns = [self._turn(axis) for axis in guided]
-        basis, comm = self.rigid_basis()[:, columns] * own[:, None], self.body.mesh.comm
+        basis, comm = self.rigid_basis(self._pivots[number])[:, columns] * own[:, None], self.body.mesh.comm
         rows = basis[held]
         gram = comm.allreduce(rows.T @ rows)
         scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
@@ -344,16 +370,6 @@ def _parts_text(name: str, boxes: NDArray[np.float64], part: int) -> str:
         f"touches nor is held: expected parts that are joined in the mesh (in gmsh Coherence, or BooleanFragments), or "
         f"each with a share of {name}_contact or supports of its own"
     )
-
-
-def _pivot(body: BodyMesh, description: Body) -> NDArray[np.float64]:
-    """Return the point O about which rotations are taken; by default the first support's centre."""
-    if description.pivot is not None:
-        return np.array(description.pivot)
-    for number, support in enumerate(description.supports):
-        if support.on is None or support.on in body.points:
-            return _support_points(body, support, f"{body.name}.supports.{number}").mean(axis=0)
-    return np.zeros(body.mesh.geometry.dim)
 
 
 def _column_echelon(matrix: NDArray[np.float64]) -> tuple[NDArray[np.float64], list[int]]:

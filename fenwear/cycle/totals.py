@@ -37,6 +37,7 @@ SUMS = (
     "distance", "load_path", "load_distance", "drag_distance", "work", "volume_punch", "mass_punch", "volume_strip",
     "mass_strip",
 )  # fmt: skip
+AROUND = 0.1  # mean normal of a part of the contact below which it looks all ways
 MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
 
@@ -139,13 +140,20 @@ def _along_approach(system: Placed, phase: int, mu: Array) -> Array:
 def approach(rigid: RigidEquilibrium) -> Array:
     """Return the way in which the load acts at each node (n, d).
 
-    It is the translation of the bodies that brings them together; where supports hold it, the mean normal.
+    It is the translation of the bodies that brings them together. Parts of the contact that supports hold against that,
+    or that turn about a hinge, are pressed along their mean normal; along each normal where these add up to nothing,
+    as around a whole bore.
     """
-    along = rigid.approach
-    if along is not None:
-        return along
-    mean = rigid.pair.weights @ rigid.pair.normal
-    return np.broadcast_to(mean / np.linalg.norm(mean), rigid.pair.normal.shape)
+    along, pair = rigid.approach, rigid.pair
+    found = np.zeros_like(pair.normal) if along is None else along.copy()
+    for k in range(pair.punch.part.max() + 1):
+        own = pair.punch.part == k
+        if np.abs(found[own]).max() > 0:
+            continue
+        mean = pair.weights[own] @ pair.normal[own] / pair.weights[own].sum()
+        size = np.linalg.norm(mean)
+        found[own] = mean / size if size > AROUND else pair.normal[own]
+    return found
 
 
 def cycle_totals(system: Placed, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:

@@ -55,8 +55,19 @@ class RigidEquilibrium:
     @property
     def mean_pressure(self) -> float:
         """Load over the nominal contact, MPa; 1 where supports and not the contact carry the load."""
-        forces = [np.linalg.norm(self.resultant[own]) for own in self.translations]
-        return float(sum(forces) / self.pair.weights.sum()) or 1.0 if forces else 1.0
+        return self.carried / float(self.pair.weights.sum()) or 1.0
+
+    @property
+    def carried(self) -> float:
+        """The load that the contact carries, N or N/mm; of bodies that turn about hinges moments over arms."""
+        forces = [float(np.linalg.norm(self.resultant[own])) for own in self.translations]
+        return sum(forces or [abs(float(self.resultant[k])) / self._arm(k) for k in range(len(self.resultant))])
+
+    def _arm(self, mode: int) -> float:
+        """Return the mean arm of the normals about the axis of a rotation, mm."""
+        turned = np.abs(self.rigid_normal[:, mode])
+        own = turned > 0
+        return float(self.pair.weights @ turned / max(self.pair.weights @ own, 1e-300)) or 1.0
 
     @property
     def translations(self) -> list[list[int]]:

@@ -35,6 +35,9 @@ COMPONENTS = {"xx": "σ xx", "zz": "σ zz", "xz": "σ xz"}
 SHOWN_WIDE = 2.0  # widths over height of both bodies that are shown whole
 LINE_OF_TEXT = 0.07  # of the height of a panel
 CLOSE_UP = 0.75  # of the contact's width: what a close view has of the bodies above and below
+APART = 5.0  # of the distance of contact nodes: from which on two are of two parts
+BETWEEN = 0.1  # of the mean length of parts: the gap between two of them
+ROUND = 0.5  # height of a contact over its width: from which on the close view has all of it
 PLATE: Any = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1}
 FILLS = {"punch": "#d6e4f0", "strip": "#f3e3d6"}
 
@@ -42,10 +45,10 @@ FILLS = {"punch": "#d6e4f0", "strip": "#f3e3d6"}
 def stress_figure(fields: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the components of the stress and von Mises' stress along the contact surfaces of both bodies."""
     figure, axes = panels(2, 3.0, look=look)
-    contact = fields.punch_contact_x.values
+    contact = _along(fields.punch_contact_x.values, fields.punch_contact_z.values)
     margin = 0.25 * np.ptp(contact)
     for ax, body in zip(axes, BODIES, strict=True):
-        x = fields[f"{body}_contact_x"].values
+        x = _along(*(fields[f"{body}_contact_{axis}"].values for axis in "xz"))
         nodes = _contact_nodes(fields, body)
         order = np.argsort(x)
         for number, (part, text) in enumerate(COMPONENTS.items()):
@@ -58,6 +61,17 @@ def stress_figure(fields: xarray.Dataset, look: Look = STANDARD) -> Figure:
     contact_axis(axes[-1])
     axes[-1].set_xlim(contact.min() - margin, contact.max() + margin)
     return figure
+
+
+def _along(x: Array, z: Array) -> Array:
+    """Return where contact nodes are along a contact (n,), mm: x, or the arc length, which is x in the middle."""
+    if (np.diff(x) > 0).all():
+        return x
+    steps = np.hypot(np.diff(x), np.diff(z))
+    far = steps > APART * np.median(steps)
+    arc = np.append(0.0, np.cumsum(np.where(far, BETWEEN * steps[~far].sum() / (1 + far.sum()), steps)))
+    middle = int(np.abs(arc - arc[-1] / 2).argmin())
+    return np.asarray(arc - arc[-1] / 2 if far.any() else arc - arc[middle] + x[middle])
 
 
 def _contact_nodes(fields: xarray.Dataset, body: str) -> NDArray[np.int64]:
@@ -76,15 +90,19 @@ def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look 
     names = {ax: _Names(ax) for ax in axes}
     x, z = fields.punch_contact_x.values, fields.punch_contact_z.values
     width = float(np.ptp(x))
+    steps = np.hypot(np.diff(x), np.diff(z))
+    apart = 1 + np.flatnonzero(steps > APART * np.median(steps))  # parts of the contact
     for ax in axes:
         for body in BODIES:
             _elements(ax, fields, body)
             _ends(ax, fields, body, case, names[ax] if ax is axes[0] else None)
-        ax.plot(x, z, color=GREEN, linewidth=2.0)
+        ax.plot(*np.insert(np.stack([x, z]), apart, np.nan, axis=1), color=GREEN, linewidth=2.0)
         ax.set_aspect("equal", adjustable="box")
         ax.set_xlabel("x (mm)")
         ax.set_ylabel("z (mm)")
     low, high = float(z.min()) - CLOSE_UP * width, float(z.min()) + CLOSE_UP * width
+    if np.ptp(z) > ROUND * width:
+        low, high = float(z.min()) - 0.25 * width, float(z.max()) + 0.25 * width
     _cut_off(axes[0], fields, case)
     names[axes[0]].write()
     axes[1].set_xlim(x.min() - 0.5 * width, x.max() + 0.5 * width)

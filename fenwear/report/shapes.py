@@ -15,6 +15,7 @@ from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, pa
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -58,27 +59,37 @@ def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Lo
 
 
 def _outline_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look) -> Figure:
-    """Draw a round contact of the punch as a tester of roundness sees it: its outline, depths magnified."""
-    outline = np.column_stack([history.place.values, history.height.values])
-    middle = (outline.min(axis=0) + outline.max(axis=0)) / 2
-    ways = np.gradient(outline, axis=0)
-    normal = (
-        np.column_stack([-ways[:, 1], ways[:, 0]]) / np.linalg.norm(ways, axis=1)[:, None]
-    )  # to the left of the way
-    depth, size = history.wear, float(np.ptp(outline, axis=0).max())
-    deepest = float(depth.sel(half_cycle=list(half_cycles)).max())
-    magnified = DRAWN * size / deepest if deepest > 0 else 1.0
-    figure, (ax,) = panels(1, 5.0, look=look)
-    ax.plot(*outline.T, color="0", linestyle="--", linewidth=1.2, label="unworn")
-    for colour, n in shades(half_cycles):
-        worn = outline + magnified * depth.sel(half_cycle=n).values[:, None] * normal
-        ax.plot(*worn.T, color=colour, label=look.name(history, n), gid=str(n))
-    ax.plot(*middle, "+", color="0")
-    ax.set_aspect("equal")
-    ax.set_xlabel("x (mm)")
-    ax.set_ylabel(f"z (mm), depths {magnified:,.3g} times as large")
-    legend_beside(ax, look.of_one)
+    """Draw round contacts as a tester of roundness sees them: their outlines, depths magnified."""
+    worn = [end for body, end in BODIES.items() if f"wear{end}" in history and f"place{end}" in history]
+    figure, axes = panels(len(worn), 5.0, look=look)
+    for ax, end in zip(axes, worn, strict=True):
+        outline, normal = (
+            np.column_stack([history[f"{name}{end}"].values for name in names])
+            for names in (("place", "height"), ("inwards_x", "inwards_z"))
+        )
+        depth, size = history[f"wear{end}"], float(np.ptp(outline, axis=0).max())
+        deepest = float(depth.sel(half_cycle=list(half_cycles)).max())
+        magnified = DRAWN * size / deepest if deepest > 0 else 1.0
+        part = history[f"part{end}"].values if f"part{end}" in history else np.zeros(len(outline))
+        cuts = np.flatnonzero(np.diff(part)) + 1
+        _trace(ax, outline, cuts, color="0", linestyle="--", linewidth=1.2, label="unworn")
+        for colour, n in shades(half_cycles):
+            worn_away = outline + magnified * depth.sel(half_cycle=n).values[:, None] * normal
+            _trace(ax, worn_away, cuts, color=colour, label=look.name(history, n), gid=str(n))
+        ax.plot(*((outline.min(axis=0) + outline.max(axis=0)) / 2), "+", color="0")
+        ax.set_aspect("equal")
+        ax.set_ylabel(f"z (mm), depths {magnified:,.3g} times as large")
+        legend_beside(ax, look.of_one)
+    axes[-1].set_xlabel("x (mm)")
     return figure
+
+
+def _trace(ax: Axes, outline: Array, cuts: NDArray[np.int64], **style: Any) -> None:
+    """Draw an outline (n, 2) with gaps before these nodes; closed where it is one curve that ends where it began."""
+    steps = np.linalg.norm(np.diff(outline, axis=0), axis=1)
+    if not len(cuts) and np.linalg.norm(outline[-1] - outline[0]) < 2 * steps.max():
+        outline = np.vstack([outline, outline[:1]])
+    ax.plot(*np.insert(outline, cuts, np.nan, axis=0).T, **style)
 
 
 def worn_range(history: xarray.Dataset) -> tuple[float, float]:

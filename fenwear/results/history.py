@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.assembly import Tribosystem
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
@@ -145,8 +146,24 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
         unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
         columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
     if arc:
-        columns["place"] = Column(("x",), pair.punch.x[:, 0], {"units": "mm", "long_name": "x of the contact node"})
+        columns |= _outline(pair.punch, "")
+    if system.strip_wears and pair.strip.arc is not None:
+        columns |= _outline(pair.strip, "_strip")
     return {**columns, **part_columns(system, plane=True), **steps.columns(system)}
+
+
+def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
+    """Return where the nodes of a curve that is no graph over x are, and the normals into the body there."""
+    over, inwards = (f"x{end}",), -surface.outward
+    known = {
+        "place": (surface.x[:, 0], "mm", "x of the contact node"),
+        "inwards_x": (inwards[:, 0], "1", f"x component of the normal into the {surface.body}"),
+        "inwards_z": (inwards[:, 1], "1", f"z component of the normal into the {surface.body}"),
+    }
+    return {
+        f"{name}{end}": Column(over, values, {"units": unit, "long_name": text})
+        for name, (values, unit, text) in known.items()
+    }
 
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:

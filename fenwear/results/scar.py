@@ -2,7 +2,9 @@
 
 A scar is where the depth is more than a share of the largest one, by default a hundredth. Its edge is put between two
 nodes by linear interpolation, and so is right to an element, of which it takes rather too much. Length is along the
-sliding and width across it; on rings and on closed tracks the scar goes all the way round, and has a width alone.
+sliding and width across it; on rings and on closed tracks the scar goes all the way round, and has a width alone. On
+curves that are no graphs over x it is counted along them. Where a contact has parts that lie apart, it is that of the
+largest scar, without the gaps between them.
 """
 
 from __future__ import annotations
@@ -30,12 +32,14 @@ class ScarGeometry:
     Attributes:
         coordinates: Along and across the sliding (n, 2), or across it alone (n, 1), mm.
         edges: Pairs of neighbouring nodes (m, 2).
+        part: The connected part of the surface of each node (n,).
         names: Of the extents: ("length", "width"), ("width",) of what is worn all the way round, and none of a plane's
             strip that is.
     """
 
     coordinates: Array
     edges: NDArray[np.int64]
+    part: NDArray[np.int64]
     names: tuple[str, ...]
 
     def extents(self, depth: Array, share: float = EDGE) -> dict[str, Array]:
@@ -47,10 +51,17 @@ class ScarGeometry:
         """
         if not self.names:
             return {}
-        return dict(zip(self.names, extents(depth, self.coordinates, self.edges, share).T, strict=True))
+        level = share * depth.max(axis=1, initial=0.0)
+        found = np.zeros((len(depth), len(self.names)))
+        for k in range(self.part.max(initial=-1) + 1):
+            own = np.where(self.part == k, depth, 0.0)
+            found = np.maximum(found, extents(own, self.coordinates, self.edges, share, level))
+        return dict(zip(self.names, found.T, strict=True))
 
 
-def extents(depth: Array, coordinates: Array, edges: NDArray[np.int64], share: float = EDGE) -> Array:
+def extents(
+    depth: Array, coordinates: Array, edges: NDArray[np.int64], share: float = EDGE, level: Array | None = None
+) -> Array:
     """Return how far scars reach along each coordinate (k, c), mm.
 
     Args:
@@ -58,8 +69,9 @@ def extents(depth: Array, coordinates: Array, edges: NDArray[np.int64], share: f
         coordinates: Of the nodes (n, c), mm.
         edges: Pairs of neighbouring nodes (m, 2).
         share: Of the largest depth, where a scar ends.
+        level: The depth where it ends (k,), mm, in place of that share.
     """
-    level = share * depth.max(axis=1, initial=0.0)[:, None]
+    level = (share * depth.max(axis=1, initial=0.0) if level is None else level)[:, None]
     inside = depth > level
     first, second = edges.T
     a, b = depth[:, first] - level, depth[:, second] - level
@@ -82,16 +94,15 @@ def scar_geometry(placed: Placed, surface: ContactSurface) -> ScarGeometry:
     edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
     edges = np.unique(edges, axis=0)
     all_round = surface is placed.pair.strip and placed.sliding.track is not None
+    part = surface.part
     if surface.dim == 2:
-        return (
-            ScarGeometry(surface.x[:, :0], edges, ())
-            if all_round
-            else ScarGeometry(surface.x[:, :1], edges, ("width",))
-        )
+        if all_round:
+            return ScarGeometry(surface.x[:, :0], edges, part, ())
+        return ScarGeometry(surface.abscissa[:, None], edges, part, ("width",))
     coordinates = sliding_chart(placed.sliding.field, placed.pair).coordinates(surface.x)
     if all_round:
-        return ScarGeometry(coordinates[:, 1:], edges, ("width",))
-    return ScarGeometry(coordinates, edges, ("length", "width"))
+        return ScarGeometry(coordinates[:, 1:], edges, part, ("width",))
+    return ScarGeometry(coordinates, edges, part, ("length", "width"))
 
 
 def conforming(pair: ContactPair) -> bool:

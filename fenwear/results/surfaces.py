@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
@@ -96,19 +94,11 @@ def part_columns(placed: Placed, plane: bool) -> dict[str, Column]:
             flags = {"flag_values": np.arange(len(surface.names)), "flag_meanings": " ".join(surface.names)}
             text = {"units": "1", "long_name": f"contact that each node of the {surface.body} belongs to"}
             found[f"contact{end}"] = Column(over, surface.contact, {**text, **flags})
-        part = _parts(surface)
+        part = surface.part
         if plane and part.max() > 0:
             text = {"units": "1", "long_name": f"part of the {surface.body}'s surface that each node belongs to"}
             found[f"part{end}"] = Column(over, part, text)
     return found
-
-
-def _parts(surface: ContactSurface) -> NDArray[np.int64]:
-    """Return the number of the connected part that each pressure node belongs to (n,)."""
-    cells, n = surface_cells(surface), len(surface.nodes)
-    first = np.repeat(cells[:, 0], cells.shape[1])
-    graph = csr_array((np.ones(cells.size), (first, cells.ravel())), shape=(n, n))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
 
 def coordinate_names(end: str, dim: int) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ class ContactNet:
 
     Attributes:
         surface: The punch's.
-        coordinates: Of the nodes (n, c): along and across the sliding in a solid, x or r else, mm.
+        coordinates: Of the nodes (n, c): along and across the sliding in a solid, else along the curve, mm.
         cells: Nodes of each linear facet (f, k).
         names: Of the numbers of nodes along each coordinate.
         axes: Names of the coordinates of a place on the surface.
@@ -121,6 +121,7 @@ def contact_net(pair: ContactPair, field: SlidingField, axes: tuple[str, ...]) -
     """
     surface = pair.punch
     if surface.dim == 2:
-        return ContactNet(surface, surface.x[:, :1], surface_cells(surface), ("nodes_across_contact",), axes)
+        along = surface.abscissa[:, None]
+        return ContactNet(surface, along, surface_cells(surface), ("nodes_across_contact",), axes)
     names = ("nodes_along_sliding", "nodes_across_sliding")
     return ContactNet(surface, sliding_chart(field, pair).coordinates(surface.x), surface_cells(surface), names, axes)

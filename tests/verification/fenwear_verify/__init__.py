@@ -2,6 +2,7 @@
 
 from fenwear_verify import (
     bores,
+    brakes,
     conduction,
     contact,
     curved,
@@ -33,6 +34,7 @@ __all__ = [
     "Row",
     "VerificationCase",
     "bores",
+    "brakes",
     "conduction",
     "contact",
     "curved",

@@ -139,7 +139,8 @@ def _run(
         seconds = time.perf_counter() - begin
         ended = {"stop": run.stop(failure), **how, "half_cycles_seconds": seconds}
         said = [system.names.told(text) for text in warnings]
-        return run.finish({**ended, "warnings": said, "retries": run.remedies}, report=report)
+        ending = {**ended, "warnings": said, "retries": run.remedies}
+        return run.finish(ending, report=report, uncertain=failure is None)
 
     with noted as signals:
         try:
@@ -375,7 +376,7 @@ class _Run:
         how = "" if isinstance(failure, InterruptedRunError) else ", such as with other solver options behind --"
         return f"{reached}, to go on: --resume{how}"
 
-    def finish(self, how: dict[str, Any], *, report: bool) -> dict[str, Any]:
+    def finish(self, how: dict[str, Any], *, report: bool, uncertain: bool) -> dict[str, Any]:
         """Write what a run ends with, and return the summary; collective."""
         self._on_history(HistoryWriter.close)
         if self.last is None:
@@ -388,11 +389,22 @@ class _Run:
             how = {**how, "no_growth_rate": reason}
         summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
+        if uncertain and self.case.output.uncertainty:
+            summary["uncertainty"] = self._uncertainty(self.last)
+            on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
             from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
 
             on_root(self.comm, lambda: try_report(self.directory, self.log))
         return summary
+
+    def _uncertainty(self, last: Block) -> dict[str, Any]:
+        """Return how uncertain the numbers of the end are, and tell it; collective."""
+        from fenwear.accuracy import shown, uncertainty
+
+        found = uncertainty(self.case, last)
+        self.log(shown.text(last.system, found))
+        return shown.table(last.system, found)
 
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""

@@ -111,6 +111,11 @@ class Output(Part):
     )
     checkpoint: Annotated[Time, Field(gt=0)] = Field(default=60.0, description="time between two checkpoints")
     report: bool = Field(default=True, description="draw figures and report.html when the run has ended")
+    uncertainty: bool = Field(
+        default=True,
+        description="estimate the numerical uncertainty of depths, volumes, pressures and temperatures at the end of a "
+        "run, from the same run on coarser elements",
+    )
     figures_at: tuple[Annotated[int, Field(ge=1, strict=True)], ...] = Field(
         default=(), description="half-cycles that the figures show; by default six spread over the run"
     )

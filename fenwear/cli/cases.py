@@ -80,7 +80,13 @@ def run(
 
 
 @app.command("check")
-def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa: B006
+def check_command(
+    case: CaseArgument,
+    settings: SetOption = [],  # noqa: B006
+    accuracy: Annotated[
+        bool, typer.Option("--accuracy", help="Estimate how uncertain the numbers of the run will be.")
+    ] = False,
+) -> None:
     """Validate a case with its geometry and print it with all defaults."""
     from fenwear.assembly import elastic, law_named, needs_of, place_case, shares_text, with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings, stability_number
@@ -90,7 +96,7 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
 
     loaded = load(case, settings)
     if loaded.sticks:
-        _check_stick(with_law(loaded, "coulomb"))
+        _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy)
         return
     placed = place_case(loaded)
     wanted = needs_of(placed)
@@ -102,7 +108,8 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
         log(choice.text)
         loaded = with_law(loaded, choice.law)
         if choice.law == "coulomb":
-            _check_stick(loaded, law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False))
+            stuck = law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False)
+            _check_stick(loaded, stuck, accuracy=accuracy)
             return
         system = replace(system, made_from=loaded)
     from fenwear.optimum import motion_words
@@ -124,17 +131,31 @@ def check_command(case: CaseArgument, settings: SetOption = []) -> None:  # noqa
     for body, modes in (("punch", rigid.mode_names[: rigid.of_punch]), ("strip", rigid.mode_names[rigid.of_punch :])):
         if modes:
             log(f"the {body} is free to {', '.join(map(motion_words, modes))}: the contact has to balance it")
+    if accuracy:
+        _foresee(warm)
 
 
-def _check_stick(case: Case, system: Tribosystem | None = None) -> None:
+def _foresee(system: Tribosystem) -> None:
+    """Say how uncertain the numbers of a run will be."""
+    from fenwear.accuracy import foreseen, shown
+
+    found = foreseen(system)
+    log(f"foreseen for the end of the run, in {found.seconds:.2g} s: {shown.text(system, found)}")
+
+
+def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: bool) -> None:
     """Print a case with stick with all defaults, and what its first cycle comes to."""
+    from fenwear.assembly import assemble
     from fenwear.cli.partial_slip import check_text
 
+    system = system or assemble(case)
     text = check_text(case, system)
     for warning in doubts(case):
         log(f"warning: {warning}")
     print_case(case)
     log(text)
+    if accuracy:
+        _foresee(system)
 
 
 @app.command("new")

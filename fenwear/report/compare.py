@@ -158,7 +158,9 @@ def compare(directories: Sequence[Path]) -> Comparison:
     if len({has_stick(history) for history, _, _ in read}) > 1:
         raise CaseError(InputError("DIR", "expected runs with stick, or runs in gross sliding, not both"))
     summaries = [summary for _, summary, _ in read]
-    shown = [{k: v for k, v in s.items() if k not in ("versions", "warnings", "title")} for s in summaries]
+    shown = [
+        {k: v for k, v in s.items() if k not in ("versions", "warnings", "title", "uncertainty")} for s in summaries
+    ]
     return Comparison(
         names=_names(directories),
         histories=[history for history, _, _ in read],

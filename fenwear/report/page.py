@@ -22,9 +22,10 @@ from fenwear.report.stick import write_stick_report
 from fenwear.report.style import STANDARD, Look
 from fenwear.report.surface import model_of
 from fenwear.report.turned import Turned, turned_map
+from fenwear.report.uncertainty import uncertainty_rows
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
-from fenwear.results.sheet import BODIES, LINES, shown
+from fenwear.results.sheet import BODIES, LINES, UNCERTAINTY, shown
 
 REPORT = "report.html"
 SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "volume",
@@ -154,6 +155,8 @@ def page(directory: Path, look: Look = STANDARD) -> str:
         heat=_heat(summary),
         heat_balance=_figure(images, "heat_balance", caption("heat_balance", history, look)),
         stability=_stability(summary, history),
+        uncertainty=summary.get(UNCERTAINTY),
+        uncertainties=uncertainty_rows(summary),
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),
     )
@@ -190,7 +193,8 @@ def _sheet_table(name: str, sheet: dict[str, int | float]) -> Table:
 
 def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
     """Return every number of a summary by its path."""
-    values = flat({key: value for key, value in summary.items() if key not in ("versions", "warnings", "retries")})
+    left_out = ("versions", "warnings", "retries", UNCERTAINTY)
+    values = flat({key: value for key, value in summary.items() if key not in left_out})
     return {k: v for k, v in values.items() if isinstance(v, int | float) and not isinstance(v, bool)}
 
 

@@ -30,11 +30,12 @@ from fenwear.report.style import (
     shades,
 )
 from fenwear.report.surface import model_of
+from fenwear.report.uncertainty import uncertainty_rows
 from fenwear.results.cycles import by_cycles
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
 from fenwear.results.reading import load_history
-from fenwear.results.sheet import sheet_rows
+from fenwear.results.sheet import UNCERTAINTY, sheet_rows
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -286,6 +287,8 @@ def _page(directory: Path, history: xarray.Dataset, pictures: list[Any]) -> str:
         stop=summary.get("stop", "no summary yet"),
         warnings=summary.get("warnings", ()),
         numbers=numbers,
+        uncertainty=summary.get(UNCERTAINTY),
+        uncertainties=uncertainty_rows(summary),
         figures=pictures,
         case=(directory / CASE).read_text("utf-8"),
         versions="\n".join(f"{name} {version}" for name, version in summary.get("versions", {}).items()),

@@ -31,6 +31,7 @@ Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5": 0.05}  # of the largest depth, where widths are read, and how their names end
 WEAR_RATE = "mm3/(N m)"
+UNCERTAINTY, WITHIN = "uncertainty", "... numerical uncertainty"
 COLUMN = 12  # characters of a column of the printed sheet
 
 SLIDING: dict[str, Variable] = {
@@ -311,11 +312,25 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
     bodies = [summary[body] for body in BODIES if body in summary]
     heat = {f"heat_mJ.{term}": value for term, value in summary.get("heat_mJ", {}).items() if value}
     rows = []
+    uncertain = summary.get(UNCERTAINTY, {})
+    of_bodies = [uncertain.get(body, {}) for body in BODIES if body in summary]
     for key, line in LINES.items():
         found = next(([one] for one in (summary.get("sliding", {}), heat, summary) if key in one), bodies)
         if any(key in one for one in found):
             rows.append((line.label, line.unit, [shown(one.get(key), line) for one in found]))
+            rows += _within(key, line, of_bodies if found is bodies else [uncertain])
     return rows
+
+
+def _within(key: str, line: Line, uncertain: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, list[float | None]]]:
+    """Return the line below one of the sheet that says how uncertain its numbers are; none where that is not known."""
+    if not any(key in one for one in uncertain):
+        return []
+    return [(WITHIN, line.unit, [_two_digits(shown(one.get(key), line)) for one in uncertain])]
+
+
+def _two_digits(value: float | None) -> float | None:
+    return value if value is None or not np.isfinite(value) else float(f"{value:.1e}")
 
 
 def shown(value: Any, line: Line) -> Any:
@@ -328,11 +343,12 @@ def sheet_text(summary: Mapping[str, Any]) -> str:
     rows, names = sheet_rows(summary), Names(**summary.get("names", {}))
     bodies = [names.by_roles[body] for body in BODIES if body in summary]
     ways = [name for name, one in summary.items() if isinstance(one, Mapping) and "max_pressure_MPa" in one]
-    contact = [
-        (line.label, line.unit, [shown(summary[way].get(key), line) for way in ways])
-        for key, line in OF_CONTACT.items()
-        if any(key in summary[way] for way in ways)
-    ]
+    uncertain = [summary.get(UNCERTAINTY, {}).get(way, {}) for way in ways]
+    contact = []
+    for key, line in OF_CONTACT.items():
+        if any(key in summary[way] for way in ways):
+            contact.append((line.label, line.unit, [shown(summary[way].get(key), line) for way in ways]))
+            contact += _within(key, line, uncertain)
     labels = [names.told(f"{label} ({unit})" if unit else label) for label, unit, _ in (*rows, *contact)]
     wide = max(map(len, labels), default=0)
     lines = []

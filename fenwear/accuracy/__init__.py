@@ -1,0 +1,30 @@
+"""The numerical uncertainty of what a run tells: how far depth, volume, pressure and temperature may be from the limit.
+
+In the words of ASME V&V 20 the error of a number against a measurement has parts of the input, the model and the
+numerics; here it is the last of these alone, u_num, estimated after the run (solution verification, V&V 10). Each
+source is a contribution of its own, and their sum bounds what they come to together, whatever their signs:
+
+    mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements;
+    wear steps   of marched half-cycles or of jumps, from the same run in smaller steps;
+    positions    of the strip in a half-cycle, from the same run with half as many;
+    following    of meshes that follow the wear, from the same run in which they follow half as often;
+    heat steps   what halving them changes of the contact's temperatures;
+    heat basis   how far temperatures on it are from those of the whole mesh;
+    solver       what is left of equilibrium, and rounding.
+
+The runs that are compared are made on the coarser elements, so that all of them together take less than the set-up of
+the bodies does; only that against the run itself is of its own size. With phi_h of the run, phi_H of the coarser one
+and r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluids Eng. 116, 1994),
+
+    u = 1.25 d / (r^q - 1),    d = |phi_h - phi_H| or, if that is more, what their fields differ by (`Value.apart`).
+
+Contact limits the order: quadratic elements and better have q = 3/2 where the edges of contact are free (Z. Belhachmi,
+F. Ben Belgacem, Math. Comp. 72, 2003). A largest value at an edge, where the limit is a singularity or a step that wear
+has left, is taken to approach it with q = 1 only. What the coarser run cannot see, errors of the model, of the
+friction and wear coefficients, is no part of it.
+"""
+
+from fenwear.accuracy.told import Uncertainty, foreseen, uncertainty
+from fenwear.accuracy.values import Quantity, Value, values_of
+
+__all__ = ["Quantity", "Uncertainty", "Value", "foreseen", "uncertainty", "values_of"]

@@ -1,0 +1,64 @@
+"""What steps and bases of the heat contribute: to temperatures what is known of both, to pressures what the gap feels.
+
+The exchange knows how far contact temperatures and the thermal gap are from those of smaller steps and of the whole
+mesh, relative to themselves. The pressure is solved for once more with a thermal gap that is larger by as much; worn
+depths differ by no more than it does beside a rigid motion, and by no more than the pressure that wears them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenwear.accuracy.values import Contribution, Values
+from fenwear.arrays import Array
+from fenwear.cycle import Block
+from fenwear.errors import ConvergenceError
+
+
+def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
+    """Return what steps and basis of the heat contribute to the numbers of a run's end; none without heat; collective.
+
+    Args:
+        last: The last half-cycles.
+        values: Their numbers.
+    """
+    exchange = last.system.exchange
+    fineness = None if exchange is None else exchange.fineness
+    if fineness is None or last.heat is None:
+        return {}
+    known = {"heat steps": fineness.change, "heat basis": fineness.difference}
+    return {source: _of(last, values, share) for source, share in known.items() if share is not None}
+
+
+def _of(last: Block, values: Values, share: float) -> Contribution:
+    assert last.heat is not None
+    system = last.system
+    begin = 0.0 if system.heat is None else system.heat.initial
+    rise = float(last.heat.max_temperature[-1]) - begin
+    pressure, depth = system.led(lambda: _felt(last, share)) if not system.sticks else (share, np.inf)
+    found: Contribution = {}
+    for quantity, value in values.items():
+        relative = pressure * abs(value.number)
+        found[quantity] = {
+            "temperature": share * abs(rise),
+            "pressure": relative,
+            "depth": min(relative, depth),
+            "volume": 0.0,
+        }[quantity.name]
+    return found
+
+
+def _felt(last: Block, share: float) -> tuple[float, float]:
+    """Return the relative change of the largest pressure by a share more of the thermal gap, and that gap's range."""
+    system, exchange, temperature = last.system, last.system.exchange, last.end.temperature
+    if exchange is None or temperature is None:
+        return share, np.inf
+    phase = (int(last.half_cycle[-1]) * system.motion.positions - 1) % len(system.motion.phases)
+    thermal = exchange.gap(temperature, phase)
+    gap: Array = system.gap(phase, last.end.worn) + thermal
+    contact = system.phase_contact((phase,))
+    try:
+        before, after = (contact.solve(g).pressure.max() for g in (gap, gap + share * thermal))
+    except ConvergenceError:
+        return share, np.inf
+    return abs(float(after / before) - 1), share * float(np.ptp(thermal))

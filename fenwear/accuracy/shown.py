@@ -1,0 +1,93 @@
+"""How the uncertainty of a run is told: as a table of summary.json, and in words, with the key that lowers it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fenwear.accuracy.told import Uncertainty
+from fenwear.accuracy.values import Contribution, Quantity
+from fenwear.assembly import Tribosystem
+from fenwear.results.degrees import degrees_of
+
+KEYS = {"depth": "largest_depth_mm", "volume": "worn_volume_mm3"}
+HIGHEST = 8  # degree of elements
+WORDS = {"depth": "worn depth", "volume": "worn volume", "pressure": "largest pressure", "temperature": "temperature"}
+
+
+def table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
+    """Return an uncertainty as summary.json has it: under the names of the numbers, in all and by its sources."""
+    return {
+        **_named(system, found.total),
+        "contributions": {source: _named(system, own) for source, own in found.contributions.items()},
+        **({"untold": found.untold} if found.untold else {}),
+        "remedies": remedies(system, found),
+        "seconds": found.seconds,
+    }
+
+
+def _named(system: Tribosystem, numbers: Contribution) -> dict[str, Any]:
+    named: dict[str, Any] = {}
+    for quantity, number in numbers.items():
+        if quantity.name in KEYS:
+            named.setdefault(quantity.of, {})[KEYS[quantity.name]] = number
+        elif quantity.name == "temperature":
+            named[f"max_temperature_{degrees_of(system.case).unit}"] = number
+        elif quantity.of:
+            named.setdefault(_way(system, quantity), {})["max_pressure_MPa"] = number
+        else:
+            named["largest_pressure_in_cycle_MPa"] = number
+    return named
+
+
+def _way(system: Tribosystem, quantity: Quantity) -> str:
+    motion = system.motion
+    stroke = (int(quantity.of) - 1) % motion.half_cycles
+    return system.direction_words[int(motion.phases[stroke * motion.positions].direction)]
+
+
+def remedies(system: Tribosystem, found: Uncertainty) -> dict[str, str]:
+    """Return for each kind of number what would lower its uncertainty most, a key and its value."""
+    worst: dict[str, tuple[float, str]] = {}
+    for quantity, value in found.values.items():
+        share = found.total[quantity] / max(abs(value.number), 1e-300)
+        if share > worst.get(quantity.name, (0.0, ""))[0]:
+            worst[quantity.name] = share, found.largest(quantity)
+    return {name: text for name, (_, source) in worst.items() if (text := _remedy(system, source))}
+
+
+def _remedy(system: Tribosystem, source: str) -> str:
+    case, positions = system.case, system.motion.positions
+    degree, follow = case.geometry.degree, case.geometry.follow_wear or 0.0
+    fineness = None if system.exchange is None else system.exchange.fineness
+    jumps = case.run.integration == "jump"
+    steps = 0 if fineness is None else 2 * fineness.steps
+    tolerance = "" if case.heat is None else f"heat.reduction_tolerance = {case.heat.reduction_tolerance / 10:.2g}"
+    return {
+        "mesh": f"geometry.degree = {degree + 1}, or more elements at the contact"
+        if degree < HIGHEST
+        else "more elements",
+        "wear steps": f"run.jump_tolerance = {case.run.jump_tolerance / 4:.2g}"
+        if jumps
+        else 'run.integration = "jump"',
+        "slip steps": f"stick.step_tolerance = {case.stick.step_tolerance / 2:.2g}",
+        "positions": f"motion.positions = {2 * positions - positions % 2}",
+        "following": f"geometry.follow_wear = {follow / 2:.2g}",
+        "heat steps": f"heat.steps = {steps}",
+        "heat basis": tolerance,
+    }.get(source, "")
+
+
+def text(system: Tribosystem, found: Uncertainty) -> str:
+    """Return in a few lines how uncertain the numbers are, what of, and what would help."""
+    told, helps, total = [], remedies(system, found), found.total
+    for name, words in WORDS.items():
+        shares = {q: total[q] / max(abs(v.number), 1e-300) for q, v in found.values.items() if q.name == name}
+        if not shares:
+            continue
+        worst = max(shares, key=lambda quantity: shares[quantity])
+        by = f", most by the {found.largest(worst)}" if name in helps else ""
+        told.append(f"{words} {100 * shares[worst]:.2g} %{by}")
+    lines = [f"numerical uncertainty: {'; '.join(told)}"]
+    lines += [f"not told of the {source}: {why}" for source, why in found.untold.items()]
+    lines += [f"to lower it: {key}" for key in sorted(set(helps.values()))]
+    return "\n".join(lines)

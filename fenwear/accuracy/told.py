@@ -1,0 +1,182 @@
+"""The contributions to the numerical uncertainty of a run's end."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from fenwear.accuracy.again import Again, coarser, in_few_steps, set_up
+from fenwear.accuracy.heat import of_heat
+from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of
+from fenwear.assembly import Tribosystem
+from fenwear.case import Case
+from fenwear.cycle import Block
+from fenwear.cycle.driver import Watch, unwatched
+from fenwear.cycle.state import pressure_scale
+from fenwear.errors import CaseError, ConvergenceError
+
+SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
+ORDER, AT_EDGES = 1.5, 1.0
+SMALLER = 4.0  # by which the tolerance of jumps is cut; their error falls with its power 2/3, as they are of 2nd order
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """The numerical uncertainty of the numbers of a run's end.
+
+    Attributes:
+        values: The numbers, in mm, mm³, MPa and K.
+        contributions: Of each source to that of each number, in its unit.
+        untold: Why there is none of a source that there should be one of, by its name.
+        seconds: That it took.
+    """
+
+    values: Values
+    contributions: dict[str, Contribution]
+    untold: dict[str, str] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    @property
+    def total(self) -> Contribution:
+        """The sum of all contributions."""
+        return {
+            quantity: sum(own.get(quantity, 0.0) for own in self.contributions.values()) for quantity in self.values
+        }
+
+    def largest(self, quantity: Quantity) -> str:
+        """Return the source that contributes most to a number."""
+        return max(self.contributions, key=lambda source: self.contributions[source].get(quantity, 0.0))
+
+
+def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertainty:
+    """Return the numerical uncertainty of a run's end; collective.
+
+    Args:
+        case: Of the run, whole, with its law of contact.
+        last: The last half-cycles of the run.
+        watch: Asked between solves of the runs that are compared.
+
+    Raises:
+        InterruptedRunError: as `watch`.
+    """
+    begin = time.perf_counter()
+    values, until = values_of(last), int(last.half_cycle[-1])
+    found: dict[str, Contribution] = {}
+    untold: dict[str, str] = {}
+    lower = coarser(case)
+    if lower is None:
+        untold["mesh"] = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
+    try:
+        base = in_few_steps(lower or case, until * last.system.motion.positions)
+        again = Again(set_up(base, last.system), until, watch)
+        first, end = again.ends()
+        before = values_of(end)
+        if lower is not None:
+            found["mesh"] = of_mesh(values, before, case.geometry.degree)
+        for source, contribution in _steps(again, before, first, last):
+            found[source] = contribution
+    except (CaseError, ConvergenceError) as error:
+        untold["steps" if "mesh" in found else "mesh"] = str(error)
+    found |= of_heat(last, values)
+    found["solver"] = _of_solver(values, last)
+    return Uncertainty(values, found, untold, time.perf_counter() - begin)
+
+
+def of_mesh(values: Values, coarse: Values, degree: int) -> Contribution:
+    """Return what is left to the limit of small elements, from the same numbers on elements of a degree less."""
+    ratio = degree / (degree - 1)
+    return {
+        quantity: SAFETY * value.apart(coarse[quantity]) / (ratio ** order_of(value) - 1)
+        for quantity, value in values.items()
+        if quantity in coarse
+    }
+
+
+def order_of(value: Value) -> float:
+    """Return the order at which a number is taken to approach its limit."""
+    return AT_EDGES if value.at_edge else ORDER
+
+
+def _steps(again: Again, before: Values, first: Block, last: Block) -> Iterator[tuple[str, Contribution]]:
+    """Yield what steps of wear and of slip, positions of the strip and meshes that follow contribute; collective."""
+    case = last.system.case
+    positions, follow = last.system.motion.positions, case.geometry.follow_wear
+    if case.run.integration == "jump":
+        finer = again.otherwise(run={"jump_tolerance": case.run.jump_tolerance / SMALLER}).values()
+        yield "wear steps", _apart(before, finer, 1 / (1 - SMALLER ** (-2 / 3)))
+    else:
+        yield "wear steps", _of_half_cycles(before, first, last)
+    if last.system.sticks:
+        fineness = last.system.lawful.fineness
+        if fineness is not None:
+            yield "slip steps", {quantity: fineness.change * abs(value.number) for quantity, value in before.items()}
+    fewer = max(2, 2 * (positions // 4) + positions % 2)
+    if positions > fewer:
+        apart = _apart(before, again.otherwise(motion={"positions": fewer}).values(), fewer / (positions - fewer))
+        yield "positions", apart
+    if last.system.bodies.followed is not None and follow is not None:
+        yield "following", _apart(before, again.otherwise(geometry={"follow_wear": 2 * follow}).values(), 1.0)
+
+
+def _apart(one: Values, other: Values, factor: float) -> Contribution:
+    return {quantity: factor * abs(value.number - other[quantity].number) for quantity, value in one.items()}
+
+
+def _of_half_cycles(before: Values, first: Block, last: Block) -> Contribution:
+    """Return what steps of half-cycles leave: in depths, of first order, half of what the wear of one has changed.
+
+    The sums of explicit and of implicit steps differ by the wear of the first half-cycle less that of the last one, and
+    lie on either side of the wear that goes on within the steps. The pressure is half a half-cycle late.
+    """
+    strokes = last.system.motion.half_cycles
+    late = float(last.periodicity[-1]) * pressure_scale(last.system, last.pressure[-1]) / (2 * strokes)
+    found: Contribution = {}
+    for body, depth, start in (("punch", last.wear, first.wear), ("strip", last.wear_strip, first.wear_strip)):
+        rate = float(start[0].max()) / int(first.half_cycle[0])
+        mean = float(depth[-1].max()) / int(last.half_cycle[-1])
+        found[Quantity("depth", body)] = abs(rate - mean) / 2
+    return {
+        quantity: found.get(quantity, late if quantity.name == "pressure" and np.isfinite(late) else 0.0)
+        for quantity in before
+    }
+
+
+def _of_solver(values: Values, last: Block) -> Contribution:
+    left = float(last.equilibrium_error.max()) + float(last.complementarity_error.max()) + ROUNDING
+    return {quantity: left * abs(value.number) for quantity, value in values.items()}
+
+
+def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
+    """Return what the uncertainty of a run's end will be about, before it is run; collective.
+
+    The run is made on elements of the next two lower degrees, by jumps where it is long, and what the finer of the two
+    leaves is taken to the run's own by the assumed order. Where there is only one lower degree it is the run itself.
+
+    Args:
+        system: Of the run's case.
+        watch: Asked between solves.
+
+    Raises:
+        ConvergenceError: a half-cycle did not converge.
+    """
+    begin = time.perf_counter()
+    case, until = system.case, system.case.run.half_cycles
+    degree = case.geometry.degree
+    below = coarser(case) if degree > 2 else None
+    base = in_few_steps(below or case, until * system.motion.positions)
+    if base.run.integration == "jump":
+        until = until // system.motion.half_cycles * system.motion.half_cycles
+    one = replace(system, made_from=base) if below is None else set_up(base, system)
+    _, last = Again(one, until, watch).ends()
+    found = uncertainty(base, last, watch)
+    if below is not None and "mesh" in found.contributions:
+        mesh = {
+            quantity: own * ((degree - 1) / degree) ** order_of(found.values[quantity])
+            for quantity, own in found.contributions["mesh"].items()
+        }
+        found = replace(found, contributions={**found.contributions, "mesh": mesh})
+    return replace(found, seconds=time.perf_counter() - begin)

@@ -1,0 +1,122 @@
+"""The numbers of a run's end whose uncertainty is told, and whether they are those of an edge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fenwear.arrays import Array, Mask
+from fenwear.assembly import Placed
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.cycle import Block
+from fenwear.results.surfaces import surface_cells
+
+BODIES = ("punch", "strip")
+SAME = 1e-4  # of the surface's extent: nodes that are one
+
+
+class Quantity(NamedTuple):
+    """What a number is of: depth or volume of a body, pressure of a half-cycle of the cycle, or temperature.
+
+    Attributes:
+        name: "depth", "volume", "pressure" or "temperature".
+        of: Body, or number of the half-cycle in the cycle; "" for a number of the whole contact.
+    """
+
+    name: str
+    of: str = ""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A number, in mm, mm³, MPa or K, with what it is the largest of.
+
+    Attributes:
+        number: Itself.
+        at_edge: Whether it is found at an edge of contact or surface.
+        x: The nodes that it is the largest of (n, d), mm; none of a number of the whole surface.
+        along: The values there (n,).
+        weights: Their areas (n,).
+    """
+
+    number: float
+    at_edge: bool = False
+    x: Array = field(default_factory=lambda: np.zeros((0, 1)))
+    along: Array = field(default_factory=lambda: np.zeros(0))
+    weights: Array = field(default_factory=lambda: np.zeros(0))
+
+    def apart(self, other: Value) -> float:
+        """Return how far a number is from another discretisation's: never less than the fields of both are on average.
+
+        The largest of: the difference of the numbers; that at the common node nearest to where the number is found; the
+        root mean square of those at the common nodes where there is anything. Two of them may be small by chance.
+        """
+        found = abs(self.number - other.number)
+        if not len(self.x) or not len(other.x):
+            return found
+        distance, nearest = cKDTree(other.x).query(self.x)
+        common = distance < SAME * max(float(np.ptp(self.x, axis=0).max()), 1e-300)
+        if not common.any():
+            return found
+        differences = np.where(common, np.abs(self.along - other.along[nearest]), 0.0)
+        far = np.linalg.norm(self.x - self.x[self.along.argmax()], axis=1)
+        weights = np.where(common & (self.along > 0), self.weights, 0.0)
+        mean = float(np.sqrt(weights @ differences**2 / max(float(weights.sum()), 1e-300)))
+        return max(found, float(differences[np.where(common, far, np.inf).argmin()]), mean)
+
+
+Values = dict[Quantity, Value]
+Contribution = dict[Quantity, float]  # to the uncertainty of each number, in its unit
+
+
+def values_of(last: Block) -> Values:
+    """Return the numbers at the end of a run: largest depths, volumes, largest pressures of a cycle and temperature."""
+    system, found = last.system, Values()
+    depths, surfaces = (last.wear[-1], last.wear_strip[-1]), (system.pair.punch, system.pair.strip)
+    for body, law, depth, surface in zip(BODIES, system.sliding.wear, depths, surfaces, strict=True):
+        if law is not None:
+            found[Quantity("depth", body)] = _largest(depth, surface)
+            found[Quantity("volume", body)] = Value(float(last.totals.of(f"volume_{body}")[-1]))
+    found |= _pressures(system, last)
+    if last.heat is not None:
+        sides: list[Array] = [last.heat.temperature_punch[-1], last.heat.temperature_strip[-1]]
+        warmer = max(sides, key=lambda side: float(side.max()))
+        found[Quantity("temperature")] = _largest(warmer, system.pair.punch)
+    return found
+
+
+def _pressures(system: Placed, last: Block) -> Values:
+    surface, strokes = system.pair.punch, system.motion.half_cycles
+    if last.steps:
+        steps: Array = np.concatenate([one.pressure for one in last.steps[-strokes:]])
+        return {Quantity("pressure"): _largest(steps[np.argmax(steps.max(axis=1))], surface)}
+    return {
+        Quantity("pressure", str(int(number) % strokes)): _largest(np.asarray(pressure), surface)
+        for number, pressure in zip(last.half_cycle[-strokes:], last.pressure[-strokes:], strict=True)
+    }
+
+
+def _largest(values: Array, surface: ContactSurface) -> Value:
+    """Return the largest of values at the nodes of a surface (n,), at an edge where one beside it has none."""
+    node = int(values.argmax())
+    cells = surface_cells(surface)
+    near = np.unique(cells[(cells == node).any(axis=1)])
+    at_edge = bool(rim(surface)[node] or (values[near] <= 0).any())
+    return Value(float(values[node]), at_edge, surface.x, values, surface.weights)
+
+
+def rim(surface: ContactSurface) -> Mask:
+    """Return which pressure nodes lie on the rim of a contact surface (n,): on a side of one linear facet alone."""
+    cells = surface_cells(surface)
+    found: Mask = np.zeros(len(surface.nodes), dtype=bool)
+    if cells.shape[1] == 2:
+        nodes, count = np.unique(cells, return_counts=True)
+        found[nodes[count == 1]] = True
+        return found
+    sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)  # corners come around
+    pairs, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    found[pairs[count == 1].ravel()] = True
+    return found

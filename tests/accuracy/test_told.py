@@ -1,0 +1,121 @@
+"""The numerical uncertainty that is told of a run, against its true errors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import Block, Tribosystem, evolve
+from fenwear.accuracy import Quantity, Value, shown, uncertainty, values_of
+from fenwear.accuracy.told import of_mesh
+
+Assembled = Callable[..., Tribosystem]
+FEW = "geometry.parameters.elements_along_contact=8"
+RINGS = ("geometry.parameters.across=4", "run.half_cycles=20000")
+DEPTH, VOLUME, PRESSURE = Quantity("depth", "punch"), Quantity("volume", "punch"), Quantity("pressure", "0")
+
+
+def end_of(system: Tribosystem) -> Block:
+    """Return the last half-cycles of the run of a system."""
+    *_, last = evolve(system)
+    return last
+
+
+def test_rings_end_within_what_is_told(assembled: Assembled) -> None:
+    """Turning rings wear to p = F / (2 pi (r2 - r1) r): the error at the inner edge is told."""
+    system = assembled("ring-on-ring", *RINGS, "geometry.degree=2")
+    found = uncertainty(system.case, end_of(system))
+    exact = 2000 / (2 * np.pi * 10 * 20)
+    error, told = abs(found.values[PRESSURE].number - exact), found.total[PRESSURE]
+    assert error < told < 0.01 * exact
+
+
+def test_true_error_of_a_flat_punch_is_told(assembled: Assembled) -> None:
+    """Against four times as many elements, of depth and pressure, at the edges where they are largest."""
+    settings = ("run.half_cycles=40", "geometry.degree=3")
+    system = assembled("example1", *settings, FEW)
+    found = uncertainty(system.case, end_of(system))
+    exact = values_of(end_of(assembled("example1", *settings, FEW.replace("8", "32"))))
+    for quantity in (DEPTH, PRESSURE, Quantity("pressure", "1")):
+        error = abs(found.values[quantity].number - exact[quantity].number)
+        assert error < found.total[quantity] < 10 * error
+    assert found.values[DEPTH].at_edge
+
+
+def test_worn_volume_of_flat_contacts_is_certain(assembled: Assembled) -> None:
+    """With a = b = 1 equilibrium gives it on any mesh: that is what the comparison finds, while depths differ."""
+    system = assembled("example1", "run.half_cycles=40", "geometry.degree=3", FEW)
+    found = uncertainty(system.case, end_of(system))
+    volume = found.values[VOLUME].number
+    assert volume == pytest.approx(1.25e-8 * np.pi * 10000 * 40 * 3.0, rel=1e-9)
+    assert found.total[VOLUME] < 1e-9 * volume
+    assert found.total[DEPTH] > 1e-3 * found.values[DEPTH].number
+
+
+def test_uncertainty_falls_with_the_elements(assembled: Assembled) -> None:
+    """Smaller elements leave less."""
+    told = []
+    for elements in (8, 16, 32):
+        settings = ("run.half_cycles=2000", 'run.integration="jump"', "geometry.degree=2")
+        system = assembled("example2", *settings, FEW.replace("8", str(elements)))
+        told.append(uncertainty(system.case, end_of(system)).total[DEPTH])
+    assert told[0] > 1.3 * told[1] > 1.69 * told[2]
+
+
+def test_half_cycles_as_steps_are_told(assembled: Assembled) -> None:
+    """Explicit and implicit half-cycles lie on either side of small steps, each as far as is told."""
+    fast = ('wear.punch.coefficient="1e-6 1/MPa"', "run.half_cycles=20", "geometry.degree=2", FEW)
+    one = end_of(system := assembled("example2", *fast, 'run.integration="implicit"'))
+    small = ('wear.punch.coefficient="1e-7 1/MPa"', "run.half_cycles=200", *fast[2:])
+    exact = values_of(end_of(assembled("example2", *small, 'run.integration="implicit"')))[DEPTH].number
+    error = abs(values_of(one)[DEPTH].number - exact)
+    steps = uncertainty(system.case, one).contributions["wear steps"][DEPTH]
+    assert 0.5 * error < steps < 5 * error
+
+
+def test_linear_elements_have_nothing_below(assembled: Assembled) -> None:
+    """What cannot be compared is said, with the key that helps; all else is told."""
+    system = assembled("example2", "run.half_cycles=4", "geometry.degree=1", FEW)
+    found = uncertainty(system.case, end_of(system))
+    assert "geometry.degree" in found.untold["mesh"]
+    assert "wear steps" in found.contributions
+    assert "geometry.degree" in shown.text(system, found)
+
+
+def test_equal_largest_values_of_other_fields_are_apart() -> None:
+    """Two largest values may agree by chance where their fields do not."""
+    x = np.linspace(0, 1, 5)[:, None]
+    fine = Value(1.0, False, x, np.array([0, 0.5, 1.0, 0.5, 0]), np.full(5, 0.2))
+    coarse = Value(1.0, False, x[::2], np.array([0.4, 1.0, 0.4]), np.full(3, 0.4))
+    other = Value(1.0, False, x[::2], np.array([0.0, 0.9, 1.0]), np.full(3, 0.4))
+    assert fine.apart(coarse) == 0.0  # they differ only where there is nothing
+    assert fine.apart(other) == pytest.approx(0.1)
+    assert of_mesh({DEPTH: fine}, {DEPTH: other}, 2)[DEPTH] == pytest.approx(1.25 * 0.1 / (2**1.5 - 1))
+
+
+def test_run_tells_it(fenwear: Callable[..., Any], tmp_path: Any) -> None:
+    """In summary.json, on the sheet and in the report; not where the case does not want it."""
+    import json
+
+    short = ("--set", "run.half_cycles=4", "--set", FEW, "--set", "output.fields_at=[]")
+    done = fenwear("run", "example1", *short, "-o", tmp_path / "a")
+    assert done.returncode == 0
+    assert "... numerical uncertainty (µm)" in done.stdout
+    told = json.loads((tmp_path / "a" / "summary.json").read_text())["uncertainty"]
+    assert told["punch"]["largest_depth_mm"] > 0
+    assert told["rightward"]["max_pressure_MPa"] > told["contributions"]["solver"]["rightward"]["max_pressure_MPa"]
+    assert "Numerical uncertainty" in (tmp_path / "a" / "report.html").read_text()
+    without = ("--set", "output.uncertainty=false", "--set", "output.report=false")
+    fenwear("run", "example1", *short, *without, "-o", tmp_path / "b")
+    assert "uncertainty" not in json.loads((tmp_path / "b" / "summary.json").read_text())
+
+
+def test_check_foresees_it(fenwear: Callable[..., Any]) -> None:
+    """Before the run, from lower degrees."""
+    done = fenwear("check", "example1", "--accuracy", "--set", FEW, "--set", "run.half_cycles=40")
+    assert done.returncode == 0
+    assert "numerical uncertainty: worn depth" in done.stderr
+    assert "to lower it: geometry.degree = 5" in done.stderr

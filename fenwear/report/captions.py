@@ -21,6 +21,8 @@ TEXTS = {
     "{chosen}: by it material is lost, and it is well posed where the edge of the contact moves.",
     "peaks": "Largest contact pressure and width in contact{hot}, for each sliding direction, over the {axis}; "
     "grey: the largest of the mean pressure over the last tenth of what is done.",
+    "place": "The shaft in its bore: (a) the way from the middle of the unworn bore to that of the unworn shaft, (b) "
+    "its size and (c) its angle from the way in which the load presses the shaft, as the strip turns, over the {axis}.",
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
     "the sliding distance.",
     "scar": "(a) Largest worn depth and (b) width of the scar at 1 % and 5 % of it, over the {axis}.",

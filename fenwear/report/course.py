@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.report.style import (
+    BLUE,
     BODY_COLOURS,
     DIRECTIONS,
+    RED,
     STANDARD,
     Look,
     direction_style,
@@ -118,6 +120,32 @@ def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         ax.set_ylim(bottom=0)
         legend_beside(ax, "")
     run_axis(axes[-1], history, look)
+    return figure
+
+
+def place_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw a shaft's place in its bore over a run: the path of its middle, eccentricity and attitude angle."""
+    figure, axes = panels(3, 2.7, share_x=False, look=look)
+    x = look.course(history)
+    e_x, e_z = (1e3 * history[f"eccentricity_{axis}"].values for axis in "xz")
+    axes[0].plot(e_x, e_z, color="0", **mark_few(x))
+    axes[0].plot(0, 0, "+", color="0", label="middle of the bore")
+    axes[0].plot(e_x[:1], e_z[:1], "o", color=BLUE, markersize=4, label="shaft, at first")
+    axes[0].plot(e_x[-1:], e_z[-1:], "s", color=RED, markersize=4, label="shaft, at the end")
+    axes[0].set_aspect("equal", adjustable="datalim")
+    axes[0].margins(0.15)
+    axes[0].set_xlabel("x (µm)")
+    axes[0].set_ylabel("z (µm)")
+    legend_beside(axes[0], "")
+    axes[1].plot(x, 1e3 * history.eccentricity, color="0", **mark_few(x))
+    axes[1].set_ylabel("eccentricity (µm)")
+    axes[1].set_ylim(bottom=0)
+    axes[2].plot(x, history.attitude_angle, color="0", **mark_few(x))
+    axes[2].set_ylabel("attitude angle\n(degrees)")
+    low, high = axes[2].get_ylim()
+    axes[2].set_ylim(min(low, -1.0), max(high, 1.0))
+    for ax in axes[1:]:
+        run_axis(ax, history, look)
     return figure
 
 

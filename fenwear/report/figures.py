@@ -21,6 +21,7 @@ from fenwear.report.course import (
     late_pressures,
     mean_pressure,
     peak_figure,
+    place_figure,
     scar_figure,
     shown_unit,
     volume_figure,
@@ -195,6 +196,8 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
     if cycle_means(history, chosen):
         drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
     drawn["peaks"] = peak_figure(history, look)
+    if "eccentricity" in history:
+        drawn["place"] = place_figure(history, look)
     if "sliding_distance" in history:
         drawn["volume"] = volume_figure(history, Look(look.width, "distance"))
         drawn["scar"] = scar_figure(history, look)

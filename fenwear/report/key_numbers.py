@@ -21,6 +21,7 @@ UNITS = {
     "_mm": "mm",
     "_K": "K",
     "_degC": "°C",
+    "_deg": "degrees",
     "_mJ": "mJ",
     "_seconds": "s",
 }

@@ -28,8 +28,8 @@ from fenwear.results.history import CASE, HISTORY
 from fenwear.results.sheet import BODIES, LINES, UNCERTAINTY, shown
 
 REPORT = "report.html"
-SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "volume",
-            "scar", "friction", "surface_stress", "temperature", "boundary_temperature", "pressure_map",
+SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "place",
+            "volume", "scar", "friction", "surface_stress", "temperature", "boundary_temperature", "pressure_map",
             "wear_strip_map", "temperature_map", "temperature_strip_map", "cuts_along", "cuts_across")  # fmt: skip
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
 

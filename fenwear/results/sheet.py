@@ -209,6 +209,8 @@ LINES = {
     "friction_coefficient": Line("friction coefficient, mean", ""),
     "friction_over_load": Line("work of friction over load and distance", ""),
     "friction_work_mJ": Line("work of friction", "J", 1e-3),
+    "eccentricity_mm": Line("eccentricity of the shaft in the bore", "µm", 1e3),
+    "attitude_angle_deg": Line("attitude angle, as the strip turns", "degrees"),
     "largest_energy_mJ_per_mm2": Line("dissipated energy per area, largest", "J/mm²", 1e-3),
     **{
         f"{name}_{unit}": Line(f"largest temperature {when}", shown)

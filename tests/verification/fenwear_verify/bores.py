@@ -14,6 +14,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble
 from fenwear.case import make_case
 from fenwear.cycle import Block, jump
+from fenwear.results import place
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
 RADIUS, YOUNG, POISSON, LOAD = 10.0, 210e3, 0.3, 50.0  # of the bore, mm; MPa; N/mm
@@ -159,6 +160,7 @@ def bushing() -> Result:
             theirs, ours = exact / clearance, depth / clearance
             rows += [
                 profile(f"{what}: depth / D", theirs, ours, 1e-3, scale=theirs.max()),
+                number(f"{what}: eccentricity / D", 1 / np.cos(half), _eccentricity(last) / clearance, 1e-3),
                 number(f"{what}: area / (R D)", 2 * (np.tan(half) - half), area / RADIUS / clearance, 1e-3),
                 profile(f"{what}: p / p0", np.cos(psi[inside]), pressure[inside] / largest, 0.03),
                 number(f"{what}: volume by depth over metered", 1, area / metered, 1e-9),
@@ -174,6 +176,11 @@ def bushing() -> Result:
         errors.append(float(np.mean(found)))
     rows.append(order("order of the pressure's largest error, mean of the angles", 1, errors, 0.7))
     return Result(rows, [Plot("Worn bushing: depth", "psi (degrees)", "depth / D", lines, ("linear", "log"))])
+
+
+def _eccentricity(last: Block) -> float:
+    """Return the way from the bore's middle to the shaft's at the end, mm."""
+    return float(place.values(last)["eccentricity"][-1])
 
 
 TABLE = (  # s (mm); depth (mm), half angle (degrees), area (mm²), largest pressure (MPa) at D = 0.05 mm and P = 50 N/mm

@@ -19,8 +19,7 @@ from fenwear.cycle import (
     Span,
     explicit_growth,
     follow_program,
-    jump,
-    march,
+    integrate,
     stability_number,
     stationary_growth,
 )
@@ -285,17 +284,9 @@ class _Run:
         self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
-        shared: dict[str, Any] = {
-            "periodic_within": run.periodic_within,
-            "start": start,
-            "stops": self._fields_at,
-            "leave": leave,
-            "watch": self._watch,
-            "loading": span.loading,
-        }
-        if run.integration == "jump":
-            return jump(system, span.until, tolerance=run.jump_tolerance, **shared)
-        return march(system, span.until, implicit=run.integration == "implicit", **shared)
+        course = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
+        course["periodic_within"] = run.periodic_within
+        return integrate(system, run.integration, span, run.jump_tolerance, **course)
 
     def _take(self, block: Block) -> None:
         if block.system.bodies.followed is not self.system.bodies.followed:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.laws import ContactLaw, law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
@@ -64,7 +65,7 @@ class Placed:
         sliding: Motion, friction and wear.
         heat: Settings of the heat between the bodies; None without.
         solver: Of the contact: "condensed", or "full" for the reference on both bodies' meshes.
-        law: Of the contact: "gross-sliding", or "coulomb" where nodes stick or slip.
+        law: Of the contact, by its name: see `laws`.
         made_from: The case; None where it was made in Python.
         loaded: The bodies under the loads of each phase.
         rigids: Equilibrium of the rigid modes in each phase, with its pair of surfaces.
@@ -92,9 +93,14 @@ class Placed:
         return self.clock.time + self.motion.time(np.asarray(half_cycle) - self.clock.half_cycles)
 
     @property
+    def contact_law(self) -> ContactLaw:
+        """The law of contact."""
+        return law_named(self.law)
+
+    @property
     def sticks(self) -> bool:
         """Whether nodes stick or slip by themselves."""
-        return self.law == "coulomb"
+        return self.contact_law.sticks
 
     @property
     def normal_force(self) -> float:

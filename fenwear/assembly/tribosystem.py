@@ -91,12 +91,12 @@ class Tribosystem(Placed):
     @property
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
-        return float(self.lawful.elastic_length) if self.sticks else self.interface.elastic_length
+        return self.contact_law.elastic_length(self)
 
     @property
     def replicated(self) -> bool:
         """Whether every rank could go on alone: no temperatures of all nodes, no contact on all displacements."""
-        return (self.solver == "condensed" or self.sticks) and (self.exchange is None or self.exchange.reduced)
+        return self.contact_law.replicated(self)
 
     def led(self, function: Callable[[], T]) -> T:
         """Call what goes on from prepared bodies, on rank 0 for all where that can be, else on every rank; collective.
@@ -140,25 +140,9 @@ class Tribosystem(Placed):
             CaseError: they never meet: no pressure, no wear, nothing to follow.
             ConvergenceError: the contact of a phase did not converge.
         """
-        if self.sticks:
-            self.lawful.check_touching()
-            return
-        gaps = []
-        for phase in range(len(self.motion.phases)):
-            contact = self.phase_contact((phase,)).solve(self.gap(phase, self.unworn()))
-            if contact.pressure.max() > 0:
-                self._check_carried(float(self.pairs[phase].weights @ contact.pressure[0]))
-                return
-            gaps.append(float(contact.gap.min()))
-        raise CaseError(
-            InputError(
-                "geometry",
-                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
-                "expected a punch that its supports let come down, or that starts in contact",
-            )
-        )
+        self.contact_law.check_touching(self)
 
-    def _check_carried(self, force: float) -> None:
+    def check_carried(self, force: float) -> None:
         """Raise where supports carry all of the loads.
 
         Args:
@@ -379,7 +363,9 @@ def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = 
 
 def preparation(system: Tribosystem) -> Preparation:
     """Return how the heat of a system was prepared: "reduced" where its settings do not say so themselves."""
-    if system.exchange is None or system.heat is None:
+    if system.heat is None:
+        return "as set"
+    if system.exchange is None:
         return "none"
     return "reduced" if system.exchange.reduced and system.heat.operator != "reduced" else "as set"
 

@@ -4,27 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly.bodies import build_bodies, build_conduction
-from fenwear.assembly.laws import GROSS, LAWS, law_named
+from fenwear.assembly.bodies import build_bodies
+from fenwear.assembly.laws import law_named
 from fenwear.assembly.placed import Placed, place
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
     Preparation,
     Tribosystem,
-    answers_for,
-    condense_bodies,
-    elastic,
-    heating_friction,
     joined,
     preparation,
     with_exchange,
-    with_reduced_heat,
 )
-from fenwear.case import Case, Cycle, Heat, changed_case
+from fenwear.case import Case, Heat, changed_case
 from fenwear.sliding.wear import Worn
 
 
@@ -53,14 +47,8 @@ def assemble(
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    if case.contact.law in LAWS and case.contact.law != GROSS:
-        law = law_named(case.contact.law)
-        return law.assemble(case, comm, followed, heat=heat, fresh=fresh, warmed=warmed)
-    system = elastic(place_case(case, comm, followed, warmed), fresh=fresh)
-    if heat == "none":
-        return system
-    prepare = with_reduced_heat if heat == "reduced" else with_exchange
-    return prepare(system, keep=True, fresh=fresh)
+    bodies = build_bodies(case, comm, followed, warmed)
+    return law_named(case.contact.law).of_bodies(case, bodies, heat=heat, fresh=fresh)
 
 
 def renewed(
@@ -76,9 +64,7 @@ def renewed(
     Raises:
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    if system.law != GROSS:
-        return law_named(system.law).renewed(system, followed, warmed)
-    return assemble(system.case, system.comm, followed, heat=preparation(system), warmed=warmed)
+    return law_named(system.law).renewed(system, build_bodies(system.case, system.comm, followed, warmed))
 
 
 def place_case(
@@ -129,32 +115,10 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     Raises:
         CaseError: the punch would tip over.
     """
-    before = system.case
-    if {before.contact.law, case.contact.law} & (LAWS.keys() - {GROSS}):
-        return law_named(case.contact.law).varied(system, case)
-    if set_up_by(before) != set_up_by(case):
+    law = law_named(case.contact.law)
+    if law is not law_named(system.law) or set_up_by(system.case) != set_up_by(case):
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
-    bodies, condensed, sliding = system.bodies, system.condensed, system.sliding
-    if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
-        sliding = make_sliding(case)
-    tables = [one.motion if isinstance(one.motion, Cycle) else None for one in (before, case)]
-    if (before.punch.loads, before.strip.loads, tables[0]) != (case.punch.loads, case.strip.loads, tables[1]):
-        bodies = bodies.under(case)
-    conducts_alike = _same_conduction(before, case)
-    if not conducts_alike:
-        bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
-    placed = place(bodies, sliding, case.heat, solver=case.contact.solver, case=case)
-    if not answers_for(condensed, system, placed):
-        condensed = condense_bodies(placed)
-    elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
-        condensed = condensed.under_loads(bodies)
-    if system.exchange is None or case.heat is None:
-        return joined(placed, condensed)
-    if not conducts_alike or placed.motion != system.motion:
-        prepare = with_reduced_heat if preparation(system) == "reduced" else with_exchange
-        return prepare(joined(placed, condensed))
-    friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
-    return joined(placed, condensed, system.exchange.varied(case.heat, friction))
+    return law.varied(system, case)
 
 
 def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
@@ -175,7 +139,7 @@ def set_up_by(case: Case) -> tuple[object, ...]:
     return (*meshed, case.model, case.setup, case.materials, case.heat is None, initial, *bodies)
 
 
-def _same_conduction(one: Case, other: Case) -> bool:
+def same_conduction(one: Case, other: Case) -> bool:
     """Return whether heat is conducted alike in the bodies of two cases, whatever passes between them."""
     if one.heat is None or other.heat is None:
         return one.heat is other.heat

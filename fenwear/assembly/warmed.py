@@ -16,17 +16,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies, build_conduction, elastic_body
-from fenwear.assembly.laws import GROSS, law_named
-from fenwear.assembly.placed import place
-from fenwear.assembly.strokes import make_sliding
-from fenwear.assembly.tribosystem import (
-    Tribosystem,
-    condense_bodies,
-    joined,
-    preparation,
-    with_exchange,
-    with_reduced_heat,
-)
+from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.case import Body, Case
 from fenwear.errors import CaseError
 from fenwear.heat.conduction import HeatBody
@@ -127,15 +117,7 @@ def warmed_system(system: Tribosystem, state: HeatState) -> Tribosystem:
     """
     case = system.case
     bodies = _bodies_at(system.bodies, case, state.temperatures())
-    if system.law != GROSS:
-        return law_named(system.law).at_temperatures(system, bodies)
-    placed = place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case)
-    condensed = system.condensed if bodies.punch is system.bodies.punch else condense_bodies(placed)
-    new = joined(placed, condensed)
-    kept = preparation(system)
-    if kept == "none":
-        return new
-    return with_reduced_heat(new) if kept == "reduced" else with_exchange(new)
+    return system.contact_law.renewed(system, bodies)
 
 
 def _bodies_at(bodies: Bodies, case: Case, temperatures: tuple[Array, Array]) -> Bodies:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, WrapValidator, model_validator
 
 from fenwear.arrays import Array
 from fenwear.case.dependence import (
@@ -23,6 +23,8 @@ from fenwear.case.dependence import (
 from fenwear.case.quantities import Force, Number, Part, Stress, Unit, quantity
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, InputError
+
+CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
 
 
 class Dependence(Part):
@@ -129,10 +131,14 @@ def constant_or_dependence(constant: Any) -> Any:
     ]
 
 
+def _own_or_registered(name: Any, own: Callable[[Any], Any]) -> Any:
+    return name if isinstance(name, str) and name in CONTACT_LAWS else own(name)
+
+
 class Contact(Part):
     """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
 
-    law: Literal["gross-sliding", "coulomb", "auto"] = Field(
+    law: Annotated[Literal["gross-sliding", "coulomb", "auto"], WrapValidator(_own_or_registered)] = Field(
         default="auto",
         description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
         "as in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically and "

@@ -4,7 +4,7 @@
 """
 
 from fenwear.cycle.block import Block
-from fenwear.cycle.evolve import evolve
+from fenwear.cycle.evolve import evolve, integrate
 from fenwear.cycle.follow import follow
 from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
@@ -30,6 +30,7 @@ __all__ = [
     "heat_gain",
     "heat_warnings",
     "held",
+    "integrate",
     "jump",
     "march",
     "monotonic",

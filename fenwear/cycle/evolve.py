@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.cycle.block import Block
@@ -10,6 +11,21 @@ from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.program import Span, follow_program
 from fenwear.cycle.state import RunState
+
+
+def integrate(system: Tribosystem, how: str, span: Span, tolerance: float, **course: Any) -> Iterator[Block]:
+    """Yield the blocks of a span in the way that `run.integration` of a case names; collective.
+
+    Args:
+        system: The assembled problem.
+        how: "explicit", "implicit" or "jump".
+        span: How far, and under which loads.
+        tolerance: Of jumps.
+        course: What `march` and `jump` share: where it starts, and what ends it before.
+    """
+    if how == "jump":
+        return jump(system, span.until, tolerance=tolerance, loading=span.loading, **course)
+    return march(system, span.until, implicit=how == "implicit", loading=span.loading, **course)
 
 
 def evolve(
@@ -38,21 +54,17 @@ def evolve(
     run = system.case.run
     last, how = half_cycles or run.half_cycles, integration or run.integration
 
-    def integrate(
+    def over(
         own: Tribosystem, state: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
-        if how == "jump":
-            bound = tolerance or run.jump_tolerance
-            return jump(own, span.until, tolerance=bound, start=state, leave=leave, loading=span.loading,
-                        periodic_within=run.periodic_within)  # fmt: skip
-        return march(own, span.until, implicit=how == "implicit", start=state, leave=leave, loading=span.loading,
-                     periodic_within=run.periodic_within)  # fmt: skip
+        bound = tolerance or run.jump_tolerance
+        return integrate(own, how, span, bound, start=state, leave=leave, periodic_within=run.periodic_within)
 
     if how == "jump":
         system = with_reduced_heat(system)
         strokes = system.motion.half_cycles
         last = last // strokes * strokes
-    for block in follow_program(system, integrate, last, start):
+    for block in follow_program(system, over, last, start):
         yield block
         if block.end.half_cycle >= last:
             return

@@ -7,27 +7,32 @@ the temperatures, see `jump_error`.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import reduce
 
-from mpi4py import MPI
+import numpy as np
 
-from fenwear.arrays import Array
 from fenwear.assembly import (
     Bodies,
+    Placed,
     Preparation,
+    Sliding,
     Tribosystem,
-    assemble,
+    build_conduction,
     elastic,
+    heating_friction,
+    joined,
     make_sliding,
     place,
     preparation,
     property_change,
-    renewed,
-    with_case,
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.case import Case
+from fenwear.assembly.laws import GROSS
+from fenwear.assembly.tribosystem import answers_for, condense_bodies
+from fenwear.assembly.variants import same_conduction
+from fenwear.case import Case, Cycle
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat
 from fenwear.cycle.driver import Loading, Watch
 from fenwear.cycle.jump_error import ORDER
@@ -35,11 +40,10 @@ from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
 from fenwear.cycle.state import RunState
-from fenwear.cycle.steady import Steady, steady
-from fenwear.errors import ConvergenceError
+from fenwear.cycle.steady import Steady, steady_state
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.remedies import SHORTER_JUMPS
-from fenwear.sliding.wear import Worn
 
 WARMED = 2.0  # times heat.property_tolerance that properties may change by in a jump of several cycles
 SAFETY, LEAST, MOST = 0.9, 0.2, 5.0  # of the next jump's length over the last one's
@@ -136,47 +140,87 @@ class Jumps:
 class GrossSliding:
     """The law of gross sliding."""
 
+    name = GROSS
+    sticks = False
     memory: type | None = None
-
-    def assemble(
-        self,
-        case: Case,
-        comm: MPI.Comm,
-        followed: Worn | None,
-        *,
-        heat: Preparation,
-        fresh: bool,
-        warmed: tuple[Array, Array] | None,
-    ) -> Tribosystem:
-        """Return the system of a case; collective."""
-        return assemble(case, comm, followed, heat=heat, fresh=fresh, warmed=warmed)
 
     def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
         """Return the system of a case whose bodies are built; collective."""
-        system = elastic(
-            place(bodies, make_sliding(case), case.heat, solver=case.contact.solver, case=case), fresh=fresh
-        )
+        system = elastic(self._placed(case, bodies), fresh=fresh)
         if heat == "none":
             return system
         return (with_reduced_heat if heat == "reduced" else with_exchange)(system, keep=True, fresh=fresh)
 
-    def at_temperatures(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
-        """Return the system of the same case and meshes with the properties that these bodies have; collective."""
-        return self.of_bodies(system.case, bodies, heat=preparation(system), fresh=False)
+    def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
+        """Return the system of the same case with the meshes or properties that these bodies have; collective."""
+        placed = self._placed(system.case, bodies)
+        condensed = system.condensed if bodies.punch is system.bodies.punch else condense_bodies(placed)
+        return _with_heat_as(system, joined(placed, condensed), keep=bodies.warmed is None)
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
-        """Return the system of another case; collective."""
-        if system.sticks:
-            return assemble(case, system.comm, system.bodies.followed)
-        return with_case(system, case)
+        """Return the system of another case; collective.
 
-    def renewed(self, system: Tribosystem, followed: Worn | None, warmed: tuple[Array, Array] | None) -> Tribosystem:
-        """Return the system of the same case on meshes and with properties of now; collective."""
-        return renewed(system, followed, warmed)
+        Loads, friction, wear, motion and the exchange of heat factor no stiffness again; another motion prepares the
+        steps of heat again.
+        """
+        before, bodies, condensed, sliding = system.case, system.bodies, system.condensed, system.sliding
+        if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
+            sliding = make_sliding(case)
+        tables = [one.motion if isinstance(one.motion, Cycle) else None for one in (before, case)]
+        if (before.punch.loads, before.strip.loads, tables[0]) != (case.punch.loads, case.strip.loads, tables[1]):
+            bodies = bodies.under(case)
+        conducts_alike = same_conduction(before, case)
+        if not conducts_alike:
+            bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
+        placed = self._placed(case, bodies, sliding)
+        if not answers_for(condensed, system, placed):
+            condensed = condense_bodies(placed)
+        elif (bodies.punch, bodies.strip) != (system.bodies.punch, system.bodies.strip):
+            condensed = condensed.under_loads(bodies)
+        if system.exchange is None or case.heat is None:
+            return joined(placed, condensed)
+        if not conducts_alike or placed.motion != system.motion:
+            return _with_heat_as(system, joined(placed, condensed))
+        friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
+        return joined(placed, condensed, system.exchange.varied(case.heat, friction))
 
-    def end(self, system: Tribosystem) -> Steady:
+    def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> Placed:
+        placed = place(bodies, sliding or make_sliding(case), case.heat, solver=case.contact.solver, case=case)
+        return placed if placed.law == self.name else replace(placed, law=self.name)
+
+    def replicated(self, system: Tribosystem) -> bool:
+        """Return whether every rank could go on alone."""
+        return system.solver == "condensed" and (system.exchange is None or system.exchange.reduced)
+
+    def elastic_length(self, system: Tribosystem) -> float:
+        """Return the gap that unit pressures open on average, mm/MPa."""
+        return system.interface.elastic_length
+
+    def check_touching(self, system: Tribosystem) -> None:
+        """Make sure that the surfaces touch in some phase; collective.
+
+        Raises:
+            CaseError: they never meet, or supports carry all of the load.
+            ConvergenceError: the contact of a phase did not converge.
+        """
+        gaps = []
+        for phase in range(len(system.motion.phases)):
+            contact = system.phase_contact((phase,)).solve(system.gap(phase, system.unworn()))
+            if contact.pressure.max() > 0:
+                system.check_carried(float(system.pairs[phase].weights @ contact.pressure[0]))
+                return
+            gaps.append(float(contact.gap.min()))
+        raise CaseError(
+            InputError(
+                "geometry",
+                f"the surfaces never meet within the stroke: under load they stay {min(gaps):.3g} mm apart; "
+                "expected a punch that its supports let come down, or that starts in contact",
+            )
+        )
+
+    def end(self, system: Tribosystem, properties_within: float | None = None) -> Steady:
         """Return the cyclic steady state; collective."""
-        return steady(system)
+        return steady_state(system, properties_within)
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
         """Return the step of one half-cycle."""
@@ -185,6 +229,14 @@ class GrossSliding:
     def jumps(self, system: Tribosystem, tolerance: float, watch: Watch, loading: Loading) -> Jumps:
         """Return the step of many cycles."""
         return Jumps(Stepper(system, tolerance, watch, loading), tolerance)
+
+
+def _with_heat_as(system: Tribosystem, new: Tribosystem, *, keep: bool = False) -> Tribosystem:
+    """Return a new system with its heat prepared as that of another one; collective."""
+    prepared = preparation(system)
+    if prepared == "none":
+        return new
+    return (with_reduced_heat if prepared == "reduced" else with_exchange)(new, keep=keep)
 
 
 LAW = GrossSliding()

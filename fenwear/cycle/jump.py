@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from fenwear.assembly import Tribosystem, law_named
+from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import BLOCK, Course, Jumps, Loading, Watch, Watching, as_given, drive, unwatched
 from fenwear.cycle.state import RunState
@@ -47,7 +47,7 @@ def jump(
         message = f"jumps go on from a whole cycle only, got half-cycle {start.half_cycle}"
         raise CaseError(InputError("run.integration", message))
     watching = Watching(system.team, watch)
-    step: Jumps = law_named(system.law).jumps(system, tolerance, watching, loading)
+    step: Jumps = system.contact_law.jumps(system, tolerance, watching, loading)
     exchange, state = step.system.exchange, start or step.beginning()
     if exchange is not None and state.temperature is not None:
         state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads

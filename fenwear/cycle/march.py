@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from fenwear.assembly import Tribosystem, law_named
+from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import BLOCK, Course, Loading, Watch, Watching, as_given, drive, unwatched
 from fenwear.cycle.state import RunState, beginning
@@ -47,5 +47,5 @@ def march(
         state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads
     watching = Watching(system.team, watch)
     course = Course(half_cycles, periodic_within, block, stops, leave, watching)
-    step = law_named(system.law).half_cycles(system, watching, loading, implicit=implicit)
+    step = system.contact_law.half_cycles(system, watching, loading, implicit=implicit)
     yield from drive(system, step, state, course)

@@ -31,7 +31,6 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import (
     Tribosystem,
     friction_power,
-    law_named,
     property_change,
     taken_at,
     warmed_system,
@@ -149,11 +148,14 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
         ConvergenceError: the inequality did not converge, or not with the nodes that conduct, or not with the
             properties of the temperatures.
     """
-    begin = time.perf_counter()
     system = at_step(system)
-    if system.sticks:
-        found: Steady = law_named(system.law).end(system)
-        return found
+    found: Steady = system.contact_law.end(system, properties_within)
+    return found
+
+
+def steady_state(system: Tribosystem, properties_within: float | None = None) -> Steady:
+    """Return the cyclic steady state of gross sliding, see `steady`; collective."""
+    begin = time.perf_counter()
     state = _of_these_bodies(system)
     if warming_key(system) and system.heat is not None:
         share = LEFT if properties_within is None else properties_within / system.heat.property_tolerance

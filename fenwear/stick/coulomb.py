@@ -9,18 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mpi4py import MPI
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import (
     Bodies,
     Preparation,
     Tribosystem,
-    build_bodies,
     build_conduction,
     joined,
     place_at_rest,
-    set_up_by,
 )
 from fenwear.assembly.tribosystem import Condensed
 from fenwear.bodies.operators import SurfaceOperator
@@ -110,20 +107,6 @@ class StickSetup:
     meshes: float
     ends: Ends | None = None
 
-    @property
-    def elastic_length(self) -> float:
-        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
-        return self.rig.interface.middle.elastic_length
-
-    def check_touching(self) -> None:
-        """Make sure that the load brings the surfaces together; collective.
-
-        Raises:
-            CaseError: it does not.
-        """
-        if not touches(self.rig):
-            raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
-
 
 def touches(rig: Rig) -> bool:
     """Return whether the load brings the surfaces together; collective."""
@@ -133,43 +116,22 @@ def touches(rig: Rig) -> bool:
 class Coulomb:
     """The law: nodes stick, or slip against their friction."""
 
+    sticks = True
     memory: type | None = Memory
-
-    def assemble(
-        self,
-        case: Case,
-        comm: MPI.Comm,
-        followed: Worn | None,
-        *,
-        heat: Preparation,
-        fresh: bool,
-        warmed: tuple[Array, Array] | None,
-    ) -> Tribosystem:
-        """Return the system of a case; collective."""
-        return system_of(case, build_bodies(case, comm, followed, warmed), heat=heat, fresh=fresh)
 
     def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
         """Return the system of a case whose bodies are built; collective."""
         return system_of(case, bodies, heat=heat, fresh=fresh)
 
-    def at_temperatures(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
-        """Return the system of the same case and meshes with the properties that these bodies have; collective."""
+    def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
+        """Return the system of the same case with the meshes or properties that these bodies have; collective."""
         same = bodies.punch is system.bodies.punch
         condensed = (system.condensed.punch, system.condensed.strip) if same else None
         return system_of(system.case, bodies, condensed=condensed, ends=system.lawful.ends)
 
-    def renewed(self, system: Tribosystem, followed: Worn | None, warmed: tuple[Array, Array] | None) -> Tribosystem:
-        """Return the system of the same case on meshes and with properties of now; collective."""
-        bodies = build_bodies(system.case, system.comm, followed, warmed)
-        return system_of(system.case, bodies, ends=system.lawful.ends)
-
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
         """Return the system of another case that shares the bodies that the change leaves; collective."""
         before = system.case
-        if not system.sticks or set_up_by(before) != set_up_by(case):
-            return self.assemble(
-                case, system.comm, system.bodies.followed, heat="as set", fresh=False, warmed=system.bodies.warmed
-            )
         bodies, condensed = system.bodies, (system.condensed.punch, system.condensed.strip)
         if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
             bodies = bodies.under(case)
@@ -185,7 +147,24 @@ class Coulomb:
         ends = system.lawful.ends if same_steps(before, case) else None
         return system_of(case, bodies, condensed=same, ends=ends)
 
-    def end(self, system: Tribosystem) -> FinalShape:
+    def replicated(self, system: Tribosystem) -> bool:
+        """Return whether every rank could go on alone."""
+        return system.exchange is None or system.exchange.reduced
+
+    def elastic_length(self, system: Tribosystem) -> float:
+        """Return the gap that unit pressures open on average, mm/MPa."""
+        return float(system.lawful.rig.interface.middle.elastic_length)
+
+    def check_touching(self, system: Tribosystem) -> None:
+        """Make sure that the load brings the surfaces together; collective.
+
+        Raises:
+            CaseError: it does not.
+        """
+        if not touches(system.lawful.rig):
+            raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
+
+    def end(self, system: Tribosystem, properties_within: float | None = None) -> FinalShape:  # noqa: ARG002
         """Return the shape to which partial slip wears; collective."""
         return final_shape(system.lawful.rig)
 

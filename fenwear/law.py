@@ -54,9 +54,8 @@ class Decided:
     @property
     def numbers(self) -> dict[str, Any]:
         """What the summary of a run says of it."""
-        share = None if self.choice is None else self.choice.share
-        if share is None and not self.system.sticks:
-            share = elastic_share(self.system)
+        known = None if self.choice is None else self.choice.share
+        share = elastic_share(self.system) if known is None else known
         return {"contact_law": self.case.contact.law, "elastic_share_of_stroke": share}
 
 

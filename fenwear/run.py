@@ -204,7 +204,7 @@ class _Run:
             self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
         self.warnings += [*position_warnings(system), *system.bodies.remarks, *doubts(self.case)]
         self.warnings += [*size_warnings(self.case, system.bodies, system.rigid)]
-        self.warnings += law_warnings(system) if system.sticks else stroke_warnings(system)
+        self.warnings += [*law_warnings(system), *stroke_warnings(system)]
         for warning in self.warnings:
             log(f"warning: {warning}")
         self._heat_watch = HeatWatch(self.extremes)

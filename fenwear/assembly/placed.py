@@ -368,12 +368,15 @@ class Placed:
             zone: Nodes in contact (n,) bool; by default all.
 
         Raises:
-            CaseError: a node of the contact lies on the axis of rotation, or nothing slides one way.
+            CaseError: a node of the contact lies on the axis of rotation, nothing slides one way, or nodes stick.
             ConvergenceError: a pressure_threshold or a pressure_cap leaves no optimum.
         """
         if self.motion.steps:
             message = "is a table of changing directions and loads: no one pressure is the optimum of all; see `steady`"
             raise CaseError(InputError("motion.kind", message))
+        if self.sticks:
+            message = "expected 'gross-sliding': the pressure optimum is that of surfaces that slide as a whole"
+            raise CaseError(InputError("contact.law", message))
         slides = self.sliding.field.rate(self.pair.opposite, self.pair.normal)
         if not (slides > ROUNDING * slides.max()).all():
             message = "lies within the contact: nothing slides there, so that no pressure wears it evenly"

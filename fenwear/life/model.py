@@ -15,7 +15,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, assemble, law_named, with_case
+from fenwear.assembly import Tribosystem, assemble, with_case
 from fenwear.case import Case, Dependence
 from fenwear.cycle import Block, critical_speed, cycles_to_reach, follow, jump, steady
 from fenwear.cycle.coupled import cycle_heat, touching
@@ -158,7 +158,7 @@ class Model:
 
     def stick_left_out(self) -> list[str]:
         """Return what is to be said of stick that the case leaves out, with an estimate of it."""
-        return [] if self.system().sticks else stroke_warnings(self.system())
+        return stroke_warnings(self.system())
 
     def _check_stays(self) -> None:
         """Refuse laws that change as long as a run goes on where a steady state is asked for.
@@ -353,7 +353,7 @@ class Model:
 
 def _of_final_shape(system: Tribosystem) -> Snapshot:
     """Return the shape to which partial slip wears: where nothing that slips carries pressure, and nothing wears on."""
-    found: FinalShape = law_named(system.law).end(system)
+    found: FinalShape = steady(system)
     none = Totals(np.zeros(len(SUMS)), np.zeros(0), np.zeros(0))
     surfaces = _worn_surfaces(system, found.worn, found.worn.times(0.0), none)
     thickness = system.bodies.punch.thickness

@@ -24,7 +24,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, law_named
+from fenwear.assembly import Tribosystem
 from fenwear.case import Case, OneWay, Rotation
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
@@ -179,7 +179,7 @@ def _memory(folder: Path, system: Tribosystem, arrays: dict[str, Any]) -> Any:
     """Return what a law of contact remembers; collective."""
     if not any(name.startswith(f"{MEMORY}.") for name in arrays):
         return None
-    kind: Any = law_named(system.law).memory
+    kind: Any = system.contact_law.memory
     try:
         memory = unpack(kind, MEMORY, arrays)
     except (KeyError, TypeError, ValueError):

@@ -6,7 +6,9 @@ a solid they are those along the sliding and across it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from functools import wraps
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +26,8 @@ if TYPE_CHECKING:
     from fenwear.stick.coulomb import Steps
     from fenwear.stick.cycle import Records
 
+S = TypeVar("S", Block, Tribosystem)
+T = TypeVar("T")
 STEP = "step"
 VARIABLES: dict[str, Variable] = {
     "step_fraction": (("half_cycle", STEP), "1", "fraction of the cycle at the end of the time step"),
@@ -59,10 +63,20 @@ IN_SOLIDS: dict[str, tuple[str, str, str]] = {
 IN_TURNING = {"displacement": "rad", "tangential_force": "N mm"}  # units where the strip turns
 
 
+def of_time_steps(function: Callable[[S], dict[str, T]]) -> Callable[[S], dict[str, T]]:
+    """Let a function of a system or a block return nothing where the law of contact resolves no time steps."""
+
+    @wraps(function)
+    def resolved(given: S) -> dict[str, T]:
+        system = given.system if isinstance(given, Block) else given
+        return function(given) if system.sticks else {}
+
+    return resolved
+
+
+@of_time_steps
 def variables(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of time steps of a system whose law resolves them; none of others."""
-    if not system.sticks:
-        return {}
     found = {**VARIABLES, **({} if system.exchange is None else HEAT_VARIABLES)}
     if system.pair.punch.dim == 3:
         found = {**{name: one for name, one in found.items() if name not in IN_SOLIDS}, **of_solids()}
@@ -77,10 +91,9 @@ def of_solids() -> dict[str, Variable]:
     return {**found, **ACROSS}
 
 
+@of_time_steps
 def columns(system: Tribosystem) -> dict[str, Column]:
     """Return what of time steps does not change in a run."""
-    if not system.sticks:
-        return {}
     pair, position = system.pair, system.lawful.rig.interface.middle
     none = Column((STEP,), np.arange(1, most(system) + 1), {"units": "1", "long_name": "time step of the half-cycle"})
     if pair.punch.dim == 3:
@@ -98,10 +111,9 @@ def columns(system: Tribosystem) -> dict[str, Column]:
     }
 
 
+@of_time_steps
 def attributes(system: Tribosystem) -> dict[str, Any]:
     """Return what a history says of a law that resolves half-cycles."""
-    if not system.sticks:
-        return {}
     rig = system.lawful.rig
     return {"law": system.law, "friction": float(rig.friction[0]), "period": rig.program.period}
 
@@ -111,11 +123,10 @@ def most(system: Tribosystem) -> int:
     return int(np.bincount([step.half_cycle for step in system.lawful.rig.program.steps]).max())
 
 
+@of_time_steps
 def values(block: Block) -> dict[str, NDArray[Any]]:
     """Return the time steps of a block's half-cycles by name: (k, ...), padded with NaN."""
     system = block.system
-    if not system.sticks:
-        return {}
     rows = [_row(system, steps) for steps in steps_of(block)]
     size = most(system)
     return {name: np.array([_padded(row[name], size) for row in rows]) for name in rows[0]}
@@ -197,11 +208,10 @@ def surface_stress(case: Case, records: Records) -> Array:
     return young / (1 - nu**2) * both - nu / (1 - nu) * records.pressure
 
 
+@of_time_steps
 def numbers(last: Block) -> dict[str, Any]:
     """Return the key numbers of the time steps of the last cycle of a run; none of a law without them."""
     system = last.system
-    if not system.sticks:
-        return {}
     found = values(last)
     cycle = slice(-system.motion.half_cycles, None)
     solid = system.pair.punch.dim == 3
@@ -227,10 +237,9 @@ def numbers(last: Block) -> dict[str, Any]:
     }
 
 
+@of_time_steps
 def extremes(block: Block) -> dict[str, float]:
     """Return what is largest over the time steps of a block, by the names of a run's extremes; temperatures in K."""
-    if not block.system.sticks:
-        return {}
     weights = block.system.lawful.rig.weights
     steps = steps_of(block)
     found = {

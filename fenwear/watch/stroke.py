@@ -35,8 +35,11 @@ def elastic_and_amplitude(system: Tribosystem) -> tuple[float, float]:
 
 
 def elastic_share(system: Tribosystem) -> float | None:
-    """Return the share of the amplitude that the bodies take up elastically; None for sliding one way."""
-    if len(set(system.motion.directions)) == 1:
+    """Return the share of the amplitude that the bodies take up elastically before they slide as a whole.
+
+    None for sliding one way, and where nodes stick: there it is followed.
+    """
+    if system.sticks or len(set(system.motion.directions)) == 1:
         return None
     way, amplitude = elastic_and_amplitude(system)
     return way / max(amplitude, 1e-300)

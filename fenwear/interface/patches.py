@@ -9,6 +9,7 @@ patches; a node where two of them meet has a part in each.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,19 +29,53 @@ SLIVER = 0.5  # the same of any one facet
 STRAIGHT = 1e-3  # of what normals fix of the middle across them: what they fix of it along the axis of a cylinder
 
 
+@dataclass(frozen=True)
+class Side:
+    """A surface where it lies.
+
+    Attributes:
+        surface: As it was meshed.
+        trace: Its trace nodes (N, d), mm.
+        normal: Of its facets (f, d).
+    """
+
+    surface: ContactSurface
+    trace: Array
+    normal: Array
+
+    @property
+    def middles(self) -> Array:
+        """The middles of the facets (f, d) by their corners."""
+        corners = self.surface.facets[:, : len(RING[self.surface.cell])]
+        return np.asarray(self.trace[corners].mean(axis=1))
+
+    def charted(self, s: Array, part: NDArray[np.bool_]) -> ChartedSurface:
+        """Return some of the facets, whose trace nodes a chart has at s (N, d - 1), mm."""
+        own = self.surface
+        return ChartedSurface(s, own.facets[part], own.cell, own.degree, own.nodes)
+
+
+# The patches of a contact, the punch's surface first in each; None where the chart does not fit the surfaces.
+Chart = Callable[[Side, Side], list[Patch] | None]
+
+
 def patches(punch: ContactSurface, strip: ContactSurface, placement: Placement = HERE) -> list[Patch]:
-    """Return the patches of a contact with the strip in its place; the first surface of each is the punch's."""
-    own, other = facet_normals(punch), placement.vectors(facet_normals(strip))
-    trace, found = placement.points(strip.trace), []
-    middle = None if _is_graph(own) else _middle(punch, own)
-    if middle is not None:
-        return _from_middle(middle, (punch, punch.trace, own), (strip, trace, other))
-    for axis, side, part in _sides(own):
-        seen = other[:, axis] * side <= -SEEN
-        if not seen.any() or (part.all() and (other[:, axis] * side < 0).all()):
+    """Return the patches of a contact with the strip in its place, by the first of `CHARTS` that fits."""
+    own = Side(punch, punch.trace, facet_normals(punch))
+    other = Side(strip, placement.points(strip.trace), placement.vectors(facet_normals(strip)))
+    found = (chart(own, other) for chart in CHARTS)
+    return next(parts for parts in found if parts is not None)
+
+
+def _along_axes(own: Side, other: Side) -> list[Patch]:
+    """Return the parts of a contact that look along each axis to each side, as graphs over the plane across it."""
+    found = []
+    for axis, side, part in _sides(own.normal):
+        seen = other.normal[:, axis] * side <= -SEEN
+        if not seen.any() or (part.all() and (other.normal[:, axis] * side < 0).all()):
             seen[:] = True
-        views = [np.delete(x, axis, axis=1) for x in (punch.trace, trace)]
-        found.append(Patch.of(_charted(punch, views[0], part), _charted(strip, views[1], seen)))
+        first, second = (np.delete(one.trace, axis, axis=1) for one in (own, other))
+        found.append(Patch.of(own.charted(first, part), other.charted(second, seen)))
     return found
 
 
@@ -98,7 +133,7 @@ class _Middle:
 
 def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
     """Return the middle that normals (f, d) of facets pass, in least squares; None where they pass none."""
-    x, d = _places(surface, surface.trace), surface.dim
+    x, d = Side(surface, surface.trace, normal).middles, surface.dim
     across = np.eye(d) - normal[:, :, None] * normal[:, None, :]
     system = across.mean(axis=0)
     sizes, axes = np.linalg.eigh(system)
@@ -115,33 +150,27 @@ def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
     return _Middle(point, round_.T, axes[:, ~fixed].T, float(np.median(radius)))
 
 
-def _from_middle(
-    middle: _Middle, first: tuple[ContactSurface, Array, Array], second: tuple[ContactSurface, Array, Array]
-) -> list[Patch]:
-    """Return the patches of round surfaces, each given with its trace in place (N, d) and normals (f, d)."""
-    (punch, punch_trace, own), (strip, trace, other) = first, second
-    ways, opposite = (middle.ways(_places(surface, x)) for surface, x in ((punch, punch_trace), (strip, trace)))
+def _from_middle(own: Side, other: Side) -> list[Patch] | None:
+    """Return the parts of round surfaces as seen from their middle; None of a graph, or where there is no middle."""
+    middle = None if _is_graph(own.normal) else _middle(own.surface, own.normal)
+    if middle is None:
+        return None
+    ways, opposite = (middle.ways(side.middles) for side in (own, other))
     outwards, facing = (
-        np.sign(np.einsum("fc,fc->f", way, normal @ middle.across.T))
-        for way, normal in ((ways, own), (opposite, other))
+        np.sign(np.einsum("fc,fc->f", way, side.normal @ middle.across.T))
+        for way, side in ((ways, own), (opposite, other))
     )
     found = []
     for axis, side, part in _sides(ways):
         for out in np.unique(outwards[part]):
             seen = (opposite[:, axis] * side >= AROUND) & (facing == -out)
             views = []
-            for surface, x, facets in ((punch, punch_trace, part & (outwards == out)), (strip, trace, seen)):
-                s, used = np.zeros((len(x), surface.dim - 1)), np.unique(surface.facets[facets])
-                s[used] = middle.chart(x[used], axis)
-                views.append(_charted(surface, s, facets))
+            for one, facets in ((own, part & (outwards == out)), (other, seen)):
+                s, used = np.zeros((len(one.trace), one.surface.dim - 1)), np.unique(one.surface.facets[facets])
+                s[used] = middle.chart(one.trace[used], axis)
+                views.append(one.charted(s, facets))
             found.append(Patch.of(*views))
     return found
 
 
-def _places(surface: ContactSurface, trace: Array) -> Array:
-    """Return the middles of facets (f, d) by their corners."""
-    return np.asarray(trace[surface.facets[:, : len(RING[surface.cell])]].mean(axis=1))
-
-
-def _charted(surface: ContactSurface, s: Array, part: NDArray[np.bool_]) -> ChartedSurface:
-    return ChartedSurface(s, surface.facets[part], surface.cell, surface.degree, surface.nodes)
+CHARTS: list[Chart] = [_from_middle, _along_axes]  # asked in turn; the last fits all

@@ -1,0 +1,142 @@
+"""The recipes of CONTRIBUTING.md, walked through: what one adds is known by its name, and does what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, assemble, load_case, make_case, march, register_contact_law, steady
+from fenwear.assembly import laws, place_case
+from fenwear.case.laws import CONTACT_LAWS
+from fenwear.cycle.gross_sliding import GrossSliding
+from fenwear.interface import patches
+from fenwear.interface.patches import CHARTS, Side
+from fenwear.run import run_case
+
+# ---- A law of contact: the strip is dragged back under a share of its load, as the tool of a shaping machine is.
+
+SHARE = 0.25
+SMALL = ["geometry.parameters.elements_along_contact=6", "geometry.degree=2", "output.report=false"]
+
+
+class DraggedBack(GrossSliding):
+    """Gross sliding, back under a share of the load."""
+
+    name = "dragged-back"
+
+    def half_cycles(self, system: Any, watch: Any, loading: Any, *, implicit: bool) -> Any:
+        """Return the step of one half-cycle, under its own load."""
+
+        def own(done: float) -> float:
+            return float(loading(done)) * (SHARE if int(done) % 2 else 1.0)
+
+        return super().half_cycles(system, watch, own, implicit=implicit)
+
+    def jumps(self, *_: Any) -> Any:
+        """Refuse what is not written."""
+        raise CaseError([])
+
+
+@pytest.fixture
+def dragged() -> Iterator[str]:
+    """Register the law, and forget it."""
+    register_contact_law(DraggedBack.name, DraggedBack())
+    yield DraggedBack.name
+    del laws.LAWS[DraggedBack.name]
+    CONTACT_LAWS.discard(DraggedBack.name)
+
+
+def test_a_law_of_contact(dragged: str, tmp_path: Path) -> None:
+    """Two cycles wear k s (1 + share) F / 2: of two strokes one has the share; a run goes its way, too."""
+    own, known = (
+        load_case("example1", [*SMALL, f"contact.law='{name}'", "run.half_cycles=4"])
+        for name in (dragged, "gross-sliding")
+    )
+    volumes = []
+    for case in (own, known):
+        system = assemble(case)
+        assert system.law == case.contact.law
+        assert not system.sticks
+        last = list(march(system, 4))[-1]
+        volumes.append(float(last.totals.of("volume_punch")[-1]))
+        assert last.load_factor.tolist() == pytest.approx([1, SHARE if case is own else 1] * 2)
+    assert volumes[0] == pytest.approx(volumes[1] * (1 + SHARE) / 2, rel=1e-9)
+    assert make_case(own.resolved()) == own
+    summary, _ = run_case(own, output=tmp_path / "run", log=lambda _: None, progress="none")
+    assert summary["punch"]["worn_volume_mm3"] == pytest.approx(volumes[0], rel=1e-12)
+    assert steady(assemble(own)).pressure.max() > 0  # what it does not change it has of gross sliding
+
+
+def test_names_of_laws_that_are_none() -> None:
+    with pytest.raises(CaseError, match=r"contact\.law: expected 'gross-sliding', 'coulomb' or 'auto', got 'dragged'"):
+        load_case("example1", ["contact.law=dragged"])
+    for name in ("coulomb", "auto", "two words"):
+        with pytest.raises(CaseError, match="expected a word that no law of fenwear has"):
+            register_contact_law(name, DraggedBack())
+
+
+# ---- A chart: an arc unrolled around its middle, in place of graphs over planes.
+
+BORE = """
+[geometry]
+file = "bushing.geo"
+degree = 2
+order = 2
+parameters = {contact_angle = 80, elements_along_contact = 24, clearance = 0.2}
+[materials.steel]
+young = 2e5
+poisson = 0.3
+[punch]
+regions = {punch_body = "steel"}
+supports = [{on = "punch_top", fix = ["x"]}]
+loads = [{on = "punch_top", force = [0, -10]}]
+[strip]
+regions = {strip_body = "steel"}
+supports = [{on = "strip_bottom", fix = ["x", "z"]}]
+[wear.punch]
+coefficient = 1e-8
+[motion]
+kind = "rotation"
+axis = [0, 1, 0]
+angular_speed = 1
+duration = 1
+[run]
+half_cycles = 1
+"""
+
+
+def unrolled(own: Side, other: Side) -> list[patches.Patch] | None:
+    """Return an arc of a plane model as one patch, by the angle around the middle times a radius; None of others."""
+    middle = patches._middle(own.surface, own.normal)
+    if own.surface.dim != 2 or middle is None:
+        return None
+    towards = middle.ways(own.middles).mean(axis=0)
+    parts = []
+    for side in (own, other):
+        x = side.trace - middle.point
+        arc = middle.radius * np.arctan2(x @ np.array([towards[1], -towards[0]]), x @ towards)
+        parts.append(side.charted(arc[:, None], np.ones(len(side.normal), bool)))
+    return [patches.Patch.of(*parts)]
+
+
+def test_a_chart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One patch in place of three sees the same contact: areas to rounding, gaps the nearer the finer the mesh."""
+    (tmp_path / "bore.toml").write_text(BORE)
+    errors = []
+    for elements in (24, 48):
+        case = load_case(tmp_path / "bore.toml", [f"geometry.parameters.elements_along_contact={elements}"])
+        found = []
+        for charts in (CHARTS, [unrolled, *CHARTS]):
+            monkeypatch.setattr(patches, "CHARTS", charts)
+            between = place_case(case).pair
+            found.append((between, len(patches.patches(between.punch, between.strip))))
+        (ready, three), (mine, one) = found
+        assert (three, one) == (3, 1)
+        np.testing.assert_allclose(mine.transfer.sum(axis=1), 1, rtol=1e-12)
+        np.testing.assert_allclose(mine.weights.sum(), ready.weights.sum(), rtol=1e-6)
+        errors.append(np.abs(mine.initial_gap - ready.initial_gap).max() / np.ptp(ready.initial_gap))
+    assert errors[1] < 0.3 * errors[0] < 1e-4

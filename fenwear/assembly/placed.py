@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.cycle_shear import cycle_shear
 from fenwear.assembly.laws import ContactLaw, law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
@@ -185,6 +186,16 @@ class Placed:
         """What each node slides in each phase (phases, n), mm."""
         return np.array([phase.distance for phase in self.motion.phases])[:, None] * self.slid
 
+    @cached_property
+    def sliding_directions(self) -> Array:
+        """Unit vectors of the sliding of each phase in space (m, n, 3), or zero."""
+        return np.array(
+            [
+                phase.direction * self.field_of(k).direction(own.opposite, own.normal)
+                for k, (phase, own) in enumerate(zip(self.motion.phases, self.pairs, strict=True))
+            ]
+        )
+
     def friction_in_space(self, phase: int, mu: Array) -> Array:
         """Return tau of a phase in space (n, 3), as `phase_friction`."""
         return self.friction.ratio(self.motion.phases[phase].direction, mu, self.pairs[phase], self.field_of(phase))
@@ -217,7 +228,7 @@ class Placed:
         """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
         laws = zip(("punch", "strip"), self.sliding.wear, strict=True)
         given: dict[str, object] = {
-            f"wear.{body}.coefficient": law.coefficient for body, law in laws if law is not None
+            f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in laws if law is not None
         }
         given["contact.friction"] = self.friction.contact.friction
         return [key for key, value in given.items() if isinstance(value, Dependence) and value.passes]
@@ -292,6 +303,7 @@ class Placed:
         temperatures: tuple[Array, Array] | None = None,
         worn: Worn | None = None,
         half_cycles: float | None = None,
+        cycle: Array | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
@@ -301,6 +313,7 @@ class Placed:
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths; by default none.
             half_cycles: Done since the start of the run; by default those before its motion.
+            cycle: Pressures of all phases (m, n), MPa; by default they are not known.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
@@ -323,6 +336,7 @@ class Placed:
             (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
+            cycle_shear(self, cycle),
         )
 
     def friction_ratio(self, direction: int) -> Array:

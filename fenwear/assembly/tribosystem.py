@@ -39,6 +39,7 @@ Preparation = Literal["as set", "reduced", "none"]  # of the heat
 SHARED = 2 * GIB  # of the whole contact, from which on ranks share the rows of its compliance
 COPIES = 4  # times as much as all ranks together may take for a contact that each has whole
 CARRIED = 1e-6  # of the loads: what the contact carries by rounding
+SAME = 1e-12  # of the largest load: what of another is rounding
 ROUNDING = 1e-12  # of unit normals: frames that differ by less are the same
 
 
@@ -278,6 +279,7 @@ def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np
 def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
     interface = condensed.join(placed.rigid)
+    under = _under_all(condensed, placed)
     found: list[Interface] = []
     for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
         earlier = next((j for j in range(k) if placed.rigids[j] is rigid and placed.loaded[j] is bodies), None)
@@ -286,10 +288,65 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
         elif earlier is not None:
             found.append(found[earlier])
         else:
-            own = condensed if bodies is placed.bodies else condensed.under_loads(bodies)
-            found.append(own.join(rigid))
+            own = under[id(bodies)]
+            alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
+            found.append(interface.under(rigid, own.punch, own.strip) if alike else own.join(rigid))
     parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
     return Tribosystem(**parts, condensed=condensed, interface=interface, interfaces=tuple(found), exchange=exchange)
+
+
+def _under_all(condensed: Condensed, placed: Placed) -> dict[int, Condensed]:
+    """Return the condensed bodies under the loads of each phase, by the id of its bodies; collective.
+
+    Displacements are linear in the loads: solved are those that the others are made of.
+    """
+    others = list({id(one): one for one in placed.loaded if one is not placed.bodies}.values())
+    found = {id(placed.bodies): condensed}
+    if not others:
+        return found
+    loads = np.array([np.concatenate([one.punch.load, one.strip.load]) for one in (placed.bodies, *others)])
+    chosen, shares = _spanning(placed.comm, loads)
+    base = [condensed if k == 0 else condensed.under_loads(others[k - 1]) for k in chosen]
+    for own, bodies in zip(shares.T[1:], others, strict=True):
+        if isinstance(condensed.punch, CondensedBody) and isinstance(condensed.strip, CondensedBody):
+            on_punch, on_strip = (
+                np.tensordot(own, [body.by_load for body in bodies_of], 1)
+                for bodies_of in ([one.punch for one in base], [one.strip for one in base])
+            )
+            found[id(bodies)] = replace(
+                condensed,
+                punch=replace(condensed.punch, by_load=on_punch),
+                strip=replace(condensed.strip, by_load=on_strip),
+            )
+        else:
+            found[id(bodies)] = condensed.under_loads(bodies)
+    return found
+
+
+def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
+    """Return loads that span all others, and their shares in each (chosen, all); collective.
+
+    The first is among them. One after the other that which differs most from those before is taken, and its direction
+    out of all (Gram and Schmidt, with pivoting).
+
+    Args:
+        comm: The ranks.
+        loads: At this rank's own degrees of freedom (all, owned).
+    """
+    left = loads.copy()
+    sizes = np.sqrt(comm.allreduce(np.einsum("ko,ko->k", left, left)))
+    scale, chosen, parts = sizes.max(initial=0.0), [], []
+    while len(chosen) < len(loads):
+        best = 0 if not chosen and sizes[0] > SAME * scale else int(np.argmax(sizes))
+        if chosen and sizes[best] <= SAME * scale:
+            break
+        chosen.append(best)
+        along = left[best] / max(sizes[best], 1e-300)
+        parts.append(comm.allreduce(left @ along))
+        left -= np.outer(parts[-1], along)
+        sizes = np.sqrt(comm.allreduce(np.einsum("ko,ko->k", left, left)))
+    whole = np.array(parts)
+    return chosen, np.linalg.lstsq(whole[:, chosen], whole, rcond=None)[0]
 
 
 def answers_for(condensed: Condensed, before: Placed, placed: Placed) -> bool:

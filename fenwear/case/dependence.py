@@ -1,7 +1,8 @@
 """Coefficients that depend on the state of the contact: expressions and tables of a case file, laws from Python.
 
 An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa), v (sliding speed, mm/s), the
-position x, y, z (mm), the worn depth (mm) and s, what has been slid (mm). It is parsed, checked node by node and then
+position x, y, z (mm), the worn depth (mm), s, what has been slid (mm), and of the cycle cs, the cross-shear ratio, and
+pm, the mean pressure over the sliding (MPa). It is parsed, checked node by node and then
 computed with numpy: no other name, call or operation than those below exists for it, so that a case file cannot run
 code. Laws are functions that a program in Python has registered; a case file alone cannot.
 """
@@ -21,8 +22,9 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 
-VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s")
-UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm"}
+VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "cs", "pm")
+UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm",
+         "cs": "", "pm": "MPa"}  # fmt: skip
 LONGEST = 500  # characters of an expression
 DEEPEST = 30  # levels of its operations
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -61,7 +63,7 @@ def register_law(name: str, function: Function, of: Sequence[str] = ("T", "p", "
     Args:
         name: A word; registered again, the new function takes its place.
         function: Of the state.
-        of: Which of T, p, v, x, y, z, depth and s it depends on; with depth or s nothing ever repeats.
+        of: Which of T, p, v, x, y, z, depth, s, cs and pm it depends on; with depth or s nothing ever repeats.
 
     Raises:
         CaseError: `name` is no word, or `function` cannot be called.

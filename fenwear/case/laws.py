@@ -32,12 +32,15 @@ class Dependence(Part):
 
     expression: str | None = Field(
         default=None,
-        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn) and s (mm, slid)",
+        description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn), s (mm, slid), "
+        "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding)",
     )
     table: tuple[tuple[Number, Number], ...] | None = Field(
         default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
-    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s"] = Field(default="T", description="argument of the table")
+    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "cs", "pm"] = Field(
+        default="T", description="argument of the table"
+    )
     regions: dict[str, Annotated[Number, Field(ge=0)]] | None = Field(
         default=None, description="value of each material region of the body, of the punch for friction"
     )
@@ -75,7 +78,7 @@ class Dependence(Part):
     @property
     def varies(self) -> bool:
         """Whether it changes with more than the place."""
-        return any(self.depends_on(name) for name in ("T", "p", "v", "depth", "s"))
+        return any(self.depends_on(name) for name in ("T", "p", "v", "depth", "s", "cs", "pm"))
 
     @property
     def passes(self) -> bool:
@@ -215,6 +218,15 @@ class WearLaw(Part):
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(ge=0)] | None = Field(
         default=None, description="volume worn over the energy of friction; beta~ = energy mu"
     )
+    per_area: constant_or_dependence(Annotated[Number | None, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=None,
+        description="k_A, depth worn over the length slid wherever surfaces touch, whatever the pressure, as of "
+        "polyethylene; in place of a law of the pressure",
+    )
+    touching_from: Annotated[Stress, Field(gt=0)] = Field(
+        default=0.1,
+        description="with per_area: pressure from which on a place counts as touching; below it in proportion",
+    )
     pressure_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="b")
     pressure_threshold: Annotated[Stress, Field(ge=0)] = Field(
         default=0.0, description="p_0: nothing wears below it, and above it (p - p_0)^b does"
@@ -254,9 +266,15 @@ class WearLaw(Part):
 
     @model_validator(mode="after")
     def _one_coefficient(self) -> Self:
-        given = [key for key in ("coefficient", "beta", "archard", "energy") if getattr(self, key) is not None]
+        keys = ("coefficient", "beta", "archard", "energy", "per_area")
+        given = [key for key in keys if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(f"give one of coefficient, beta, archard and energy, got {' and '.join(given) or 'none'}")
+            told = "coefficient, beta, archard, energy and per_area"
+            raise ValueError(f"give one of {told}, got {' and '.join(given) or 'none'}")
+        if self.per_area is not None and (self.pressure_cap is not None or self.pressure_threshold > 0):
+            raise ValueError("per_area: expected without pressure_cap and pressure_threshold")
+        if self.per_area is None and self.touching_from != WearLaw.model_fields["touching_from"].default:
+            raise ValueError("touching_from: expected with per_area")
         for key in ("coefficient", "beta"):
             value = getattr(self, key)
             if isinstance(value, float) and not (math.isfinite(value) and value >= 0):
@@ -265,7 +283,10 @@ class WearLaw(Part):
             raise ValueError("pressure_cap: expected more than pressure_threshold")
         if (self.archard is None) != (self.hardness is None):
             raise ValueError("hardness: expected together with archard, and only then")
-        if (self.archard, self.energy) != (None, None) and (self.pressure_exponent, self.speed_exponent) != (1.0, 1.0):
+        if (self.archard, self.energy, self.per_area) != (None, None, None) and (
+            self.pressure_exponent,
+            self.speed_exponent,
+        ) != (1.0, 1.0):
             raise ValueError(f"{given[0]}: expected with exponents of 1 only; give coefficient or beta")
         if isinstance(self.coefficient, Dependence):
             try:
@@ -273,6 +294,24 @@ class WearLaw(Part):
             except ValueError as error:
                 raise ValueError(f"coefficient: unit: {error}") from None
         return self
+
+    @property
+    def cap(self) -> float:
+        """Pressure beyond which wear grows no more, MPa; infinite without."""
+        if self.per_area is not None:
+            return self.touching_from
+        return math.inf if self.pressure_cap is None else self.pressure_cap
+
+    @property
+    def coefficient_key(self) -> str:
+        """Key of what may depend on the state."""
+        return "coefficient" if self.per_area is None else "per_area"
+
+    @property
+    def given_coefficient(self) -> float | Dependence | None:
+        """What may depend on the state: the coefficient, or k_A."""
+        found: float | Dependence | None = self.coefficient if self.per_area is None else self.per_area
+        return found
 
     @property
     def scale(self) -> float:
@@ -294,6 +333,11 @@ class Wear(Part):
 
     punch: WearLaw | None = Field(default=None, description="law of the punch; without it the punch does not wear")
     strip: WearLaw | None = Field(default=None, description="law of the strip; without it the strip does not wear")
+
+    @property
+    def laws(self) -> list[WearLaw]:
+        """Those that there are."""
+        return [law for law in (self.punch, self.strip) if law is not None]
 
     @model_validator(mode="after")
     def _some_law(self) -> Self:

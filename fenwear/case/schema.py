@@ -254,7 +254,8 @@ class Case(Part):
         if self.heat is None:
             given = {"contact.friction": self.contact.friction}
             for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
-                given[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
+                if law is not None:
+                    given[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
             problems += [
                 f"{key}: depends on the temperature T, which a case without the table heat does not know"
                 for key, value in given.items()
@@ -269,7 +270,7 @@ class Case(Part):
         problems += self._region_problems()
         friction = self.contact.friction
         for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
-            if law is not None and law.coefficient is None and law.archard is None and friction == 0:
+            if law is not None and (law.beta, law.energy) != (None, None) and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
 
@@ -277,7 +278,8 @@ class Case(Part):
         """Return what is wrong with coefficients that are given by regions."""
         given = {"contact.friction": (self.contact.friction, self.punch)}
         for name, law, body in (("punch", self.wear.punch, self.punch), ("strip", self.wear.strip, self.strip)):
-            given[f"wear.{name}.coefficient"] = (None if law is None else law.coefficient, body)
+            if law is not None:
+                given[f"wear.{name}.{law.coefficient_key}"] = (law.given_coefficient, body)
         problems = []
         for key, (value, body) in given.items():
             if not isinstance(value, Dependence) or value.regions is None:
@@ -350,6 +352,10 @@ class Case(Part):
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation | Cycle),
             "motion.axis: expected 'x'": not self.passes,
+            "contact.friction and wear: expected coefficients without cs and pm, which are of gross sliding,": any(
+                isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm"))
+                for one in (self.contact.friction, *(law.given_coefficient for law in self.wear.laws))
+            ),
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)
             ),
@@ -359,7 +365,7 @@ class Case(Part):
     @property
     def varies(self) -> bool:
         """Whether a coefficient depends on the state, or a load on the time in the cycle."""
-        laws = [law.coefficient for law in (self.wear.punch, self.wear.strip) if law is not None]
+        laws = [law.given_coefficient for law in (self.wear.punch, self.wear.strip) if law is not None]
         dependent = any(isinstance(value, Dependence) for value in (self.contact.friction, *laws))
         return dependent or not all(load.steady for body in ("punch", "strip") for load in self.loads_of(body))
 

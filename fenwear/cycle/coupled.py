@@ -298,7 +298,7 @@ class Coupled:
         system = self.system
         done = None if passing is None else passing.half_cycles
         conditions = [
-            system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None, worn, done)
+            system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None, worn, done, pressure)
             for k, p in enumerate(pressure)
         ]
         self._take(conditions)

@@ -173,7 +173,8 @@ class Stepper:
         if self.coupled.heat is not None and state.temperature is not None:
             surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
         conditions = [
-            system.conditions(k, pressure, surfaces, state.worn, half_cycles) for k, pressure in enumerate(pressures)
+            system.conditions(k, pressure, surfaces, state.worn, half_cycles, pressures)
+            for k, pressure in enumerate(pressures)
         ]
         return system.wear.phases(conditions).worn(pressures)
 

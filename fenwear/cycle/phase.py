@@ -65,6 +65,8 @@ class PhaseStep:
         before: ContactState | None,
         load: float = 1.0,
         half_cycles: float = 0.0,
+        near: ContactState | None = None,
+        cycle: Array | None = None,
     ) -> PhaseEnd:
         """Return the end of the phase.
 
@@ -74,6 +76,8 @@ class PhaseStep:
             before: The same phase one cycle ago.
             load: Factor of all loads.
             half_cycles: Done since the start of the run, in its middle.
+            near: Where to start from in the first cycle, such as the phase before.
+            cycle: Pressures of all phases a cycle ago (m, n), MPa; None in the first cycle.
 
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
@@ -86,12 +90,12 @@ class PhaseStep:
             temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn)
         if self._constant:
-            return self._end(*self._solve(temperature, gap, before, self._wear), before, self._wear)
-        start = before
+            return self._end(*self._solve(temperature, gap, before or near, self._wear), before, self._wear)
+        start = before or near
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            wear = self._update(pressure, temperature, worn, half_cycles)
+            wear = self._update(pressure, temperature, worn, half_cycles, cycle)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, wear)
             except ConvergenceError as error:
@@ -103,7 +107,7 @@ class PhaseStep:
         mean = np.full(len(gap), self.system.rigid.mean_pressure)
         contact, after, heat, wear = fixed_point(
             solve,
-            mean if before is None else before.pressure[0],
+            mean if start is None else start.pressure[0],
             lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
             COEFFICIENTS_FAIL,
             team=self.system.team,
@@ -111,14 +115,19 @@ class PhaseStep:
         return self._end(contact, after, heat, before, wear)
 
     def _update(
-        self, pressure: Array | None, temperature: HeatState | None, worn: Worn, half_cycles: float
+        self,
+        pressure: Array | None,
+        temperature: HeatState | None,
+        worn: Worn,
+        half_cycles: float,
+        cycle: Array | None,
     ) -> PhasesWear:
         """Take friction and wear at this pressure, and at temperature and depths at the start of the phase."""
         system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
-        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles)
+        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle)
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
             mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = system.phase_friction(self.phase, mu)

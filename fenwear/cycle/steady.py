@@ -282,7 +282,11 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     if not cap < found:
         return ""
     laws = zip(("punch", "strip"), problem.system.sliding.wear, strict=True)
-    keys = [f"wear.{body}.pressure_cap" for body, law in laws if law is not None and law.pressure_cap == cap]
+    keys = [
+        f"wear.{body}.{'pressure_cap' if law.per_area is None else 'touching_from'}"
+        for body, law in laws
+        if law is not None and law.cap == cap
+    ]
     why = (
         "the mean pressure is beyond it, all that is pressed so wears alike, and any shape stays"
         if cap <= mean

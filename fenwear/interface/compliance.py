@@ -43,6 +43,7 @@ class Interface:
         strip_moves: Which of the two.
         rows: Of the contact nodes on each rank; None where every rank has all.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.
+        like: One that differs by its loads or by where the strip's material is: what bodies answer is known of it.
     """
 
     rigid: RigidEquilibrium
@@ -51,6 +52,11 @@ class Interface:
     strip_moves: bool
     rows: Rows | None = None
     frame: Array | None = None
+    like: Interface | None = None
+
+    def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
+        """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
+        return Interface(rigid, punch, strip, self.strip_moves, self.rows, self.frame, self.like or self)
 
     @property
     def pair(self) -> ContactPair:
@@ -113,6 +119,8 @@ class Interface:
 
     @cached_property
     def _diagonal(self) -> Array:
+        if self.like is not None:
+            return self.like.diagonal()
         own = self._own
         if self.cost is None:
             kept = self.dense()
@@ -130,7 +138,7 @@ class Interface:
 
     @cached_property
     def _dense(self) -> Array:
-        return self.asked(EVERY, EVERY)
+        return self.asked(EVERY, EVERY) if self.like is None else self.like.dense()
 
     def asked(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the same as `entries`, from the bodies: for who keeps what it makes of them."""
@@ -174,6 +182,8 @@ class Interface:
     @cached_property
     def by_even(self) -> Array:
         """Gap that an even unit pressure opens without friction (n,), mm/MPa; collective where ranks share rows."""
+        if self.like is not None:
+            return self.like.by_even
         even = self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
         return even if self.rows is None else self.rows.gathered(even)
 
@@ -192,6 +202,8 @@ class Interface:
 
         Over all nodes; where no numbers are in memory, over some of them.
         """
+        if self.like is not None:
+            return self.like.elastic_length
         pair, modes, own = self.pair, self.rigid.rigid_normal, self._own
         inverse = np.linalg.pinv(modes)
         opened = self.apply(pair.normal[:, :, None] * inverse.T[:, None, :])[:, 0]

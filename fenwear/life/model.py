@@ -168,7 +168,8 @@ class Model:
         """
         laws = {"contact.friction": self.case.contact.friction}
         for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
-            laws[f"wear.{body}.coefficient"] = None if law is None else law.coefficient
+            if law is not None:
+                laws[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
         for key, law in laws.items():
             if isinstance(law, Dependence) and law.passes:
                 message = (

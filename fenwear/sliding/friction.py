@@ -18,6 +18,7 @@ from fenwear.arrays import Array
 from fenwear.case import Contact, Dependence
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
+from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import ALONG_X, SlidingField
 
 
@@ -33,6 +34,8 @@ class ContactConditions:
         depths: Worn off punch and strip there (n,) each, mm.
         slid: What each node has slid from the start (n,), mm.
         regions: Shares of the regions of punch and strip in the nodes (n,), by their names.
+        cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
+            straight at the present pressure.
     """
 
     pressure: Array
@@ -42,6 +45,7 @@ class ContactConditions:
     depths: tuple[Array, Array]
     slid: Array
     regions: tuple[Mapping[str, Array], Mapping[str, Array]]
+    cycle: CycleShear | None = None
 
     @classmethod
     def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
@@ -70,6 +74,8 @@ class ContactConditions:
             "z": z,
             "depth": self.depths[own],
             "s": self.slid,
+            "cs": np.zeros(self.shape) if self.cycle is None else self.cycle.ratio[own],
+            "pm": self.pressure if self.cycle is None else self.cycle.pressure,
             **{f"region {name}": share for name, share in self.regions[own].items()},
         }
 

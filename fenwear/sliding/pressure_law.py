@@ -29,8 +29,7 @@ class PressureLaw:
     @classmethod
     def of(cls, law: WearLaw) -> PressureLaw:
         """Return that of a wear law of the case."""
-        cap = np.inf if law.pressure_cap is None else law.pressure_cap
-        return cls(law.pressure_exponent, law.pressure_threshold, cap)
+        return cls(law.pressure_exponent, law.pressure_threshold, law.cap)
 
     @property
     def power(self) -> bool:

@@ -208,7 +208,8 @@ class Wear:
         """Whether no coefficient depends on more than the place."""
         laws = [law for law in (self.punch, self.strip) if law is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
-        dependent = any(isinstance(law.coefficient, Dependence) and law.coefficient.varies for law in laws)
+        given = [law.given_coefficient for law in laws]
+        dependent = any(isinstance(one, Dependence) and one.varies for one in given)
         return not dependent and (self.friction.constant or not of_friction)
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
@@ -238,17 +239,19 @@ class Wear:
 def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:
     """Return beta~ at the nodes (n,), in the internal unit of its exponents.
 
-    beta~ = beta mu^b, K / H (Archard), or the energy wear coefficient times mu.
+    beta~ = beta mu^b, K / H (Archard), the energy wear coefficient times mu, or k_A over the pressure from which on
+    surfaces touch, beyond which wear grows no more.
 
     Raises:
         CaseError: it is negative or not finite; `key` is the law's key.
     """
-    n = conditions.shape
-    if isinstance(law.coefficient, Dependence):
+    n, given = conditions.shape, law.given_coefficient
+    scale = law.scale if law.per_area is None else 1 / law.touching_from
+    if isinstance(given, Dependence):
         body = conditions.of("punch" if key.endswith("punch") else "strip")
-        return law.coefficient.values(body, n, law.scale, f"{key}.coefficient")
-    if law.coefficient is not None:
-        return np.full(n, law.coefficient)
+        return given.values(body, n, scale, f"{key}.{law.coefficient_key}")
+    if given is not None:
+        return np.full(n, scale * given)
     if law.archard is not None and law.hardness is not None:
         return np.full(n, law.archard / law.hardness)
     mu = friction.values(conditions)

@@ -85,7 +85,7 @@ class LocalLaws:
             return not self.friction.constant
         laws = [law for law in self.wear if law is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
-        dependent = any(isinstance(law.coefficient, Dependence) and law.coefficient.varies for law in laws)
+        dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
         return dependent or (of_friction and not self.friction.constant)
 
     def conditions(

@@ -39,7 +39,7 @@ from fenwear.cycle.jump_error import ORDER
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
-from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.state import RunState, known_pressures
 from fenwear.cycle.steady import Steady, steady_state
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
@@ -80,8 +80,7 @@ class HalfCycles:
     def _whole(self, state: RunState, phases: range, load: float) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""
         worn, temperature, ends = state.worn, state.temperature, []
-        known = joined(state.contacts)
-        cycle = None if known is None else known.pressure
+        cycle = known_pressures(state.contacts)
         for number, phase in enumerate(phases):
             if number:
                 self.watch()

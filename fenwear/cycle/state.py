@@ -55,6 +55,12 @@ def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:
     return ContactState(pressure, gap, rigid, max(c.iterations for c in present))
 
 
+def known_pressures(contacts: tuple[ContactState | None, ...]) -> Array | None:
+    """Return the pressures of all phases (m, n), MPa; None unless all are there."""
+    found = joined(contacts)
+    return None if found is None else found.pressure
+
+
 def parted(contact: ContactState) -> tuple[ContactState, ...]:
     """Return the contact of each phase of a state."""
     return tuple(

@@ -2,94 +2,34 @@
 
 A law is registered here by its name in a case, `contact.law`, as the module that has it as `LAW`, or as an object by
 `register_contact_law`; nothing else in this package names one. What they share is the loop (`cycle.driver`), the state
-(`cycle.state`), blocks, runs and results. What differs beyond their steps they answer themselves, `ContactLaw`.
+(`cycle.state`), blocks, runs and results. What differs beyond their steps they answer themselves: the questions are
+those of `contact_law.ContactLaw`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any
 
 from fenwear.case.laws import CONTACT_LAWS
 from fenwear.errors import CaseError, InputError
 
-if TYPE_CHECKING:
-    from fenwear.assembly.bodies import Bodies
-    from fenwear.assembly.tribosystem import Preparation, Tribosystem
-    from fenwear.case import Case
-
 GROSS, AUTO = "gross-sliding", "auto"
-LAWS: dict[str, str | ContactLaw] = {GROSS: "fenwear.cycle.gross_sliding", "coulomb": "fenwear.stick.coulomb"}
+LAWS: dict[str, Any] = {GROSS: "fenwear.cycle.gross_sliding", "coulomb": "fenwear.stick.coulomb"}
 
 
-class ContactLaw(Protocol):
-    """What a law of contact answers.
-
-    Attributes:
-        sticks: Whether nodes stick or slip by themselves, resolved in time steps; else all slide with the motion.
-        memory: The data class of what it remembers from half-cycle to half-cycle besides depths and temperatures, with
-            temperatures as `warm`; None for nothing.
-    """
-
-    sticks: bool
-    memory: type | None
-
-    def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
-        """Return the system of a case whose bodies are built; collective."""
-
-    def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
-        """Return the system of the same case with the meshes or properties that these bodies have; collective."""
-
-    def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
-        """Return the system of another case of the same set-up and law, sharing what the change leaves; collective."""
-
-    def replicated(self, system: Tribosystem) -> bool:
-        """Return whether every rank could go on alone: no temperatures, no contact on all displacements."""
-
-    def elastic_length(self, system: Tribosystem) -> float:
-        """Return the gap that unit pressures open on average, mm/MPa: the scale of gaps."""
-
-    def check_touching(self, system: Tribosystem) -> None:
-        """Make sure that the surfaces touch; collective.
-
-        Raises:
-            CaseError: they never do, or supports carry all of the load.
-        """
-
-    def end(self, system: Tribosystem, properties_within: float | None = None) -> Any:
-        """Return the state to which wear leads in the end; collective."""
-
-    def half_cycles(
-        self, system: Tribosystem, watch: Callable[[], bool], loading: Callable[[float], float], *, implicit: bool
-    ) -> Any:
-        """Return the `cycle.driver.Step` that goes on by a half-cycle."""
-
-    def jumps(
-        self,
-        system: Tribosystem,
-        tolerance: float,
-        watch: Callable[[], bool],
-        loading: Callable[[float], float],
-    ) -> Any:
-        """Return the `cycle.driver.Step` that goes on by as many cycles as the tolerance allows."""
-
-
-def law_named(name: str) -> ContactLaw:
-    """Return a law of contact by its name in cases; what a case leaves open slides as a whole."""
+def law_named(name: str) -> Any:
+    """Return a law of contact, a `ContactLaw`, by its name in cases; what a case leaves open slides as a whole."""
     found = LAWS[GROSS if name == AUTO else name]
-    if isinstance(found, str):
-        law: ContactLaw = import_module(found).LAW
-        return law
-    return found
+    return import_module(found).LAW if isinstance(found, str) else found
 
 
-def register_contact_law(name: str, law: ContactLaw) -> None:
+def register_contact_law(name: str, law: Any) -> None:
     """Make a law of contact known under a name, for `contact.law` of cases.
 
     Args:
         name: A word; one that is registered already is replaced.
-        law: Answers as `ContactLaw` says. Systems that it makes have its name as their `law`.
+        law: Answers as `contact_law.ContactLaw` says. Systems that it makes have its name as their `law`.
 
     Raises:
         CaseError: the name is no word, or that of a law of fenwear's own.

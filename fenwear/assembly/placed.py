@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
 from fenwear.assembly.cycle_shear import cycle_shear
-from fenwear.assembly.laws import ContactLaw, law_named
+from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
@@ -94,14 +95,14 @@ class Placed:
         return self.clock.time + self.motion.time(np.asarray(half_cycle) - self.clock.half_cycles)
 
     @property
-    def contact_law(self) -> ContactLaw:
-        """The law of contact."""
+    def contact_law(self) -> Any:
+        """The law of contact, a `contact_law.ContactLaw`."""
         return law_named(self.law)
 
     @property
     def sticks(self) -> bool:
         """Whether nodes stick or slip by themselves."""
-        return self.contact_law.sticks
+        return bool(self.contact_law.sticks)
 
     @property
     def normal_force(self) -> float:

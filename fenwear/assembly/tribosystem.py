@@ -92,12 +92,12 @@ class Tribosystem(Placed):
     @property
     def elastic_length(self) -> float:
         """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
-        return self.contact_law.elastic_length(self)
+        return float(self.contact_law.elastic_length(self))
 
     @property
     def replicated(self) -> bool:
         """Whether every rank could go on alone: no temperatures of all nodes, no contact on all displacements."""
-        return self.contact_law.replicated(self)
+        return bool(self.contact_law.replicated(self))
 
     def led(self, function: Callable[[], T]) -> T:
         """Call what goes on from prepared bodies, on rank 0 for all where that can be, else on every rank; collective.

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies
+from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.placed import Placed, place
 from fenwear.assembly.strokes import make_sliding
@@ -47,8 +48,8 @@ def assemble(
         CaseError: what only the geometry can tell is wrong.
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    bodies = build_bodies(case, comm, followed, warmed)
-    return law_named(case.contact.law).of_bodies(case, bodies, heat=heat, fresh=fresh)
+    law: ContactLaw = law_named(case.contact.law)
+    return law.of_bodies(case, build_bodies(case, comm, followed, warmed), heat=heat, fresh=fresh)
 
 
 def renewed(
@@ -64,7 +65,8 @@ def renewed(
     Raises:
         MeshQualityError: an element does not survive the motion of its mesh.
     """
-    return law_named(system.law).renewed(system, build_bodies(system.case, system.comm, followed, warmed))
+    law: ContactLaw = system.contact_law
+    return law.renewed(system, build_bodies(system.case, system.comm, followed, warmed))
 
 
 def place_case(
@@ -115,8 +117,8 @@ def with_case(system: Tribosystem, case: Case) -> Tribosystem:
     Raises:
         CaseError: the punch would tip over.
     """
-    law = law_named(case.contact.law)
-    if law is not law_named(system.law) or set_up_by(system.case) != set_up_by(case):
+    law: ContactLaw = law_named(case.contact.law)
+    if law is not system.contact_law or set_up_by(system.case) != set_up_by(case):
         return assemble(case, system.comm, system.bodies.followed, heat=preparation(system))
     return law.varied(system, case)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies, build_conduction, elastic_body
+from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.tribosystem import Tribosystem
 from fenwear.case import Body, Case
 from fenwear.errors import CaseError
@@ -117,7 +118,8 @@ def warmed_system(system: Tribosystem, state: HeatState) -> Tribosystem:
     """
     case = system.case
     bodies = _bodies_at(system.bodies, case, state.temperatures())
-    return system.contact_law.renewed(system, bodies)
+    law: ContactLaw = system.contact_law
+    return law.renewed(system, bodies)
 
 
 def _bodies_at(bodies: Bodies, case: Case, temperatures: tuple[Array, Array]) -> Bodies:

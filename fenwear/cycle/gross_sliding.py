@@ -14,6 +14,7 @@ import numpy as np
 
 from fenwear.assembly import (
     Bodies,
+    ContactLaw,
     Placed,
     Preparation,
     Sliding,
@@ -241,4 +242,4 @@ def _with_heat_as(system: Tribosystem, new: Tribosystem, *, keep: bool = False) 
     return (with_reduced_heat if prepared == "reduced" else with_exchange)(new, keep=keep)
 
 
-LAW = GrossSliding()
+LAW: ContactLaw = GrossSliding()

@@ -13,6 +13,7 @@ import numpy as np
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import (
     Bodies,
+    ContactLaw,
     Preparation,
     Tribosystem,
     build_conduction,
@@ -177,7 +178,7 @@ class Coulomb:
         return Jumps(system, tolerance, watch, loading)
 
 
-LAW = Coulomb()
+LAW: ContactLaw = Coulomb()
 
 
 def system_of(

@@ -1,4 +1,8 @@
-"""Two surfaces in contact: opposite each other, in equilibrium, and elastic."""
+"""Two surfaces in contact: opposite each other, in equilibrium, and elastic.
+
+Which nodes are opposite is found by `patches` and `overlap`, gaps and weights are those of `pair`, what forces open is
+`compliance.Interface`, and which rigid motions the contact balances `equilibrium`.
+"""
 
 from fenwear.interface.compliance import FrameCompliance, Interface, PressureCompliance, join
 from fenwear.interface.equilibrium import RigidEquilibrium, is_translation, rigid_equilibrium

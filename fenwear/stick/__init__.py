@@ -1,7 +1,8 @@
 """Coulomb's law with stick: partial slip, fretting.
 
-Which nodes stick, slip or open is decided in `equations`, a time step of it solved in `increment`, with heat in `heated`;
-`cycle.Rig` goes through the steps of a cycle, `jump` over many; `coulomb` is the law for the controller, `fenwear.cycle`.
+Which nodes stick, slip or open is decided in `equations`, a time step of it solved in `increment`, with heat in
+`heated`; `cycle.Rig` goes through the steps of a cycle, `jump` over many; `coulomb` is the law for the controller,
+`fenwear.cycle`.
 """
 
 from fenwear.stick.increment import advance

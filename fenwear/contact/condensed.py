@@ -156,6 +156,7 @@ class CondensedContact:
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         upper, functions = np.full(m * size, np.inf), (self._residual, self._jacobian)
         self.inequality = Inequality(lower, upper, *functions, PREFIX, NAME, self._rounding)
+        self.inequality.sets_first = self._many
 
     def _slide(self, phases: Iterable[int]) -> None:
         """Take the friction of phases."""

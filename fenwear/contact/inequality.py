@@ -6,7 +6,10 @@ systems are piecewise linear or nearly so, hence full steps, without line search
 
 SNES decides which unknowns are at their bounds. Solves that follow one another mostly end with the
 same ones: a start that is near is first taken on by Newton's method with its own set, whose factor is
-kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts.
+kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts. Where unknowns are
+many the sets themselves are gone through first: that of the next step holds what has come out below its bound, and lets
+go what is held with a residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). It
+takes fewer of them than steps that are cut off at the bounds, but need not end.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from fenwear.errors import ConvergenceError
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
+SETS = 30  # that are gone through before SNES starts
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 
 
@@ -111,6 +115,7 @@ class Inequality:
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: _Kept | None = None
         self._operator: Operator | None = None
+        self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
         self.singular = False  # whether the last set that SNES took had no factor
 
     @cached_property
@@ -185,6 +190,8 @@ class Inequality:
             ConvergenceError: SNES did not converge.
         """
         x = self._on_set(start) if near else None
+        if x is None and self.sets_first and not line_search:
+            x = self._through_sets(start)
         return self._by_snes(start, line_search) if x is None else x
 
     def _on_set(self, start: Array) -> Array | None:
@@ -216,6 +223,26 @@ class Inequality:
     def _tolerance(self) -> float:
         """Of the residual, where rounding leaves more than `TOLERANCE`."""
         return max(TOLERANCE, EPSILON * self._rounding())
+
+    def _through_sets(self, start: Array) -> Array | None:
+        """Return the solution by a sequence of sets, each solved for as it is; None where one comes again."""
+        x, key, seen = start.copy(), self._free(start), set[bytes]()
+        for _ in range(SETS):
+            if key in seen:
+                return None
+            seen.add(key)
+            free = np.frombuffer(key, dtype=bool)
+            x[~free] = self._lower[~free]
+            try:
+                kept = self._factor(self._jacobian(x), key)
+                x[kept.free] -= kept.solve(self._function(x)[kept.free])
+            except np.linalg.LinAlgError:
+                return None
+            wanted = np.where(free, x > self._lower, self._function(x) < -TOLERANCE)
+            if np.array_equal(wanted, free):
+                return self._on_set(x)
+            key = wanted.tobytes()
+        return None
 
     def _free(self, x: Array) -> bytes:
         """Return which unknowns are within their bounds, as bytes."""

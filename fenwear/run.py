@@ -284,7 +284,7 @@ class _Run:
         self, system: Tribosystem, start: RunState | None, leave: Callable[[RunState], bool], span: Span
     ) -> Iterator[Block]:
         run = self.case.run
-        course = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
+        course: dict[str, Any] = {"start": start, "leave": leave, "stops": self._fields_at, "watch": self._watch}
         course["periodic_within"] = run.periodic_within
         return integrate(system, run.integration, span, run.jump_tolerance, **course)
 

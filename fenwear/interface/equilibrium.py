@@ -67,7 +67,7 @@ class RigidEquilibrium:
         """Return the mean arm of the normals about the axis of a rotation, mm."""
         turned = np.abs(self.rigid_normal[:, mode])
         own = turned > 0
-        return float(self.pair.weights @ turned / max(self.pair.weights @ own, 1e-300)) or 1.0
+        return float(self.pair.weights @ turned / max(float(self.pair.weights @ own), 1e-300)) or 1.0
 
     @property
     def translations(self) -> list[list[int]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from mpi4py import MPI
@@ -354,7 +354,7 @@ class Model:
 
 def _of_final_shape(system: Tribosystem) -> Snapshot:
     """Return the shape to which partial slip wears: where nothing that slips carries pressure, and nothing wears on."""
-    found: FinalShape = steady(system)
+    found = cast(FinalShape, steady(system))  # under Coulomb's law
     none = Totals(np.zeros(len(SUMS)), np.zeros(0), np.zeros(0))
     surfaces = _worn_surfaces(system, found.worn, found.worn.times(0.0), none)
     thickness = system.bodies.punch.thickness

@@ -72,9 +72,8 @@ def variables(placed: Placed) -> dict[str, Variable]:
     found: dict[str, Variable] = {}
     for name, mode in zip(motions(placed), placed.rigid.mode_names, strict=True):
         body = "strip" if name.endswith("_strip") else "punch"
-        way, axis = name.split("_")[:2]
+        axis = name.split("_")[1]
         unit, text = ("mm", f"moved along {axis}") if is_translation(mode) else ("rad", f"turned about {axis}")
-        assert way in text
         part = "" if len(mode.split("_")) < 3 else f" ({'_'.join(mode.split('_')[2:])})"
         found[name] = (("half_cycle",), unit, f"how far the {body}{part} has {text}, from where it was meshed")
     return found | (ECCENTRICITY if bore_of(placed) is not None else {})
@@ -83,7 +82,7 @@ def variables(placed: Placed) -> dict[str, Variable]:
 def values(block: Block) -> dict[str, Array]:
     """Return them of each half-cycle of a block (k,)."""
     system = block.system
-    found = dict(zip(motions(system), block.rigid.T, strict=True))
+    found: dict[str, Array] = dict(zip(motions(system), block.rigid.T, strict=True))
     bore = bore_of(system)
     if bore is None:
         return found
@@ -93,7 +92,7 @@ def values(block: Block) -> dict[str, Array]:
     cross, along = away[:, 0] * pressed[1] - away[:, 1] * pressed[0], away @ pressed
     turn = np.sign(system.sliding.field.turn[1]) or 1.0
     return found | {
-        "eccentricity": np.linalg.norm(away, axis=1),
+        "eccentricity": np.asarray(np.linalg.norm(away, axis=1)),
         "eccentricity_x": away[:, 0],
         "eccentricity_z": away[:, 1],
         "attitude_angle": np.degrees(turn * np.arctan2(cross, along)),

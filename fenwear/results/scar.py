@@ -52,7 +52,7 @@ class ScarGeometry:
         if not self.names:
             return {}
         level = share * depth.max(axis=1, initial=0.0)
-        found = np.zeros((len(depth), len(self.names)))
+        found: Array = np.zeros((len(depth), len(self.names)))
         for k in range(self.part.max(initial=-1) + 1):
             own = np.where(self.part == k, depth, 0.0)
             found = np.maximum(found, extents(own, self.coordinates, self.edges, share, level))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from mpi4py import MPI
@@ -124,7 +125,7 @@ def _nodes(system: Tribosystem) -> dict[str, Array]:
 
 def _final_shape(system: Tribosystem) -> Values:
     """Return the shape to which partial slip wears."""
-    found: FinalShape = steady(system)
+    found = cast(FinalShape, steady(system))  # under Coulomb's law
     steps = system.lawful.rig.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
     pressure = found.pressures[ends]

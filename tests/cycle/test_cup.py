@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import CaseError, Tribosystem, march, steady
+from fenwear import CaseError, Tribosystem, jump, march, steady
 
 RADIUS, FORCE, RATE = 14.0, 1000.0, 1e-9
 COARSE = (
@@ -24,7 +24,9 @@ def turning(angles: list[float], **more: str) -> str:
     rows = [[float(k), *(float(c) for c in turn), -FORCE] for k, turn in enumerate(turns)]
     columns = ["time (s)", "rotation_x (rad)", "rotation_y (rad)", "rotation_z (rad)", "force_z (N)"]
     further = "".join(f", {key}={value}" for key, value in more.items())
-    return f"motion={{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_back', through=[0,0,0]}}{further}}}"
+    return (
+        f"motion={{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_back', through=[0,0,0]}}{further}}}"
+    )
 
 
 @pytest.mark.mpi
@@ -44,8 +46,31 @@ def test_steady_state_of_a_cup(assembled: Callable[..., Tribosystem]) -> None:
     assert np.abs(spread).max() < 1e-9 * state.wear_per_cycle.max()
 
 
+def test_growing_contact(assembled: Callable[..., Tribosystem]) -> None:
+    """Verification 44: sliding, volume and depth of a cup with clearance at 30, 60 and 85 degrees from the pole.
+
+    With stiff bodies the limit is of rigid ones; what they give way, 1.5 um, is a tenth of the depth at 30 degrees.
+    """
+    clearance, way = 0.1, RADIUS * np.radians(80)
+    stiff = ("geometry.parameters.clearance=0.1", "materials.polyethylene.young='20 GPa'", "geometry.follow_wear=never",
+             "materials.cobalt-chromium.young='1000 TPa'")  # fmt: skip
+    system = assembled("ball-in-cup", *COARSE, *stiff, turning([-20, 20, -20]))
+    height, end = system.pair.normal[:, 2], None
+    for angle, slid, volume, share in (
+        (30, 0.06362049, 0.06511247, 0.1),
+        (60, 1.425326, 1.570796, 0.012),
+        (85, 24.33386, 30.03636, 0.004),
+    ):
+        cycles = round(slid * RADIUS**2 * clearance / (RATE * FORCE * way))
+        *_, last = jump(system, cycles, tolerance=3e-3, start=end)
+        end, depth = last.end, last.end.worn.punch
+        assert system.pair.weights @ depth == pytest.approx(volume * RADIUS**2 * clearance, rel=2e-3)
+        rigid = np.maximum(clearance * (height / np.cos(np.radians(angle)) - 1), 0)
+        np.testing.assert_allclose(depth, rigid, rtol=0, atol=share * rigid.max())
+
+
 def test_both_bodies_worn_under_turns(assembled: Callable[..., Tribosystem]) -> None:
-    """Volumes by depth on every material point are those metered and k sum of p s, and the ball's scar turns with it."""
+    """Volumes by depth on every material point are those metered and k sum of p s; the ball has its scar turned."""
     wide = (*COARSE, "geometry.parameters.overlap_angle=25", "geometry.parameters.overlap_elements=2",
             "wear.strip.coefficient=3e-10")  # fmt: skip
     system = assembled("ball-in-cup", *wide, turning([0, 20, 0]))
@@ -54,7 +79,9 @@ def test_both_bodies_worn_under_turns(assembled: Callable[..., Tribosystem]) -> 
     volumes = pair.weights @ end.worn.punch, pair.strip.weights @ end.worn.strip
     np.testing.assert_allclose(volumes, [end.totals.of("volume_punch"), end.totals.of("volume_strip")], rtol=1e-12)
     assert volumes[1] == pytest.approx(0.3 * volumes[0], rel=1e-12)
-    pressed = sum(float(c.pressure[0] @ (pair.weights * s)) for c, s in zip(end.contacts, system.path, strict=True) if c)
+    pressed = sum(
+        float(c.pressure[0] @ (pair.weights * s)) for c, s in zip(end.contacts, system.path, strict=True) if c
+    )
     assert volumes[0] == pytest.approx(3 * RATE * pressed, rel=1e-6)
     assert end.worn.strip.min() >= 0
     # In the middle of both steps the ball has turned by 10 degrees: its own scar lies as far back.

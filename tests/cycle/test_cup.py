@@ -41,8 +41,8 @@ def test_steady_state_of_a_cup(assembled: Callable[..., Tribosystem]) -> None:
     assert state.velocity["lambda_F"] == pytest.approx(4 * RATE * angle * FORCE / (np.pi**2 * RADIUS), rel=5e-4)
     volume = float((state.wear_per_cycle * system.pair.weights).sum())
     assert volume == pytest.approx(4 / np.pi * RATE * FORCE * angle * RADIUS, rel=2e-3)
-    # The march of a worn-in cup stays where the direct solution is, which wears evenly.
-    spread = state.wear_per_cycle - state.velocity["lambda_F"] * normal[:, 2]
+    # All that touches wears by one rigid motion; at the rim, whose normals are square to it, a few nodes do not.
+    spread = (state.wear_per_cycle - state.velocity["lambda_F"] * normal[:, 2])[state.pressure[0] > 0]
     assert np.abs(spread).max() < 1e-9 * state.wear_per_cycle.max()
 
 

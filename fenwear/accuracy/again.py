@@ -15,6 +15,7 @@ from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError
 
 LONGEST = 400  # phases that are marched again one by one; longer runs go by jumps
+FEWEST = 9  # nodes of a grid that is coarsened
 TOLERANCE = 1e-3  # of these jumps
 
 
@@ -84,7 +85,9 @@ class Again:
 
 
 def coarser(case: Case) -> Case | None:
-    """Return the case on elements of the next lower degree; None where there is none."""
+    """Return the case on elements of the next lower degree, on a grid with half the nodes; None where there is none."""
+    if case.grid is not None:
+        return changed(case, grid={"nodes": (case.grid.nodes - 1) // 2 + 1}) if case.grid.nodes >= FEWEST else None
     degree = case.geometry.degree
     return None if degree == 1 else changed(case, geometry={"degree": degree - 1})
 

@@ -76,7 +76,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
         first, end = again.ends()
         before = values_of(end)
         if lower is not None:
-            found["mesh"] = of_mesh(values, before, case.geometry.degree)
+            found["mesh"] = of_mesh(values, before, fineness_of(case))
         for source, contribution in _steps(again, before, first, last):
             found[source] = contribution
     except (CaseError, ConvergenceError) as error:
@@ -94,6 +94,11 @@ def of_mesh(values: Values, coarse: Values, degree: int) -> Contribution:
         for quantity, value in values.items()
         if quantity in coarse
     }
+
+
+def fineness_of(case: Case) -> int:
+    """Return p where the run that is compared has elements, or spacings, p / (p - 1) times as large."""
+    return case.geometry.degree if case.grid is None else 2
 
 
 def order_of(value: Value) -> float:
@@ -165,8 +170,8 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     """
     begin = time.perf_counter()
     case, until = system.case, system.case.run.half_cycles
-    degree = case.geometry.degree
-    below = coarser(case) if degree > 2 else None
+    degree = fineness_of(case)
+    below = coarser(case) if degree > 2 or case.grid is not None else None
     base = in_few_steps(below or case, until * system.motion.positions)
     if base.run.integration == "jump":
         until = until // system.motion.half_cycles * system.motion.half_cycles

@@ -260,7 +260,7 @@ class Placed:
     def outworn(self, worn: Worn) -> bool:
         """Return whether the wear since the meshes were moved is large against the elements at the contact."""
         limit = None if self.made_from is None else self.made_from.geometry.follow_wear
-        if limit is None:
+        if limit is None or self.pair.punch.grid is not None:  # nothing of a grid's wear is the mesh's
             return False
         followed = self.bodies.followed
         rest = worn if followed is None else worn - followed

@@ -19,7 +19,7 @@ from fenwear.assembly.placed import Placed
 from fenwear.assembly.ways import chosen, free_on_ranks, settle
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.operators import SurfaceOperator, operators_for
+from fenwear.bodies.operators import Relocatable, SurfaceOperator, operators_for
 from fenwear.bodies.response import Request, identity
 from fenwear.case import CONDENSED
 from fenwear.case.names import told_by_name
@@ -64,7 +64,10 @@ class Condensed:
 
     def join(self, rigid: RigidEquilibrium) -> Interface:
         """Return both joined at the place of a pair; collective where ranks share the rows."""
-        return join(rigid, self.punch, self.strip, strip_moves=self.strip_moves, rows=self.rows)
+        pair, strip, moves = rigid.pair, self.strip, self.strip_moves
+        if moves and pair.punch.grid is not None and isinstance(strip, Relocatable):
+            strip, moves = strip.at(pair.placement.points_back(pair.punch.x)), False
+        return join(rigid, self.punch, strip, strip_moves=moves, rows=self.rows)
 
     def under_loads(self, bodies: Bodies) -> Condensed:
         """Return the same under the loads of these bodies; collective."""

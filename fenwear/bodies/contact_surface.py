@@ -27,6 +27,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_vector
+from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.errors import CaseError, InputError
 
@@ -57,6 +58,7 @@ class ContactSurface:
         names: Of the contacts that the surface is of; none where it is one.
         contact: Which of them each pressure node belongs to (n,); None where it is one.
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
+        grid: Of a surface that is a regular grid and no trace of a mesh; else None.
     """
 
     body: str
@@ -72,6 +74,7 @@ class ContactSurface:
     arc: Array | None = None
     names: tuple[str, ...] = ()
     contact: NDArray[np.int64] | None = None
+    grid: RegularGrid | None = None
 
     @cached_property
     def part(self) -> NDArray[np.int64]:

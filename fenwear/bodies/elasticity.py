@@ -14,12 +14,13 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array
 from ufl.algorithms.check_arities import ArityMismatch
 
 from fenwear import compat
 from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector, compiled
-from fenwear.bodies.contact_surface import contact_surface
+from fenwear.bodies.contact_surface import ContactSurface, contact_surface
 from fenwear.bodies.factor import Factor, make_together
 from fenwear.bodies.low_rank import LowRank
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
@@ -55,6 +56,8 @@ class ElasticBody:
         acting: Sum of the loads' sizes, N: of a moment, whose resultant is none, too.
         swallowed: What of it acts where supports hold that very component (d,), N: it reaches nothing else.
         operator: Name of how its contact surface answers to forces.
+        surface: The contact surface: the trace of the mesh, or a grid of its own (see `lay_grid`).
+        reading: Of a grid, what takes values at the trace nodes of the mesh to its nodes (N, N_mesh); else None.
         setup: How it is condensed.
         solver: What solves for its columns; set before the first solution, by the memory that there is.
         holders: How many ranks have its factor at once and share its columns; set likewise.
@@ -94,6 +97,7 @@ class ElasticBody:
         element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(dim,))
         self.space = fem.functionspace(mesh, element)
         self.surface, self.trace = contact_surface(body, self.space, measure(mesh, law.kind))
+        self.reading: csr_array | None = None
         self._held = held = Supports(body, self.space, description, law.kind, self.trace)
         self.pivot, self.rigid_modes, self.mode_names = held.pivot, held.modes, held.names
         self._bcs, self.supported, self.imposed = held.conditions, held.held, held.imposed
@@ -145,7 +149,28 @@ class ElasticBody:
         """Displacement of the contact surface's trace nodes by each rigid mode (N, d, modes); collective."""
         if not self.rigid_modes:
             return np.zeros((*self.surface.trace.shape, 0))
-        return self.trace.pick(np.array(self.rigid_modes).T)
+        return self.on_surface(self.trace.pick(np.array(self.rigid_modes).T))
+
+    def lay_grid(self, surface: ContactSurface, reading: csr_array) -> None:
+        """Let its contact surface be a grid of its own.
+
+        Args:
+            surface: The grid.
+            reading: What takes values at the trace nodes of the mesh to it (N, N_mesh).
+        """
+        self.surface, self.reading = surface, reading
+
+    def on_surface(self, values: Array) -> Array:
+        """Return values at the trace nodes of the mesh (N_mesh, ...) at those of the contact surface (N, ...)."""
+        if self.reading is None:
+            return values
+        return np.asarray(self.reading @ values.reshape(len(values), -1)).reshape(-1, *values.shape[1:])
+
+    def on_trace(self, forces: Array) -> Array:
+        """Return forces at the trace nodes of the contact surface (N, ...) at those of the mesh (N_mesh, ...)."""
+        if self.reading is None:
+            return forces
+        return np.asarray(self.reading.T @ forces.reshape(len(forces), -1)).reshape(-1, *forces.shape[1:])
 
     @property
     def size(self) -> int:
@@ -165,6 +190,17 @@ class ElasticBody:
         pattern = fem.create_sparsity_pattern(self._form)
         pattern.finalize()
         return int(self.dim**2 * self.body.mesh.comm.allreduce(pattern.num_nonzeros))
+
+    def free_stiffness(self) -> PETSc.Mat:
+        """Return K without any supports, per thickness, MPa, of which K with them is made; collective."""
+        free = assembled(self._form)
+        if "stiffness" not in self.__dict__ and not self.is_factored:
+            matrix = free.copy()
+            start = self.dim * self.space.dofmap.index_map.local_range[0]
+            matrix.zeroRowsColumns((self.supported + start).astype(PETSc.IntType), diag=1.0)
+            matrix.setOption(PETSc.Mat.Option.SPD, True)
+            self.__dict__["stiffness"] = matrix
+        return free
 
     @cached_property
     def stiffness(self) -> PETSc.Mat:

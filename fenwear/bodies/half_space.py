@@ -21,8 +21,8 @@ the radius. What the finite body does otherwise is smooth at the contact: anothe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.fft
@@ -108,15 +108,12 @@ class HalfSpace:
     @cached_property
     def _table(self) -> Array:
         """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
-        counts = [np.arange(1 - count, count) for count in self._shape]
-        far = np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1) * np.array(self.spacing)
-        found = influence(far.reshape(-1, self.dim - 1), self.spacing, self.shear, self.poisson, self.depth)
-        found /= np.prod(self.spacing)
-        found[:, -1] *= -self.outward  # from into the body to along its axis
-        found[:, :, -1] *= -self.outward
+        found = _influences(self._shape, self.spacing, self.shear, self.poisson, self.depth).copy()
+        found[..., -1, :] *= -self.outward  # from into the body to along its axis
+        found[..., -1] *= -self.outward
         whole = np.empty_like(found)
-        whole[:, np.array(self.axes)[:, None], np.array(self.axes)] = found
-        return np.asarray(self._directions @ whole).reshape(*far.shape[:-1], len(self._directions), self.dim)
+        whole[..., np.array(self.axes)[:, None], np.array(self.axes)] = found
+        return np.asarray(self._directions @ whole)
 
     @cached_property
     def _kernel(self) -> NDArray[np.complex128]:
@@ -126,6 +123,19 @@ class HalfSpace:
         to = np.ix_(*(np.arange(1 - count, count) % (2 * count) for count in self._shape))
         wrapped[to] = self._table
         return np.asarray(scipy.fft.rfftn(wrapped, axes=inner))
+
+    def table(self, traction: Array) -> Array:
+        """Return the displacement along the first direction by a force (d,) at all distances of two nodes."""
+        return np.asarray(self._table[..., 0, :] @ traction)
+
+    def smooth(self, traction: Array) -> None:
+        """Return what it is besides: nothing."""
+        del traction
+
+    def at(self, x: Array) -> HalfSpace:
+        """Return the same with its nodes at other places (q, d), mm: it does not know where they are."""
+        flat = x[:, list(self.axes[:-1])]
+        return replace(self, places=np.rint((flat - flat.min(axis=0)) / self.spacing).astype(np.int64))
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
@@ -161,6 +171,17 @@ class HalfSpace:
         return self
 
 
+@lru_cache(maxsize=4)
+def _influences(
+    shape: tuple[int, ...], spacing: tuple[float, ...], shear: float, poisson: float, depth: float
+) -> Array:
+    """Return displacements by unit forces on cells at all distances of two nodes of a grid (2 m - 1, ..., d, d)."""
+    counts = [np.arange(1 - count, count) for count in shape]
+    far = np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1) * np.array(spacing)
+    found = influence(far.reshape(-1, len(shape)), spacing, shear, poisson, depth) / np.prod(spacing)
+    return np.asarray(found.reshape(*far.shape[:-1], *found.shape[1:]))
+
+
 def half_space(request: Request) -> HalfSpace:
     """Return a body as a half-space, at the places of its patterns; collective.
 
@@ -186,7 +207,7 @@ def half_space(request: Request) -> HalfSpace:
     along = None if request.directions is None else request.directions
     if along is not None:
         along = along[:1] if np.abs(along - along[0]).max() <= SAME else None
-    low, high = _range(elastic, elastic.body.mesh.geometry.x[:, normal])
+    low, high = extent_along(elastic, normal)
     return HalfSpace(
         places,
         spacing,
@@ -234,6 +255,11 @@ def _constants(elastic: ElasticBody, key: str) -> tuple[float, float]:
         values[field] = high
     first, second = (float(one((0.0,) * elastic.dim, values)) for one in elastic.law.lame)
     return second, first / (2 * (first + second))
+
+
+def extent_along(elastic: ElasticBody, axis: int) -> tuple[float, float]:
+    """Return the ends of a body along an axis, mm; collective."""
+    return _range(elastic, elastic.body.mesh.geometry.x[:, axis])
 
 
 def _range(elastic: ElasticBody, values: Array) -> tuple[float, float]:

@@ -12,7 +12,7 @@ Open Source Software 5, 2020).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.condensation import condense_together
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.fine import fine
 from fenwear.bodies.half_space import half_space
 from fenwear.bodies.response import Request
 from fenwear.case import CONDENSED, Case
@@ -79,9 +80,18 @@ class SurfaceOperator(Protocol):
         """Return the same under the loads of a body that differs by them alone; collective."""
 
 
+@runtime_checkable
+class Relocatable(Protocol):
+    """An operator that answers at any places of its surface: a strip on a grid that passes under the punch."""
+
+    def at(self, x: Array) -> SurfaceOperator:
+        """Return the same with its nodes at other places of the body (q, d), mm."""
+
+
 Make = Callable[[Request], SurfaceOperator]
 OPERATORS: dict[str, Make] = {
-    "half-space": half_space
+    "fine": fine,
+    "half-space": half_space,
 }  # besides the condensed body, which all of them are made of at once
 
 
@@ -139,7 +149,7 @@ def operators_for(requests: Sequence[Request], *, keep: bool = False, fresh: boo
         CaseError: a body is none for its operator.
         ConvergenceError: a stiffness has no factor.
     """
-    wanted = [one for one in requests if one.elastic.operator == CONDENSED]
+    wanted = [one.on_mesh() for one in requests if one.elastic.operator == CONDENSED]
     condensed = iter(condense_together(wanted, keep=keep, fresh=fresh) if wanted else [])
     return [
         next(condensed) if one.elastic.operator == CONDENSED else OPERATORS[one.elastic.operator](one)

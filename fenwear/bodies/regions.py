@@ -29,5 +29,5 @@ def contact_regions(body: ElasticBody) -> Mapping[str, Array]:
     sums = np.zeros((len(order), len(mesh.regions)))
     np.add.at(sums, nodes, np.repeat(of_cell[cells], local.shape[1], axis=0))
     mesh.mesh.comm.Allreduce(MPI.IN_PLACE, sums, op=MPI.SUM)
-    shares = (sums / sums.sum(axis=1, keepdims=True))[body.surface.nodes]
+    shares = body.on_surface(sums / sums.sum(axis=1, keepdims=True))[body.surface.nodes]
     return dict(zip(mesh.regions, shares.T, strict=True))

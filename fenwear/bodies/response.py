@@ -9,7 +9,7 @@ that hold a body's factor share.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,11 @@ class Request:
         setup = self.elastic.setup
         values += [] if self.kept is None else [self.kept]
         return [setup, *self.elastic.identity(), *values, *(() if coupling is None else coupling.getValuesCSR())]
+
+    def on_mesh(self) -> Request:
+        """Return the same with patterns on the trace nodes of the mesh, where the contact surface is a grid."""
+        reading = self.elastic.reading
+        return self if reading is None else replace(self, patterns=csr_array(reading.T @ self.patterns))
 
     def forces(self, columns: NDArray[np.int64]) -> Array:
         """Return the forces on the trace nodes of some columns (N, d, k): column l a is pattern l along direction a."""

@@ -1,6 +1,6 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
-from fenwear.case.bodies import CONDENSED, Body, Geometry, Load, Model, Prescribed, Support
+from fenwear.case.bodies import CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support
 from fenwear.case.course import Output, Run
 from fenwear.case.dependence import register_law
 from fenwear.case.laws import Contact, Dependence, Stick, Wear, WearLaw
@@ -21,6 +21,7 @@ __all__ = [
     "Cycle",
     "Dependence",
     "Geometry",
+    "Grid",
     "Heat",
     "Kind",
     "Load",

@@ -62,6 +62,20 @@ class Geometry(Part):
         return data
 
 
+class Grid(Part):
+    """A regular grid of contact nodes in the tangent plane of the contact, whatever the meshes are there."""
+
+    nodes: Annotated[int, Field(ge=5, le=2049, strict=True)] = Field(
+        default=65, description="along the longer side of the grid"
+    )
+    size: Annotated[tuple[Annotated[Length, Field(gt=0)], ...], Field(min_length=1, max_length=2)] | None = Field(
+        default=None, description="its sides, [x] in the plane and [x, y] in solids; by default those of the contact"
+    )
+    middle: Annotated[tuple[Length, ...], Field(min_length=1, max_length=2)] | None = Field(
+        default=None, description="where its middle is; by default that of the contact surface"
+    )
+
+
 class Model(Part):
     """Plane bodies in (x, z) with their thickness; rings in (x, z), x the radius; or solids in (x, y, z)."""
 
@@ -278,7 +292,8 @@ class Body(Part):
     operator: str = Field(
         default=CONDENSED,
         description="how its contact surface answers to forces: condensed: as its mesh does; half-space: as one of its "
-        "material, or half-plane, without supports and other boundaries, fast for many nodes; or one made in Python",
+        "material, or half-plane, without supports and other boundaries, fast for many nodes; fine: as a half-space "
+        "and what its mesh does otherwise, on a grid finer than the mesh; or one made in Python",
     )
     profile: Profile | None = Field(
         default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"

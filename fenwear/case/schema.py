@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from fenwear.case.bodies import CONDENSED, Body, CourseLoad, Geometry, Load, Model
+from fenwear.case.bodies import CONDENSED, Body, CourseLoad, Geometry, Grid, Load, Model
 from fenwear.case.course import Output, Program, Run
 from fenwear.case.cycle_table import PLACES
 from fenwear.case.diffusion import diffusion_of
@@ -51,6 +51,7 @@ class Case(Part):
     materials: Annotated[dict[str, Material], Field(min_length=1)] = Field(description="by their names")
     punch: Body = Field(description="the body above, body 1")
     strip: Body = Field(description="the body below, which slides, body 2")
+    grid: Grid | None = Field(default=None, description="contact nodes of its own, finer than the mesh")
     contact: Contact = Field(default=Contact(), description="between the two")
     stick: Stick = Field(default=Stick(), description="of contact with stick: what the rig imposes, time steps")
     wear: Wear = Field(description="of punch, strip or both")
@@ -125,7 +126,8 @@ class Case(Part):
             "with heat: temperatures expand the bodies' meshes": self.heat is not None,
             "with contact.solver = 'full', on the bodies' meshes": self.contact.solver == "full",
         }
-        return [
+        grid = [f"grid: expected none {why}" for why, so in against.items() if so and self.grid is not None]
+        return grid + [
             f"{name}.operator: expected '{CONDENSED}' {why}" for name in others for why, so in against.items() if so
         ]
 

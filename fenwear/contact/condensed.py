@@ -24,12 +24,14 @@ from scipy.optimize import linprog
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.by_runs import SpreadPhases
+from fenwear.contact.gridded import GriddedPhases
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator, Phases, Solve
 from fenwear.contact.spread import OwnRows, SpreadBlock, SpreadCompliance
 from fenwear.contact.spread_nodes import SpreadNodes
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
+from fenwear.interface.convolution import Convolution
 from fenwear.parallel import Team
 from fenwear.remedies import (
     FULL_START,
@@ -87,6 +89,9 @@ class WearCompliance(Protocol):
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
 
+    def linear(self, pressure: Array) -> tuple[Callable[[Array], Array], Array]:
+        """Return the derivative as a product with pressures (m, n), and slopes at the nodes' own places (m, n)."""
+
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n): its derivative, of phase k to pressures j, is L_k R_j, mm/MPa."""
 
@@ -140,7 +145,9 @@ class CondensedContact:
         self._team = team or Team.of(MPI.COMM_SELF if interface.rows is None else interface.rows.comm)
         if self._shared:
             self._team.serve(self)
-        self._many = n > MANY or self._shared
+        gridded = interface.pair.punch.grid is not None and interface.cost is not None
+        self._many = n > MANY or self._shared or gridded
+        self._tables: dict[bytes, Array] = {}  # of convolutions, by their traction
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self.blocks: list[PhaseBlock] = []
         self._offset = np.zeros((m, size))
@@ -172,13 +179,13 @@ class CondensedContact:
                 self._dense[k, :n, :n] = interface.compliance(ratio, scale).matrix()
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
-        if len(self.phases) > 1 and (n >= LARGE or self._shared):
+        if len(self.phases) > 1 and (n >= LARGE or self._shared) and not self._gridded:
             self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
     def _block(self, k: int, scale: float, modes: Array, balance: Array) -> PhaseBlock:
         """Return the block of a phase of many nodes."""
         interface, alone = self.phases[k].interface, len(self.phases) == 1
-        compliance, rows = interface.compliance(self._ratios[k], scale), interface.rows
+        compliance, rows = interface.compliance(self._ratios[k], scale, self._tables), interface.rows
         diagonal = compliance.diagonal()
         if rows is None:
             known = Columns(len(modes), compliance.columns) if compliance.cost is None else compliance
@@ -234,8 +241,15 @@ class CondensedContact:
             self._elastic = self._of_nodes() if self._many and self._coupling is None else self._as_phases()
         return self._elastic
 
-    def _of_nodes(self, wear: Array | None = None, before: Operator | None = None) -> ManyNodes:
+    @property
+    def _gridded(self) -> bool:
+        """Whether all compliances are convolutions on a grid."""
+        return bool(self.blocks) and all(isinstance(block.compliance, Convolution) for block in self.blocks)
+
+    def _of_nodes(self, wear: Array | None = None, before: Operator | None = None) -> ManyNodes | GriddedPhases:
         """Return the derivative without a matrix of all nodes."""
+        if self._gridded and wear is None:
+            return GriddedPhases(self.blocks)
         known = before if isinstance(before, ManyNodes) else None
         if self._spread is None:
             return ManyNodes(self.blocks, wear, known)
@@ -252,6 +266,8 @@ class CondensedContact:
             return self._linear
         m, n = self.shape
         pressure, scale = x.reshape(m, -1)[:, :n] * self._pressure_scale, self._pressure_scale / self._gap_scale
+        if self._gridded and self._coupling is None:
+            return self._worn_on_grid(pressure, scale)
         left, slope = None, self._wearing.local(pressure)
         if slope is None:
             left, slope = self._wearing.border(pressure)
@@ -265,6 +281,16 @@ class CondensedContact:
             else:
                 self._operator = self._as_phases(local=slope * scale)
         return self._operator or self._linear
+
+    def _worn_on_grid(self, pressure: Array, scale: float) -> Operator:
+        """Return the derivative with what wears at a pressure (m, n), on a grid."""
+        assert self._wearing is not None
+        opening, slope = self._wearing.linear(pressure)
+        last, same = self._operator, self._slope is not None and np.array_equal(slope, self._slope)
+        if last is None or not same:
+            self._slope = slope
+            last = self._operator = GriddedPhases(self.blocks, lambda p: scale * opening(p), scale * slope)
+        return last
 
     def solve(
         self,

@@ -23,7 +23,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fenwear.arrays import Array
-from fenwear.contact.operators import Indices, Operator, Solve
+from fenwear.contact.operators import Approximate, Indices, Operator, Solve
 from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
@@ -174,7 +174,7 @@ class Inequality:
             free = np.frombuffer(key, dtype=bool)
             kept, bounded = (np.flatnonzero(one).astype(np.int32) for one in (free, ~free))
             rows = kept if len(bounded) else slice(None)
-            last = self._kept = _Kept(operator, key, rows, bounded, operator.factor(kept))
+            last = self._kept = _Kept(operator, key, rows, bounded, _solution(operator, kept))
         return last
 
     def solve(self, start: Array, *, near: bool = False, line_search: bool = False) -> Array:
@@ -275,6 +275,11 @@ class Inequality:
         self.iterations = snes.getIterationNumber()
         self.residual = self._function(x)
         return x
+
+
+def _solution(operator: Operator, kept: Indices) -> Solve:
+    """Return the solution operator of some rows and columns; where factors are costly to some digits."""
+    return operator.to_some_digits(kept) if isinstance(operator, Approximate) else operator.factor(kept)
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,14 @@ class Operator(Protocol):
         Raises:
             LinAlgError: they are singular.
         """
+
+
+@runtime_checkable
+class Approximate(Protocol):
+    """An operator whose solutions are costly to all digits, and cheap to some."""
+
+    def to_some_digits(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept` to some digits, for Newton's method."""
 
 
 @dataclass(frozen=True)

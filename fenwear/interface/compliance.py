@@ -21,12 +21,14 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies.condensation import product
 from fenwear.bodies.operators import SurfaceOperator
+from fenwear.interface.convolution import Convolution, convolution
 from fenwear.interface.equilibrium import RigidEquilibrium
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
 from fenwear.parallel import Rows
 
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
+SOME = 64  # nodes whose rows tell the scale of gaps where no numbers are in memory
 
 
 @dataclass(frozen=True)
@@ -187,14 +189,23 @@ class Interface:
         even = self.apply(self.pair.normal * self.pair.weights[:, None])[:, 0]
         return even if self.rows is None else self.rows.gathered(even)
 
-    def compliance(self, friction_ratio: Array | float, scale: float = 1.0) -> PressureCompliance:
+    def compliance(
+        self, friction_ratio: Array | float, scale: float = 1.0, known: dict[bytes, Array] | None = None
+    ) -> PressureCompliance | Convolution:
         """Return S, mm/MPa: the gap from unit pressures with their friction.
 
         Args:
             friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; 0.0 for none.
             scale: A factor of S.
+            known: Tables of convolutions that were made for other phases.
         """
-        return PressureCompliance(self, scale * (self.pair.normal + friction_ratio))
+        traction = self.pair.normal + friction_ratio
+        if not self.strip_moves and self.cost is not None and self.frame is None and self.rows is None:
+            tables = {} if known is None else known
+            found = convolution([self.punch, self.strip], traction, self.pair.weights, scale, tables)
+            if found is not None:
+                return found
+        return PressureCompliance(self, scale * traction)
 
     @cached_property
     def elastic_length(self) -> float:
@@ -210,7 +221,7 @@ class Interface:
         opened = opened if self.rows is None else self.rows.gathered(opened)
         rigid = opened.T * pair.weights  # what modes take up of S, which is symmetric but for the weights
         count, compliance = own.stop - own.start, self.compliance(0.0)
-        step = 1 if self.cost is None else max(count // RUN, 1)
+        step = 1 if self.cost is None else max(count // SOME, 1)
         runs = [slice(start, start + RUN * step, step) for start in range(0, count, RUN * step)]
         parts = [np.abs(compliance.columns(EVERY, run) - modes[own][run] @ rigid).sum(axis=1) for run in runs]
         lengths = np.concatenate([np.zeros(0), *parts])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
@@ -93,9 +94,15 @@ class RigidEquilibrium:
         return found if self.translations else None
 
 
+def _seen(patterns: csr_array, motion: Array) -> Array:
+    """Return what patterns (n, N) see of motions (N, d, modes), as (n, d, modes)."""
+    seen = patterns @ motion.reshape(len(motion), -1)
+    return np.asarray(seen).reshape(-1, *motion.shape[1:])
+
+
 def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:
     """Gather the rigid modes at the interface; collective."""
-    of_punch = np.einsum("Ni,Ndm->idm", pair.punch.spread.toarray(), punch.rigid_motion)
+    of_punch = _seen(pair.punch.spread.T, punch.rigid_motion)
     of_strip = (
         np.stack(
             [pair.transfer @ pair.placement.vectors(strip.rigid_motion[:, :, m]) for m in range(len(strip.mode_names))],

@@ -26,6 +26,7 @@ SLACK = 1e-6  # of the surface's size: how far the first surface may reach beyon
 CURVED, CURVED_STEPS = 1e-13, 20  # of the surface's size: rounding of a point's place; Newton steps to it
 ASTRAY, FOLDED = 1e-9, 1e3  # of the surface's size: what Newton's method may leave, and where it has no end
 BENT = 4  # degrees more where facets are bent, in which no quadrature is exact: its error falls to rounding
+ONTO = 1e-3  # of a facet: how far beyond its straight edges a point may be that its curved ones take in
 NOTHING = 1e-12  # of the smaller of two polygons: they share an edge up to rounding, no area
 RING = {"interval": [0, 1], "triangle": [0, 1, 2], "quadrilateral": [0, 1, 3, 2]}  # basix' corners in order around
 
@@ -233,6 +234,26 @@ def shared_areas(first: ChartedSurface, second: ChartedSurface) -> csr_array:
     size = np.abs(_sizes(simplices))
     shape = (len(first.nodes), len(second.nodes))
     return csr_array((size, (areas1.node[part1], areas2.node[part2])), shape=shape)
+
+
+def reading_at(surface: ChartedSurface, points: Array) -> csr_array | None:
+    """Return what takes values at the trace nodes to points of the chart (p, N); None where one is off the surface."""
+    ring, grain = surface.corners[:, RING[surface.cell]], SLACK * surface.extent
+    around = points[:, None] + grain * np.array([-1.0, 1.0])[:, None]
+    point, facet = _boxes_that_meet(around, ring)
+    found = _pull_back(surface.cell, surface.corners, facet, points[point])
+    beyond = np.maximum(found - 1, -found).max(axis=1)
+    if surface.cell == "triangle":
+        beyond = np.maximum(beyond, found.sum(axis=1) - 1)
+    order = np.lexsort((facet, beyond.round(9), point))
+    first = order[np.unique(point[order], return_index=True)[1]]
+    if len(first) < len(points) or beyond[first].max(initial=0.0) > ONTO:
+        return None
+    own = facet[first]
+    values = surface.shape_functions(_pull_back_curved(surface, own, points))
+    rows = np.broadcast_to(np.arange(len(points))[:, None], values.shape)
+    shape = (len(points), len(surface.s))
+    return csr_array((values.ravel(), (rows.ravel(), surface.facets[own].ravel())), shape=shape)
 
 
 def tabulate(cell: str, degree: int, points: Array) -> Array:

@@ -22,7 +22,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.interface.frame import common_normal, unit
 from fenwear.interface.overlap import ChartedSurface, Patch
 from fenwear.interface.patches import folds, patches
-from fenwear.interface.placement import HERE, Placement
+from fenwear.interface.placement import HERE, ZERO, Placement
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
 STEEPEST = 0.7  # cosine between the normals of the two surfaces: steeper parts never touch
@@ -111,6 +111,8 @@ def pair(
     Raises:
         CaseError: the surfaces do not face each other, or the strip's does not reach below the whole punch.
     """
+    if punch.grid is not None and strip.grid is not None:
+        return _on_grids(punch, strip, placement)
     strip_trace, strip_outward = placement.points(strip.trace), placement.vectors(strip.outward)
     if placement == HERE:
         for surface in (punch, strip):
@@ -136,6 +138,24 @@ def pair(
     return ContactPair(punch, strip, placement, normal, weights, transfer, material, wear_projection, gap)
 
 
+def _on_grids(punch: ContactSurface, strip: ContactSurface, placement: Placement) -> ContactPair:
+    """Return the pair of two grids in one plane: values go linearly between nodes, wear back by the same shares.
+
+    Raises:
+        CaseError: the strip's grid does not reach below the whole punch.
+    """
+    here, there = punch.grid, strip.grid
+    assert here is not None
+    assert there is not None
+    moved = placement.points(np.zeros((1, punch.dim)))[0, here.axes]
+    transfer = None if placement.turn != ZERO else there.reading(here, moved)
+    if transfer is None:
+        raise CaseError(InputError("grid", f"the stroke runs off the strip's grid: {placement}"))
+    back = csr_array((transfer.multiply(punch.weights[:, None])).T / strip.weights[:, None])
+    gap = _profiles(punch, strip, transfer)
+    return ContactPair(punch, strip, placement, -punch.outward, punch.weights, transfer, transfer, back, gap)
+
+
 def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     """Return a pair whose strip stays in place while its material moves: only worn depths change place.
 
@@ -144,6 +164,9 @@ def pass_material(middle: ContactPair, placement: Placement) -> ContactPair:
     """
     if placement == middle.material_place:
         return middle
+    if middle.punch.grid is not None:
+        there = _on_grids(middle.punch, middle.strip, placement)
+        return replace(there, transfer=middle.transfer)
     parts = patches(middle.punch, middle.strip, placement)
     _check_covered(parts, placement)
     material = _material(parts, dual_transfer(parts))
@@ -170,6 +193,8 @@ def transfer_at(middle: ContactPair, placement: Placement) -> csr_array:
     """
     if placement == middle.placement:
         return middle.transfer
+    if middle.punch.grid is not None:
+        return _on_grids(middle.punch, middle.strip, placement).transfer
     parts = patches(middle.punch, middle.strip, placement)
     _check_covered(parts, placement)
     return dual_transfer(parts)

@@ -86,6 +86,13 @@ def folds(surface: ContactSurface) -> bool:
     return not (_is_graph(normal) or back_to_back or _middle(surface, normal) is not None)
 
 
+def facet_side(surface: ContactSurface) -> tuple[int, float]:
+    """Return the axis that a surface looks along, and which way; of one that looks several ways along its mean."""
+    mean = facet_normals(surface).sum(axis=0)
+    axis = int(np.abs(mean).argmax())
+    return axis, float(np.sign(mean[axis]))
+
+
 def _is_graph(normal: Array) -> bool:
     """Return whether facets with these normals (f, d) all look along one axis."""
     return len(_sides(normal)) == 1

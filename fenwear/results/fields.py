@@ -137,6 +137,7 @@ def _solve(
 ) -> BodyFields:
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
     force, dim = elastic.load.copy(), elastic.dim
+    load = elastic.on_trace(load)
     force += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
     force[elastic.supported] = 0.0
     theta = change = None

@@ -1,0 +1,124 @@
+"""Contact grids of their own: the same regular grid on both bodies, along the stroke longer on the strip.
+
+Both stand in the tangent plane where the surfaces are closest; how deep each surface lies below it is read from the
+mesh, whose elements of order 2 follow a curved surface to the fourth power of their size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.assembly.strokes import Sliding
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.grid import RegularGrid
+from fenwear.case import Case, Grid
+from fenwear.errors import CaseError, InputError
+from fenwear.interface.overlap import ChartedSurface, reading_at
+from fenwear.interface.patches import facet_side
+
+MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
+
+
+def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody) -> None:
+    """Let the contact surfaces of both bodies be grids, where the case has one.
+
+    Raises:
+        CaseError: the surfaces look along no common axis, or a grid reaches beyond the surface.
+    """
+    if case.grid is None:
+        return
+    if punch.law.kind == "axisymmetric":
+        raise CaseError(InputError("grid", "expected none in rings: their contact nodes are those of the mesh"))
+    surfaces = punch.surface, strip.surface
+    (axis, side), (other, opposite) = (facet_side(surface) for surface in surfaces)
+    if axis != other or side == opposite:
+        raise CaseError(InputError("grid", "expected contact surfaces that look at each other along one axis"))
+    level = float(opposite * (surfaces[1].trace[:, axis] * opposite).max())
+    own = _grid(case.grid, punch.surface, axis, level)
+    for body, grid, outward in (
+        (punch, own, side),
+        (strip, _reached(own, sliding), opposite),
+    ):
+        reading = _reading(body, grid)
+        depth = outward * (level - reading @ body.surface.trace[:, axis])
+        if body.surface.profile is not None:
+            depth = depth + reading @ (body.surface.extension @ body.surface.profile)
+        surface = surface_on(body.body.name, grid, outward, depth)
+        body.lay_grid(surface, reading)
+
+
+def surface_on(name: str, grid: RegularGrid, outward: float, depth: Array) -> ContactSurface:
+    """Return the contact surface of a body on a grid.
+
+    Args:
+        name: Of the body.
+        grid: Its nodes.
+        outward: 1.0 where the normal out of the body points along its axis, else -1.0.
+        depth: How deep the body's surface lies below the grid (n,), mm.
+    """
+    x, every = grid.points, np.arange(len(grid.points))
+    normals = np.zeros_like(x)
+    normals[:, grid.normal] = outward
+    spread = csr_array((np.ones(len(x)), (every, every)), shape=(len(x), len(x)))
+    cell = "interval" if x.shape[1] == 2 else "quadrilateral"
+    surface = ContactSurface(name, x, grid.facets, cell, 1, every, grid.weights, normals, spread)
+    return replace(surface, profile=depth, grid=grid)
+
+
+def _grid(wanted: Grid, surface: ContactSurface, axis: int, level: float) -> RegularGrid:
+    """Return the punch's grid.
+
+    Raises:
+        CaseError: sides or middle have another number of components than the surface.
+    """
+    x = np.delete(surface.trace, axis, axis=1)
+    low, high = x.min(axis=0), x.max(axis=0)
+    for key, value in (("size", wanted.size), ("middle", wanted.middle)):
+        if value is not None and len(value) != len(low):
+            raise CaseError(InputError(f"grid.{key}", f"expected {len(low)} length(s), got {len(value)}"))
+    sides = high - low if wanted.size is None else np.array(wanted.size)
+    middle = (low + high) / 2 if wanted.middle is None else np.array(wanted.middle)
+    spacing = sides.max() / (wanted.nodes - 1)
+    counts = np.maximum(np.floor(sides / spacing + MARGIN * wanted.nodes), 1).astype(np.int64) + 1
+    steps = sides / (counts - 1)
+    corner = middle - steps * (counts - 1) / 2
+    return RegularGrid(tuple(corner), tuple(steps), tuple(int(k) for k in counts), axis, level)
+
+
+def _reached(grid: RegularGrid, sliding: Sliding) -> RegularGrid:
+    """Return the same grid, as much longer as the punch reaches on the strip during the motion."""
+    along, corners = grid.axes, grid.points[:: max(len(grid.points) - 1, 1)]
+    steps = np.array(grid.spacing)
+    before = after = np.zeros(len(steps))
+    for offset in {phase.offset for phase in sliding.motion.phases}:
+        moved = (sliding.field.placement(offset).points_back(corners) - corners)[:, along]
+        before, after = np.maximum(before, -moved.min(axis=0)), np.maximum(after, moved.max(axis=0))
+    more = np.array([np.ceil(one / steps - 1e-6).astype(np.int64) for one in (before, after)])
+    corner = np.array(grid.corner) - more[0] * steps
+    return replace(grid, corner=tuple(corner), counts=tuple(int(k) for k in grid.counts + more.sum(axis=0)))
+
+
+def _reading(body: ElasticBody, grid: RegularGrid) -> csr_array:
+    """Return what takes values at the trace nodes of a body's mesh to its grid (n, N).
+
+    Raises:
+        CaseError: the grid reaches beyond the surface.
+    """
+    surface = body.surface
+    s = np.delete(surface.trace, grid.normal, axis=1)
+    charted = ChartedSurface(s, surface.facets, surface.cell, surface.degree, surface.nodes)
+    found = reading_at(charted, grid.flat)
+    if found is None:
+        spans: Sequence[str] = [
+            " by ".join(f"{low:.4g} to {high:.4g}" for low, high in zip(one.min(axis=0), one.max(axis=0), strict=True))
+            for one in (grid.flat, s)
+        ]
+        text = f"spans {spans[0]} mm on the {body.body.name}, whose contact surface spans {spans[1]} only"
+        raise CaseError(InputError("grid.size", f"{text}: expected a grid within it"))
+    return found

@@ -1,0 +1,259 @@
+"""A finite body whose contact is finer than its mesh: a half-space, and a correction that its mesh is solved for.
+
+    G(x, y) = G_half(x, y) + sum of L_i(x) C_ij L_j(y)
+
+The first is singular, exact, and the same everywhere: products go by fast Fourier transforms over the contact grid, of
+any number of nodes. The second is what the body does otherwise (supports, sides, bottom, layers below, free rigid
+motions): smooth while the contact is away from other boundaries, so that a few tens of points and a mesh that is coarse
+at the contact give it (`correction`). Where it is not, the coefficients of its polynomials do not fall, and it is
+refused. Nothing of the set-up depends on the number of contact nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array, Nodes
+from fenwear.bodies.contact_surface import contact_tag
+from fenwear.bodies.correction import Correction, Ground, below, cell_constants, coefficients, correct, interpolation
+from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.half_space import HalfSpace, extent_along
+from fenwear.bodies.material import Isotropic
+from fenwear.bodies.response import Request
+from fenwear.errors import CaseError, InputError
+from fenwear.parallel import total
+
+FEWEST, MOST = 5, 17  # points along an axis
+PER_DEPTH = 2.5  # further points for each distance of the next boundary that the grid is long
+RESOLVED, TRUSTED = 1e-3, 1e-2  # of the half-space's mean over the grid: what polynomials should, and may leave out
+FALLS = 0.7  # of what polynomials leave out: by how much two more points along an axis have to lessen it
+UNEVEN = 0.05  # of the correction: what may not be symmetric of it, by coarse elements or a strongly curved surface
+OF_SQUARE, OF_LINE = 2.97, 1.5  # mean of s / r, and of ln(s / r), over two points of a square or line of side s
+SAME = 1e-9  # of a material's constants: one material
+
+
+@dataclass(frozen=True)
+class FineBody:
+    """A half-space and what a finite body does otherwise.
+
+    Attributes:
+        half: The half-space, on the nodes of the grid.
+        grid: Where the correction is known.
+        correction: Between its points.
+        weights: Values at the points to the nodes (q, m).
+        unresolved: What the correction's polynomials leave out, over the half-space's mean compliance over the grid.
+        loaded: Displacement of each point by the loads (m, d), mm.
+    """
+
+    half: HalfSpace
+    grid: RegularGrid
+    correction: Correction
+    weights: Array
+    unresolved: float
+    loaded: Array
+    by_temperature: Array | None = None
+    kept: NDArray[np.int64] | None = None
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors (q, d, a)."""
+        return self.half.directions
+
+    @property
+    def by_load(self) -> Array:
+        """Displacement by the loads (q, d), mm."""
+        return np.asarray(self.weights @ self.loaded)
+
+    @cached_property
+    def cost(self) -> float:
+        """Of a product."""
+        return self.half.cost + 2 * self.weights.size * self.half.dim
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Whole numbers of each node along the axes of the grid (q, d - 1)."""
+        return self.half.places
+
+    def table(self, traction: Array) -> Array:
+        """Return the half-space's displacement along the first direction by a force (d,) at all distances."""
+        return self.half.table(traction)
+
+    def smooth(self, traction: Array) -> tuple[Array, Array]:
+        """Return values at points to the nodes (q, m), and what forces along a traction (d,) at points do (m, m)."""
+        return self.weights, self.correction.response[:, 0] @ traction
+
+    def at(self, x: Array) -> FineBody:
+        """Return the same with its nodes at other places of the body (q, d), mm."""
+        weights = at_nodes(self.correction, self.grid, x[:, self.grid.axes])
+        return replace(self, half=self.half.at(x), weights=weights)
+
+    def apply(self, forces: Array) -> Array:
+        """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
+        q, d, *rest = forces.shape
+        at_points = (self.weights.T @ forces.reshape(q, -1)).reshape(-1, d, *rest)
+        moved = np.tensordot(self.correction.response, at_points, ((2, 3), (0, 1)))
+        smooth = (self.weights @ moved.reshape(len(moved), -1)).reshape(q, *moved.shape[1:])
+        return self.half.apply(forces) + smooth
+
+    def entries(self, rows: Nodes, columns: Nodes) -> Array:
+        """Return the displacements at nodes from unit forces at others (rows, a, columns, d)."""
+        smooth = np.tensordot(self.weights[rows], self.correction.response, 1)
+        besides = np.tensordot(smooth, self.weights[columns], (2, 1))
+        return self.half.entries(rows, columns) + np.moveaxis(besides, 3, 2)
+
+    def diagonal(self) -> Array:
+        """Return the displacements at each node from unit forces at itself (q, a, d)."""
+        smooth = np.tensordot(self.weights, self.correction.response, 1)
+        return self.half.diagonal() + np.einsum("qamd,qm->qad", smooth, self.weights)
+
+    def under(self, elastic: ElasticBody) -> FineBody:
+        """Return the same under the loads of a body that differs by them alone; collective."""
+        return replace(self, loaded=by_loads(elastic, self.correction, self.half.directions[0]))
+
+
+def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Array:
+    """Return what the loads of a body do to the points of its correction (m, d) by directions (d, a); collective."""
+    own = np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64)
+    return np.asarray(total(elastic.body.mesh.comm, own) @ along.T)
+
+
+def at_nodes(correction: Correction, grid: RegularGrid, x: Array) -> Array:
+    """Return what takes values at the points of a correction to nodes x (q, d - 1): (q, m)."""
+    weights: Array = np.ones((len(x), 1))
+    for k, count in enumerate(correction.counts):
+        places, which = np.unique(x[:, k], return_inverse=True)
+        one = interpolation(count, grid.corner[k], grid.corner[k] + grid.sides[k], places)
+        weights = (weights[:, :, None] * one[which][:, None]).reshape(len(x), -1)
+    return weights
+
+
+def fine(request: Request) -> FineBody:
+    """Return a body on a contact grid, as a half-space and a correction; collective.
+
+    Raises:
+        CaseError: there is no grid, it is of rings or not isotropic, several materials touch, or the correction is not
+            smooth: it says by which number.
+        ConvergenceError: its stiffness has no factor.
+    """
+    elastic, key = request.elastic, f"{request.elastic.body.name}.operator"
+    grid = elastic.surface.grid
+    if grid is None:
+        raise CaseError(InputError("grid", f"missing, but required with {key} = 'fine': the nodes of the contact"))
+    if elastic.law.kind == "axisymmetric":
+        raise CaseError(InputError(key, "expected 'condensed' for rings: 'fine' is of plane models and solids"))
+    ground = _ground(elastic, key)
+    x = (request.patterns.T @ elastic.surface.trace) / np.asarray(request.patterns.sum(axis=0)).reshape(-1, 1)
+    x = x[:, grid.axes]
+    along = None if request.directions is None else request.directions
+    if along is not None:
+        along = along[:1] if np.abs(along - along[0]).max() <= SAME else None
+    half = HalfSpace(
+        np.rint((x - grid.corner) / grid.spacing).astype(np.int64),
+        grid.spacing,
+        ground.shear,
+        ground.poisson,
+        axes=(*grid.axes, grid.normal),
+        outward=ground.outward,
+        depth=ground.depth,
+        along=along,
+    )
+    correction, unresolved = _resolved(elastic, ground, half.directions[0].T, key)
+    weights = at_nodes(correction, grid, x)
+    loaded = by_loads(elastic, correction, half.directions[0])
+    elastic.free_factor()
+    return FineBody(half, grid, correction, weights, unresolved, loaded)
+
+
+def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> tuple[Correction, float]:
+    """Return a correction whose polynomials resolve it, and by how much they may not; collective.
+
+    Raises:
+        CaseError: none does.
+    """
+    low, high = extent_along(elastic, ground.grid.normal)
+    wanted = FEWEST + PER_DEPTH * np.maximum(ground.grid.sides / (high - low) - 1, 0)
+    counts = [min(int(np.ceil(count)), MOST) for count in wanted]
+    before: Array = np.full(len(counts), np.inf)
+    while True:
+        correction = correct(elastic, ground, tuple(counts), along)
+        rests = rest_of(correction, ground)
+        more = (rests > RESOLVED) & (np.array(counts) < MOST) & (rests < FALLS * before)
+        if not more.any():
+            break
+        counts = [min(count + 2 * int(one), MOST) for count, one in zip(counts, more, strict=True)]
+        before = np.where(more, rests, before)
+    if not rests.max() <= TRUSTED:
+        message = (
+            f"what the {elastic.body.name} does otherwise than a half-space is not smooth at the contact: polynomials "
+            f"through {' x '.join(map(str, counts))} points leave {100 * rests.max():.2g} % of the compliance, where "
+            f"'fine' expects at most {100 * TRUSTED:.2g} %; make grid.size smaller, so that the contact keeps away "
+            "from edges, or take 'condensed'"
+        )
+        raise CaseError(InputError(key, message))
+    if correction.uneven > UNEVEN:
+        message = (
+            f"what the {elastic.body.name} does otherwise than a half-space differs by {100 * correction.uneven:.2g} % "
+            f"from Betti's theorem, where 'fine' expects at most {100 * UNEVEN:g} %: take smaller elements, or a "
+            "contact that is small against the radius of the surface, or 'condensed'"
+        )
+        raise CaseError(InputError(key, message))
+    return correction, float(rests.max())
+
+
+def rest_of(correction: Correction, ground: Ground) -> Array:
+    """Return what polynomials of the correction leave out along each axis of the grid (d - 1,).
+
+    Over the mean of the half-space's compliance over the grid. From the last two orders and the two before them, as
+    the coefficients of a smooth function fall by the same factor from order to order.
+    """
+    d, sides = len(correction.counts) + 1, ground.grid.sides
+    to_orders: Array = np.ones((1, 1))
+    numbers: NDArray[np.int64] = np.zeros((1, 0), dtype=np.int64)
+    for count in correction.counts:
+        to_orders = np.asarray(np.kron(to_orders, coefficients(count)), dtype=np.float64)
+        own = np.tile(np.arange(count), len(numbers))
+        numbers = np.column_stack([np.repeat(numbers, count, axis=0), own])
+    orders = np.einsum("pi,iajd->pajd", to_orders, correction.response)
+    ease = (1 - ground.poisson) / (2 * np.pi * ground.shear)  # 1 / (pi E*) of one body
+    mean = ease * OF_SQUARE / np.sqrt(np.prod(sides)) if d == 3 else 2 * ease * OF_LINE
+    found = []
+    for axis, count in enumerate(correction.counts):
+        pairs = [(count - 2, count), (count - 4, count - 2)]
+        sizes = [
+            float(np.sqrt((orders[(numbers[:, axis] >= low) & (numbers[:, axis] < high)] ** 2).sum(axis=0)).max())
+            for low, high in pairs
+        ]
+        found.append(sizes[0] * min(sizes[0] / max(sizes[1], 1e-300), 1.0) / mean)
+    return np.array(found)
+
+
+def _ground(elastic: ElasticBody, key: str) -> Ground:
+    """Return the half-space that a body is at its contact; collective.
+
+    Raises:
+        CaseError: several materials touch, or the body is not isotropic.
+    """
+    grid, comm = elastic.surface.grid, elastic.body.mesh.comm
+    assert grid is not None
+    if not isinstance(elastic.law, Isotropic):
+        raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: 'fine' is isotropic"))
+    mesh = elastic.body.mesh
+    facets = below(elastic, grid, elastic.body.facet_tags.find(contact_tag(elastic.body)))
+    constants = cell_constants(elastic)
+    to_cell = mesh.topology.connectivity(elastic.dim - 1, elastic.dim)
+    touching = np.array([to_cell.links(facet)[0] for facet in facets], dtype=np.int64)
+    found = np.concatenate(comm.allgather(constants[touching]))
+    if not len(found):
+        raise CaseError(InputError("grid", f"lies off {elastic.body.name}_contact"))
+    if (np.ptp(found, axis=0) > SAME * found.max()).any():
+        message = "the contact grid lies over several materials, where it expects one: take 'condensed', or a smaller"
+        raise CaseError(InputError(key, f"{message} grid.size"))
+    first, second = found[0]
+    low, high = extent_along(elastic, grid.normal)
+    outward = float(np.sign(elastic.surface.outward[0, grid.normal]))
+    return Ground(grid, outward, float(second), float(first / (2 * (first + second))), high - low)

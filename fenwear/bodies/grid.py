@@ -1,0 +1,108 @@
+"""A contact surface of its own: a regular grid in the tangent plane, whatever the mesh below it is.
+
+Nodes of it stand in the plane in which the bodies touch first; how deep the body's surface lies below each is the
+profile that opens the gap. Forces on it act along the plane's normal and in the plane, as in the theory of Hertz: what
+the slope of a curved surface changes is of the order of the square of contact width over radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, identity, kron
+
+from fenwear.arrays import Array
+
+SNAP = 1e-9  # of a spacing: rounding of a place
+
+
+@dataclass(frozen=True)
+class RegularGrid:
+    """Nodes at even distances in a plane across an axis, in the plane along a line.
+
+    Attributes:
+        corner: Least coordinates along the axes of the grid (d - 1,), mm.
+        spacing: mm (d - 1,).
+        counts: Nodes along these axes (d - 1,).
+        normal: The model's axis across the grid.
+        level: Where it stands along that, mm.
+    """
+
+    corner: tuple[float, ...]
+    spacing: tuple[float, ...]
+    counts: tuple[int, ...]
+    normal: int
+    level: float
+
+    @property
+    def axes(self) -> list[int]:
+        """The model's axes along the grid."""
+        return [axis for axis in range(len(self.counts) + 1) if axis != self.normal]
+
+    @property
+    def sides(self) -> Array:
+        """Its extents (d - 1,), mm."""
+        return np.array(self.spacing) * (np.array(self.counts) - 1)
+
+    @property
+    def middle(self) -> Array:
+        """Its middle (d - 1,), mm."""
+        return np.array(self.corner) + self.sides / 2
+
+    @cached_property
+    def flat(self) -> Array:
+        """Coordinates of the nodes along the grid (n, d - 1), mm, the first axis the slowest."""
+        along = [low + step * np.arange(k) for low, step, k in zip(self.corner, self.spacing, self.counts, strict=True)]
+        return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, len(along))
+
+    @cached_property
+    def points(self) -> Array:
+        """Coordinates of the nodes (n, d), mm."""
+        return np.insert(self.flat, self.normal, self.level, axis=1)
+
+    @cached_property
+    def weights(self) -> Array:
+        """What of the plane belongs to each node (n,), mm or mm²: half as much on the rim."""
+        whole = np.ones(1)
+        for step, count in zip(self.spacing, self.counts, strict=True):
+            own = np.full(count, step)
+            own[[0, -1]] /= 2
+            whole = np.multiply.outer(whole, own).ravel()
+        return whole
+
+    @property
+    def facets(self) -> NDArray[np.int64]:
+        """Nodes of each interval or square, in the order of basix (f, 2 or 4)."""
+        number = np.arange(int(np.prod(self.counts))).reshape(self.counts)
+        if number.ndim == 1:
+            return np.stack([number[:-1], number[1:]], axis=1)
+        corners = (number[:-1, :-1], number[1:, :-1], number[:-1, 1:], number[1:, 1:])
+        return np.stack(corners, axis=-1).reshape(-1, 4)
+
+    def reading(self, to: RegularGrid, shift: Array) -> csr_array | None:
+        """Return what takes values here to the nodes of another grid (n_to, n), linear between nodes.
+
+        Args:
+            to: Another grid, whose axes are the same.
+            shift: By how much this one is moved (d - 1,), mm.
+
+        Returns:
+            None where the other one reaches beyond this one.
+        """
+        whole = identity(1, format="csr")
+        for k, step in enumerate(self.spacing):
+            at = (to.corner[k] - self.corner[k] - shift[k] + to.spacing[k] * np.arange(to.counts[k])) / step
+            near = np.rint(at)
+            at = np.where(np.abs(at - near) < SNAP * self.counts[k], near, at)
+            if at.min() < 0 or at.max() > self.counts[k] - 1:
+                return None
+            low = np.minimum(np.floor(at).astype(np.int64), max(self.counts[k] - 2, 0))
+            share, rows = at - low, np.arange(to.counts[k])
+            entries = (np.concatenate([1 - share, share]), (np.tile(rows, 2), np.concatenate([low, low + 1])))
+            one = csr_array(entries, shape=(to.counts[k], self.counts[k]))
+            one.eliminate_zeros()
+            whole = kron(whole, one, format="csr")
+        return csr_array(whole)

@@ -1,0 +1,294 @@
+"""Bodies whose contact is finer than their mesh: against exact kernels, Hertz, and the condensed body."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import ufl
+from scipy.integrate import quad
+from scipy.interpolate import CubicSpline
+from scipy.special import j0
+from ufl.algorithms import extract_coefficients
+
+from fenwear import Case, CaseError, assemble, load_case, march
+from fenwear.arrays import Array
+from fenwear.assembly import build_bodies, elastic, make_sliding, place
+from fenwear.bodies import operators
+from fenwear.bodies.correction import Ground
+from fenwear.bodies.fine import FineBody, fine
+from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.half_space import HalfSpace, influence
+from fenwear.bodies.half_space import half_space as as_half_space
+from fenwear.bodies.material import Isotropic
+from fenwear.bodies.operators import OPERATORS
+from fenwear.bodies.response import Request, identity
+
+NU = 0.3
+BALL = (
+    "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",
+    "contact.friction=0", "wear.punch.coefficient=0", "wear.strip.coefficient=0", "motion.positions=2",
+    "punch.operator='fine'", "strip.operator='fine'", "grid.size=['0.36 mm', '0.36 mm']",
+)  # fmt: skip
+
+
+def layer(across: int, layers: int, **more: Any) -> Case:
+    """Return a layer of thickness 1, bonded to a rigid base, 8 x 8 wide, E = 1; above it a stiff block."""
+    sizes = {"width": 4, "depth": 4, "margin_x": 2, "margin_y": 2, "punch_height": 1, "strip_height": 1}
+    counts = {"across_x": across // 2, "across_y": across // 2, "margin_elements": across // 4}
+    data: dict[str, Any] = {
+        "geometry": {
+            "file": "solid_blocks.geo",
+            "degree": 2,
+            "parameters": {**sizes, **counts, "punch_layers": 1, "strip_layers": layers},
+        },
+        "model": {"kind": "solid"},
+        "materials": {"layer": {"young": 1.0, "poisson": NU}, "hard": {"young": 1e8, "poisson": NU}},
+        "punch": {
+            "regions": {"punch_body": "hard"},
+            "supports": [{"on": "punch_far", "fix": ["x", "y"]}],
+            "no_turning_about": ["x", "y", "z"],
+            "loads": [{"on": "punch_far", "force": [0, 0, -1]}],
+            "operator": "half-space",
+        },
+        "strip": {
+            "regions": {"strip_body": "layer"},
+            "supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}],
+            "operator": "fine",
+        },
+        "grid": {"nodes": 33, "size": [1.8, 1.8]},
+        "contact": {"friction": 0.0},
+        "wear": {"punch": {"coefficient": 0.0}},
+        "motion": {"kind": "reciprocating", "amplitude": 0.1, "period": 1.0},
+        "run": {"half_cycles": 2},
+    }
+    return Case.model_validate({**data, **more})
+
+
+@cache
+def otherwise(r: float) -> float:
+    """Return what a unit force moves the layer by at a distance, beyond a half-space: row 55, Hankel's integral."""
+    k = 3 - 4 * NU
+
+    def rest(s: float) -> float:
+        kernel = (2 * k * np.sinh(2 * s) - 4 * s) / (2 * k * np.cosh(2 * s) + 1 + k * k + 4 * s * s)
+        return float((kernel - 1) * 2 * (1 - NU**2) * j0(s * r) / (2 * np.pi))
+
+    return float(quad(rest, 0, 40, limit=400)[0])
+
+
+def as_fine(case: Case, *, upright: bool = True) -> tuple[FineBody, Array]:
+    """Return the strip of a case and its nodes."""
+    body = build_bodies(case).strip
+    x = body.surface.x
+    up = np.broadcast_to(np.eye(x.shape[1])[-1], x.shape) if upright else None
+    return fine(Request(body, identity(len(x)), up)), x
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_fields_of_the_half_space(dim: int) -> None:
+    """Equilibrium inside, no traction on the surface, and there the displacements that products are made of."""
+    shear, nu = 8e4, 0.3
+    grid = RegularGrid((0.0,) * (dim - 1), (1.0,) * (dim - 1), (2,) * (dim - 1), dim - 1, 0.0)
+    ground = Ground(grid, 1.0, shear, nu, 5.0)
+
+    def u(x: Array, force: Array) -> Array:
+        return np.array(ground.field(x, [0.0] * (dim - 1), force))
+
+    h, eye = 1e-3, np.eye(dim)
+    inner, edge = np.array([0.7, 0.4, -0.5][3 - dim :]), np.array([0.3, 0.8, 0.0][3 - dim :])
+    for force in eye:
+        second = np.array(
+            [
+                [
+                    (
+                        u(inner + h * (a + b), force)
+                        - u(inner + h * (a - b), force)
+                        - u(inner - h * (a - b), force)
+                        + u(inner - h * (a + b), force)
+                    )
+                    / (4 * h * h)
+                    for b in eye
+                ]
+                for a in eye
+            ]
+        )  # fmt: skip  (a, b, component)
+        grad_div = np.einsum("abb->a", second)
+        navier = np.einsum("aac->c", second) + grad_div / (1 - 2 * nu)
+        assert np.abs(navier).max() < 1e-4 * np.abs(second).max()
+        below = edge - 2 * h * eye[-1]
+        slopes = np.array([(u(below + h * a, force) - u(below - h * a, force)) / (2 * h) for a in eye])
+        strain = (slopes + slopes.T) / 2
+        traction = 2 * (strain[-1] + nu / (1 - 2 * nu) * np.trace(strain) * eye[-1])
+        assert np.abs(traction).max() < 0.02 * np.abs(strain).max()
+        side = 1e-3
+        sides = (side,) * (dim - 1)
+        exact = influence(edge[None, :-1], sides, shear, nu, 5.0)[0] / side ** (dim - 1)
+        turned = np.array([*[1.0] * (dim - 1), -1.0])  # into the body is against z
+        np.testing.assert_allclose(u(edge, force), turned * (exact @ (turned * force)), rtol=1e-4, atol=1e-12)
+
+
+@pytest.mark.mpi
+def test_layer_on_a_rigid_base() -> None:
+    """Row 55: the displacement of every node from forces in the middle and at a corner, falling with the mesh."""
+    errors = []
+    for across, layers in ((8, 2), (12, 3)):
+        body, x = as_fine(layer(across, layers))
+        at = [int(np.argmin(((x[:, :2] - place) ** 2).sum(axis=1))) for place in ((0, 0), (0.45, 0.9))]
+        smooth = body.weights @ (body.correction.response[:, 0, :, 2] @ body.weights[at].T)
+        seen = np.arange(0, len(x), 7)
+        r = np.linalg.norm(x[seen, None, :2] - x[at][:, :2], axis=2)
+        exact = np.vectorize(otherwise)(r.round(12))
+        errors.append(np.abs(smooth[seen] - exact).max() / abs(otherwise(0.0)))
+        assert body.correction.uneven < 0.01
+        assert body.unresolved < 1e-3
+    assert errors[0] < 0.02
+    assert errors[1] < 0.003
+
+
+def test_products_are_of_the_entries() -> None:
+    """Products, numbers and the diagonal are of one operator, which is symmetric, along all axes and along one."""
+    case = layer(8, 2, grid={"nodes": 7, "size": [1.0, 0.8]})
+    whole, x = as_fine(case, upright=False)
+    upright, _ = as_fine(case)
+    forces = np.random.default_rng(1).standard_normal((len(x), 3, 2))
+    for body in (whole, upright):
+        every = body.entries(slice(None), slice(None))
+        found = np.einsum("iajd,jdk->iak", every, forces)
+        np.testing.assert_allclose(body.apply(forces), found, rtol=0, atol=1e-11 * np.abs(found).max())
+        here = every[np.arange(len(x)), :, np.arange(len(x))]
+        np.testing.assert_allclose(body.diagonal(), here, rtol=0, atol=1e-13 * np.abs(every).max())
+    full = whole.entries(slice(None), slice(None))
+    np.testing.assert_allclose(every[..., 2], full[:, -1:, :, 2], rtol=0, atol=1e-12 * np.abs(full).max())
+    mesh = whole.correction.uneven * np.abs(whole.correction.response).max()  # along one axis it is not made symmetric
+    np.testing.assert_allclose(every, full[:, -1:], rtol=0, atol=2 * mesh)
+    np.testing.assert_allclose(full, full.transpose(2, 3, 0, 1), rtol=0, atol=1e-12 * np.abs(full).max())
+
+
+@pytest.mark.slow
+def test_as_the_condensed_body() -> None:
+    """Normal and tangential: a smooth load moves both alike, also where another material lies below."""
+    case = layer(8, 4, grid={"nodes": 21, "size": [3.0, 3.0]})
+    case = case.model_copy(update={"geometry": case.geometry.model_copy(update={"degree": 3})})
+    case.geometry.parameters["strip_height"] = 4.0
+    body = build_bodies(case).strip
+    assert isinstance(body.law, Isotropic)
+    cells = body.body.mesh.topology.index_map(3).size_local
+    middle = body.body.mesh.geometry.x[body.body.mesh.geometry.dofmap].mean(axis=1)[:cells]
+    for field in extract_coefficients(body.law.lame[1]):
+        if field.x.array[0] == 1.0:
+            field.x.array[field.function_space.dofmap.list[:cells, 0][middle[:, 2] < -2]] = 3.0
+    x = body.surface.x
+    nodes = Request(body, identity(len(x)))
+    found = fine(nodes)
+    bump = np.maximum(1 - (x[:, 0] ** 2 + x[:, 1] ** 2) / 1.5**2, 0) ** 2 * body.surface.weights
+    forces = bump[:, None, None] * np.eye(3)
+    at = ufl.SpatialCoordinate(body.body.mesh)
+    dome = ufl.max_value(1 - (at[0] ** 2 + at[1] ** 2) / 1.5**2, 0) ** 2
+    tag = body.body.curves["strip_contact"]
+    on_mesh = np.stack([body.surface_integral(dome * ufl.as_vector(e), tag) for e in np.eye(3)], axis=1)
+    on_mesh[body.supported] = 0.0
+    theirs = body.on_surface(body.trace.pick(body.solve(on_mesh)))
+    error = np.abs(found.apply(forces) - theirs).max(axis=(0, 1)) / np.abs(theirs).max(axis=(0, 1))
+    assert error.max() < 0.005, error
+
+
+@pytest.mark.mpi
+def test_ball_on_flat_is_the_contact_of_hertz() -> None:
+    """Row 19's like: pressures node by node, falling with the spacing, on meshes with four elements at the contact."""
+    errors = []
+    for nodes in (33, 65):
+        system = assemble(load_case("ball-on-flat", [*BALL, f"grid.nodes={nodes}"]))
+        pressure = next(iter(march(system, 1))).pressure[-1]
+        modulus, radius = 210e3 / (2 * (1 - NU**2)), 5.0
+        a = (3 * 20 * radius / (4 * modulus)) ** (1 / 3)
+        r = np.hypot(*system.pair.punch.x[:, :2].T)
+        exact = np.sqrt(np.maximum(1 - (r / a) ** 2, 0))
+        found = pressure / (1.5 * 20 / (np.pi * a**2))
+        errors.append(np.abs(found - exact)[r < 0.8 * a].max())
+        assert pressure @ system.pair.weights == pytest.approx(20, rel=1e-9)
+    assert errors[1] < 0.5 * errors[0]
+    assert errors[1] < 0.003
+
+
+class ExactLayer(HalfSpace):
+    """The layer by its kernel, of normal forces alone."""
+
+    def table(self, traction: Array) -> Array:
+        """Return displacements at all distances."""
+        counts = [np.arange(1 - count, count) for count in self._shape]
+        far = np.hypot(*np.meshgrid(*(c * h for c, h in zip(counts, self.spacing, strict=True)), indexing="ij"))
+        at = np.linspace(0, 2.6, 400)
+        more = CubicSpline(at, [otherwise(r) for r in at])(far)
+        return super().table(traction) + more * traction[2]
+
+
+@pytest.fixture
+def exact_layer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the exact layer known by a name."""
+
+    def make(request: Request) -> HalfSpace:
+        half = as_half_space(request)
+        return ExactLayer(**{field.name: getattr(half, field.name) for field in fields(half)})
+
+    monkeypatch.setattr(operators, "OPERATORS", {**OPERATORS, "exact-layer": make})
+
+
+@pytest.mark.usefixtures("exact_layer")
+@pytest.mark.parametrize("radius", [0.3, 0.6, 0.85])
+def test_sphere_on_a_layer(radius: float) -> None:
+    """Row 55: a rigid sphere of 20 H pressed on the layer, pressures node by node and the approach."""
+    near = 4 / 3 * (1 / (1 - NU**2)) * radius**3 / 20  # of a half-space: a layer of that load has a smaller contact
+    load = near * {0.3: 1.0, 0.6: 1.1, 0.85: 1.2}[radius]
+    found = []
+    for operator in ("fine", "exact-layer"):
+        case = layer(12, 3, grid={"nodes": 65, "size": [1.9, 1.9]})
+        strip = case.strip.model_copy(update={"operator": operator, "profile": None})
+        loads = [one.model_copy(update={"force": (0.0, 0.0, -load)}) for one in case.punch.loads]
+        case = case.model_copy(update={"strip": strip, "punch": case.punch.model_copy(update={"loads": tuple(loads)})})
+        bodies = build_bodies(case)
+        x = bodies.punch.surface.x
+        sphere = (x[:, 0] ** 2 + x[:, 1] ** 2) / 40
+        bodies.punch.surface = replace(bodies.punch.surface, profile=sphere)
+        system = elastic(place(bodies, make_sliding(case), case=case))
+        contact = system.phase_contact([0]).solve(system.gap(0, system.unworn()))
+        found.append((contact.pressure[0], contact.rigid[0, 0]))
+    (ours, approach), (exact, exact_approach) = found
+    r = np.hypot(x[:, 0], x[:, 1])
+    assert r[exact > 0].max() == pytest.approx(radius, abs=0.06)
+    assert np.abs(ours - exact).max() < 0.01 * exact.max()
+    assert ours.max() == pytest.approx(exact.max(), rel=2e-3)
+    assert approach == pytest.approx(exact_approach, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("settings", "key"),
+    [
+        (["grid.size=['0.5 mm', '0.5 mm']"], "grid.size"),
+        (["grid.middle=['1 mm', '0 mm']"], "grid.size"),
+        (["grid.size=['0.3 mm']"], "grid.size"),
+        (["contact.law='coulomb'", "contact.solver='full'"], "grid"),
+    ],
+)
+def test_what_a_grid_cannot_lie_on(settings: list[str], key: str) -> None:
+    """A grid beyond the surface, of another number of sides, or with what is of meshes alone, is refused by key."""
+    with pytest.raises(CaseError, match=key):
+        assemble(load_case("ball-on-flat", [*BALL, "grid.nodes=9", *settings]))
+
+
+def test_a_contact_that_reaches_edges() -> None:
+    """A flat end, whose edges belong to the contact, is refused with the number that says so."""
+    case = layer(8, 2, grid={"nodes": 9, "size": [4.0, 4.0]})
+    body = build_bodies(case).punch
+    x = body.surface.x
+    with pytest.raises(CaseError, match=r"punch.operator: .* not smooth at the contact: .* leave .* %"):
+        fine(Request(body, identity(len(x)), np.broadcast_to([0, 0, 1.0], x.shape)))
+
+
+def test_a_mesh_alone_is_no_grid() -> None:
+    """Without a grid there are no nodes of its own."""
+    with pytest.raises(CaseError, match="grid: missing"):
+        assemble(load_case("ball-on-flat", ["punch.operator='fine'", "strip.operator='half-space'"]))

@@ -5,7 +5,7 @@ numerics; here it is the last of these alone, u_num, estimated after the run (so
 source is a contribution of its own, and their sum bounds what they come to together, whatever their signs:
 
     mesh         of bodies, contact and temperatures, from the same run at the next lower degree of the elements;
-    wear steps   of marched half-cycles or of jumps, from the same run in smaller steps;
+    wear steps   of marched half-cycles or of jumps, from the same run in longer ones, or by what they wear;
     positions    of the strip in a half-cycle, from the same run with half as many;
     following    of meshes that follow the wear, from the same run in which they follow half as often;
     heat steps   what halving them changes of the contact's temperatures;

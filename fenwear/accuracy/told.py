@@ -20,7 +20,7 @@ from fenwear.errors import CaseError, ConvergenceError
 
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
 ORDER, AT_EDGES = 1.5, 1.0
-SMALLER = 4.0  # by which the tolerance of jumps is cut; their error falls with its power 2/3, as they are of 2nd order
+LARGER = 8.0  # by which the tolerance of jumps is raised: as they are of second order, their error by 4
 ROUNDING = 1e-12
 
 
@@ -111,8 +111,8 @@ def _steps(again: Again, before: Values, first: Block, last: Block) -> Iterator[
     case = last.system.case
     positions, follow = last.system.motion.positions, case.geometry.follow_wear
     if case.run.integration == "jump":
-        finer = again.otherwise(run={"jump_tolerance": case.run.jump_tolerance / SMALLER}).values()
-        yield "wear steps", _apart(before, finer, 1 / (1 - SMALLER ** (-2 / 3)))
+        longer = again.otherwise(run={"jump_tolerance": min(1.0, LARGER * case.run.jump_tolerance)}).values()
+        yield "wear steps", _apart(before, longer, 1.0)
     else:
         yield "wear steps", _of_half_cycles(before, first, last)
     if last.system.sticks:

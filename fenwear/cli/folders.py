@@ -40,11 +40,19 @@ def export_command(
     at: Annotated[
         str, typer.Option(metavar="NUMBERS", help="Kept half-cycles of the profiles, first and last too, with commas.")
     ] = "first,last",
+    worn: Annotated[
+        bool, typer.Option("--worn", help="The worn surfaces at one half-cycle instead: profile, STL and VTK.")
+    ] = False,
 ) -> None:
     """Write a run as CSV: a line for each kept half-cycle, and the profiles of both bodies."""
     from fenwear.results.export import export
+    from fenwear.results.worn import export_worn
 
-    for path in on_root(MPI.COMM_WORLD, lambda: export(directory, output, at)):
+    if worn:
+        paths = export_worn(directory, output, "last" if at == "first,last" else at)
+    else:
+        paths = on_root(MPI.COMM_WORLD, lambda: export(directory, output, at))
+    for path in paths:
         show(str(path))
 
 

@@ -51,7 +51,7 @@ def export(directory: Path, folder: Path | None = None, at: str = "first,last") 
     """
     history = load_history(directory)
     record = _record(directory / HISTORY, history)
-    rows = _chosen(history, record, at)
+    rows = chosen_rows(history, record, at)
     tables = {COURSE: _course(history, record)}
     if resolves(history):
         tables[LOOPS] = _loops(history, rows)
@@ -81,7 +81,7 @@ def _record(path: Path, history: xarray.Dataset) -> str:
     return record
 
 
-def _chosen(history: xarray.Dataset, record: str, at: str) -> list[int]:
+def chosen_rows(history: xarray.Dataset, record: str, at: str) -> list[int]:
     """Return the rows of the chosen records, in their order.
 
     Raises:

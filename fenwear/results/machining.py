@@ -6,6 +6,7 @@ import itertools
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
@@ -59,7 +60,7 @@ def with_shape(case: Case, points: list[list[float]]) -> Case:
 
 
 def write_stl(path: Path, surface: ContactSurface, depth: Array, thickness: float) -> None:
-    """Write the machined contact surface as a binary STL, mm.
+    """Write the machined or worn contact surface as a binary STL, mm, its normals out of the body.
 
     Args:
         path: Of the file.
@@ -67,7 +68,7 @@ def write_stl(path: Path, surface: ContactSurface, depth: Array, thickness: floa
         depth: At its pressure nodes (n,), mm.
         thickness: Of a plane model, along y; 0 for rings, which are turned about z, and solids.
     """
-    x, cells = surface.unworn - depth[:, None] * surface.outward, surface_cells(surface)
+    x, cells = surface.unworn - depth[:, None] * surface.outward, facing_outward(surface)
     if surface.dim == 2:
         turned = np.linspace(0, 2 * np.pi, AROUND + 1)
         rows = (
@@ -88,3 +89,18 @@ def write_stl(path: Path, surface: ContactSurface, depth: Array, thickness: floa
     triangles["normal"] = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
     with writing(path):
         path.write_bytes(b"fenwear".ljust(80) + np.uint32(len(triangles)).tobytes() + triangles.tobytes())
+
+
+def facing_outward(surface: ContactSurface) -> NDArray[np.int64]:
+    """Return the pressure nodes around each linear facet (f, k), counter-clockwise as seen from outside the body.
+
+    Of a line the second node is where the first one sees it to its left along y, so that pulled along y it looks out.
+    """
+    cells = surface_cells(surface)
+    out, x = surface.outward[cells].mean(axis=1), surface.unworn[cells]
+    if surface.dim == 2:
+        along = x[:, 1] - x[:, 0]
+        looks = along[:, 0] * out[:, 1] - along[:, 1] * out[:, 0]
+    else:
+        looks = np.einsum("fi,fi->f", np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), out)
+    return np.where(looks[:, None] < 0, cells[:, ::-1], cells)

@@ -1,0 +1,145 @@
+"""How good the told uncertainty is: small cases, each again on fine meshes in small steps.
+
+    docker/fenwear python3 tests/benchmarks/accuracy.py [NAME...]
+
+For each number of a run's end: its true error against the fine reference, the uncertainty that was told, their ratio,
+and the source that makes most of it; then in how many the true error lies within it, the median ratio, and what the
+estimate cost against the set-up. Numbers that the reference gives to rounding are told apart: a ratio of roundings
+says nothing. References are solutions, too: they are two to four times as fine.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear import Block, assemble, evolve, load_case
+from fenwear.accuracy import uncertainty, values_of
+from fenwear.case import Case
+
+EXACT = 1e-9  # of a number: an error that is rounding
+ELEMENTS = "geometry.parameters.elements_along_contact"
+JUMPS = 'run.integration="jump"'
+SMALL = "run.jump_tolerance=3e-4"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A small case, and what makes a reference of it.
+
+    Attributes:
+        base: The built-in case.
+        settings: Of the small one.
+        fine: Beside them, of the reference.
+    """
+
+    base: str
+    settings: Sequence[str]
+    fine: Sequence[str]
+
+
+def rounded(half_cycles: int, degree: int) -> Trial:
+    """Return a punch with rounded edges."""
+    counts = ("geometry.parameters.elements_along_flat", "geometry.parameters.elements_along_edge")
+    settings = (f"run.half_cycles={half_cycles}", f"geometry.degree={degree}", *(f"{key}=8" for key in counts))
+    return Trial("rounded-punch", settings, (*(f"{key}=24" for key in counts), "geometry.degree=3", SMALL))
+
+
+def ring(half_cycles: int, base: str = "ring-on-ring") -> Trial:
+    """Return a ring on a ring."""
+    settings = (f"run.half_cycles={half_cycles}", "geometry.parameters.across=6", "geometry.degree=3")
+    fine = ("geometry.parameters.across=20", "geometry.degree=4", SMALL)
+    return Trial(base, settings, fine if base == "ring-on-ring" else (*fine, "heat.step_tolerance=5e-4"))
+
+
+def along(base: str, elements: int, finer: int, *settings: str, fine: Sequence[str] = ()) -> Trial:
+    """Return a case whose mesh has a number of elements along its contact."""
+    return Trial(base, (f"{ELEMENTS}={elements}", *settings), (f"{ELEMENTS}={finer}", *fine))
+
+
+def solid(base: str, counts: dict[str, tuple[int, int]], *settings: str, fine: Sequence[str] = ()) -> Trial:
+    """Return a solid with numbers of elements, and those of its reference."""
+    few, many = ([f"geometry.parameters.{key}={pair[k]}" for key, pair in counts.items()] for k in (0, 1))
+    return Trial(base, (*few, *settings), (*many, *fine))
+
+
+PUNCH_ONLY = ("unset=wear.strip", "motion.positions=1", "run.jump_tolerance=3e-3")
+BALL = {"core_elements": (2, 4), "across": (4, 8), "ball_layers": (3, 5), "flat_layers": (4, 6)}
+PAD = {"across": (3, 6), "along": (3, 6), "pad_layers": (2, 3), "disc_layers": (2, 3)}
+TRIALS = {
+    "flat punch, 40 half-cycles": along("example1", 8, 32, "run.half_cycles=40"),
+    "flat punch, 2000": along("example1", 8, 32, "run.half_cycles=2000", JUMPS, fine=(SMALL,)),
+    "hinged punch, 400": along("example2", 10, 32, "run.half_cycles=400", JUMPS, "geometry.degree=3", fine=(SMALL,)),
+    "rounded punch, 2000": rounded(2000, 2),
+    "rounded punch, 20000": rounded(20000, 3),
+    "block on ring, 100": along("block-on-ring", 60, 180, "run.half_cycles=100", fine=("geometry.degree=3", SMALL)),
+    "block on ring, 1600": along("block-on-ring", 60, 180, "run.half_cycles=1600", fine=("geometry.degree=3", SMALL)),
+    "cylinder, 2": along("fretting", 30, 120, "run.half_cycles=2", *PUNCH_ONLY, fine=("geometry.degree=3",)),
+    "cylinder, 200": along("fretting", 30, 120, "run.half_cycles=200", *PUNCH_ONLY, fine=("geometry.degree=3", SMALL)),
+    "both worn, 400": along("fretting", 24, 72, "run.half_cycles=400", "motion.positions=7", "run.jump_tolerance=0.01",
+                            fine=("motion.positions=21", "run.jump_tolerance=1e-3")),
+    "rings, 200": ring(200),
+    "rings, 5000": ring(5000),
+    "rings, heat, 200": ring(200, "ring-on-ring-heat"),
+    "punch, heat, 60": along("example1-heat", 8, 24, "run.half_cycles=60", "geometry.degree=3",
+                             fine=("heat.step_tolerance=5e-4",)),
+    "punch, heat, 400": along("example1-heat", 8, 20, "run.half_cycles=400", JUMPS, "geometry.degree=3",
+                              fine=("heat.step_tolerance=5e-4", SMALL)),
+    "partial slip, 4": along("fretting-partial-slip", 24, 60, "run.half_cycles=4", fine=("stick.step_tolerance=2e-3",)),
+    "partial slip, 1000": along("fretting-partial-slip", 24, 60, "run.half_cycles=1000", fine=(SMALL,)),
+    "ball, 20": solid("ball-on-flat", BALL, "run.half_cycles=20", "motion.positions=3", fine=("motion.positions=7",)),
+    "pin, 100": solid("pin-on-disc", {}, "run.half_cycles=100", fine=("geometry.degree=3",)),
+    "pad, 200": solid("brake-pad", PAD, "run.half_cycles=200", "unset=heat"),
+}  # fmt: skip
+
+
+def ended(case: Case) -> tuple[Block, float, float]:
+    """Return the last half-cycles of a run, and the seconds of one core of its set-up and of itself."""
+    begin = time.process_time()
+    system = assemble(case, heat="reduced" if case.run.integration == "jump" else "as set", fresh=True)
+    ready = time.process_time()
+    *_, last = evolve(system)
+    return last, ready - begin, time.process_time() - ready
+
+
+def main(names: Sequence[str]) -> None:
+    """Print the table."""
+    ratios: list[float] = []
+    costs: list[float] = []
+    exact = 0
+    for name in names or TRIALS:
+        trial = TRIALS[name]
+        case = load_case(trial.base, trial.settings)
+        last, setup, run = ended(case)
+        begin = time.process_time()
+        found = uncertainty(last.system.case, last)
+        cost = time.process_time() - begin
+        costs.append(cost / setup)
+        reference = values_of(ended(load_case(trial.base, [*trial.settings, *trial.fine]))[0])
+        print(
+            f"{name}: set-up {setup:.2f} s, run {run:.2f} s, estimate {cost:.2f} s of one core", *found.untold.values()
+        )
+        total = found.total
+        for quantity, value in found.values.items():
+            error = abs(value.number - reference[quantity].number)
+            told = f"    {' '.join(quantity):22} {value.number:12.5g}  error {error:8.1e}  told {total[quantity]:8.1e}"
+            if error < EXACT * abs(value.number):
+                exact += error <= total[quantity] < EXACT * 1e3 * abs(value.number)
+                print(f"{told}  to rounding", flush=True)
+                continue
+            ratios.append(total[quantity] / error)
+            print(f"{told}  ratio {ratios[-1]:7.2f}  {found.largest(quantity)}", flush=True)
+    within = np.array(ratios) >= 1
+    print(
+        f"{within.sum()} of {len(within)} errors within what is told; told over true: median {np.median(ratios):.2g}, "
+        f"{np.percentile(ratios, 10):.2g} to {np.percentile(ratios, 90):.2g} in eight of ten; {exact} are exact and "
+        f"told so; estimate over set-up: median {np.median(costs):.2g}"
+    )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

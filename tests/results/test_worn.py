@@ -1,0 +1,73 @@
+"""Worn surfaces as files, and back in as the bodies of another run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, load_case, run_case
+from fenwear.errors import FenwearError
+from fenwear.results.machining import TRIANGLE
+from fenwear.results.reading import load_history
+from fenwear.results.worn import export_worn
+
+QUIET = ("output.report=false", "output.uncertainty=false", "output.fields_at=[]", "geometry.follow_wear='never'")
+PLANE = ("geometry.parameters.elements_along_contact=12", "run.integration='explicit'", *QUIET)
+
+
+def run(name: str, folder: Path, *settings: str) -> Path:
+    """Run a case without a word; return its folder."""
+    run_case(load_case(name, settings), "worn", folder, lambda _: None, progress="none")
+    return folder
+
+
+def test_next_half_cycle_goes_on_from_the_files(tmp_path: Path) -> None:
+    """Of both bodies: the first half-cycles on worn bodies are those that follow on the run itself."""
+    both = (*PLANE, "motion.positions=3")
+    whole = load_history(run("fretting", tmp_path / "whole", *both, "run.half_cycles=8"))
+    first = run("fretting", tmp_path / "first", *both, "run.half_cycles=6")
+    paths = export_worn(first, tmp_path / "surfaces")
+    assert [path.name for path in paths] == [
+        f"worn_{body}.{kind}" for body in ("punch", "strip") for kind in ("csv", "stl", "vtk")
+    ]
+    profiles = [f"{body}.profile.file='{tmp_path}/surfaces/worn_{body}.csv'" for body in ("punch", "strip")]
+    again = load_history(run("fretting", tmp_path / "again", *both, *profiles, "run.half_cycles=2"))
+    after = whole.pressure.values[6:8]
+    assert np.abs(again.pressure.values - after).max() < 1e-6 * after.max()
+    for body, side in (("punch", -1), ("strip", 1)):
+        triangles = np.frombuffer((tmp_path / "surfaces" / f"worn_{body}.stl").read_bytes()[84:], dtype=TRIANGLE)
+        assert (side * triangles["normal"][:, 2] > 0).all()
+    # From there on once more: a profile has that of the body before.
+    export_worn(tmp_path / "again", tmp_path / "twice")
+    twice = [text.replace("surfaces", "twice") for text in profiles]
+    third = load_history(run("fretting", tmp_path / "third", *both, *twice, "run.half_cycles=1"))
+    longer = load_history(run("fretting", tmp_path / "longer", *both, "run.half_cycles=9"))
+    assert np.abs(third.pressure.values[0] - longer.pressure.values[8]).max() < 1e-6 * after.max()
+
+
+def test_files_of_a_solid_have_its_surface(tmp_path: Path) -> None:
+    """Triangles that look out of the body, and the depths."""
+    pyvista = pytest.importorskip("pyvista")
+    small = ("geometry.parameters.core_elements=2", "geometry.parameters.across=2", "run.half_cycles=2")
+    folder = run("ball-on-flat", tmp_path / "ball", *small, "motion.positions=2", "run.integration='explicit'", *QUIET)
+    paths = {path.name: path for path in export_worn(folder, tmp_path / "surfaces")}
+    history = load_history(folder)
+    surface = pyvista.read(paths["worn_punch.vtk"])
+    assert surface["wear_mm"] == pytest.approx(history.wear.values[-1], rel=1e-9)
+    triangles = np.frombuffer(paths["worn_punch.stl"].read_bytes()[84:], dtype=TRIANGLE)
+    assert len(triangles) == surface.triangulate().n_cells
+    assert (triangles["normal"][:, 2] < 0).all()  # the ball looks down
+
+
+def test_rings_and_bad_requests(tmp_path: Path) -> None:
+    """A profile over r; one half-cycle at a time, of a run."""
+    small = ("geometry.parameters.across=4", "run.half_cycles=2", "run.integration='explicit'", *QUIET)
+    folder = run("ring-on-ring", tmp_path / "rings", *small)
+    assert export_worn(folder)[0].read_text().startswith("r (mm),depth (um)\n")
+    for at, key in (("1,2", "--at"), ("7", "--at")):
+        with pytest.raises(CaseError, match=key):
+            export_worn(folder, tmp_path / "x", at)
+    with pytest.raises(FenwearError):
+        export_worn(tmp_path / "nothing")

@@ -30,6 +30,7 @@ MOVES = {
     "lambda_M": "tilt",
     "lambda_Mx": "tilt about x",
     "lambda_My": "tilt about y",
+    "lambda_Mz": "tilt about z",
 }
 TRACK_ROUNDS, AT_REST = 500, 1e-11  # of the pressure on a closed track
 RAMP = 1e-6  # of the mean wear rate, over which the pressure rises to a threshold

@@ -20,7 +20,8 @@ from fenwear.errors import CaseError, InputError
 
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
-SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about z: hold it against turning"
+SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about {0}: hold it against turning"
+HOLLOW, BACK = 0.5, 0.9  # least over largest distance of a contact from its middle, and how little its front counts
 WRAPPED = 0.5  # component of normals, both ways, from which on a contact holds a body along that axis
 PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
 RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
@@ -29,7 +30,7 @@ RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
     "axisymmetric": ({1: "lambda_F"}, {}),
     "solid": (
         {2: "lambda_F", 3: "lambda_Mx", 4: "lambda_My"},
-        {0: SLIDE.format("x"), 1: SLIDE.format("y"), 5: SPIN},
+        {0: SLIDE.format("x"), 1: SLIDE.format("y"), 5: SPIN.format("z")},
     ),
 }
 
@@ -271,13 +272,24 @@ class Supports:
     def _remoteness(self) -> NDArray[np.float64]:
         """Return how far each owned node is from the contact's middle (owned,); collective.
 
-        No two are as far, even in a symmetric body: a millionth of it depends on the side.
+        No two are as far, even in a symmetric body: a millionth of it depends on the side. Where the contact goes
+        around its middle, as in a bore, what lies on its side away from the other body counts: guides act through these
+        nodes, and what they press must not dent the contact.
         """
         owned, comm = self.space.dofmap.index_map.size_local, self.body.mesh.comm
-        x = self.space.tabulate_dof_coordinates()[:owned]
-        middle = comm.allreduce(x[self.contact].sum(axis=0)) / comm.allreduce(len(self.contact))
+        x, contact = self.space.tabulate_dof_coordinates()[:owned], self.contact
+        middle = comm.allreduce(x[contact].sum(axis=0)) / comm.allreduce(len(contact))
         away = (x - middle) / self._size()
-        return np.asarray(np.linalg.norm(away, axis=1) * (1 + 1e-6 * away @ (1.0, 0.7, 0.4)))
+        far = np.linalg.norm(away, axis=1)
+        nearest = comm.allreduce(far[contact].min(initial=np.inf), MPI.MIN)
+        if nearest > HOLLOW * comm.allreduce(far[contact].max(initial=0.0), MPI.MAX):
+            up, surface = away[:, self.dim - 1] / np.maximum(far, 1e-300), self._trace.surface
+            bore = np.einsum("ic,ic->", surface.x - middle[: self.dim], surface.outward) < 0
+            back = (
+                -1.0 if bore == (self.body.name == "punch") else 1.0
+            )  # the punch is above: its bore touches at the top
+            far *= 1 - BACK * (1 - back * up) / 2
+        return np.asarray(far * (1 + 1e-6 * away @ (1.0, 0.7, 0.4)))
 
     def _regularise(self) -> list[fem.DirichletBC]:
         """Return one further support for each rigid mode, at the nodes farthest from the contact; collective.
@@ -319,7 +331,20 @@ def _balanced(kind: Kind, outward: NDArray[np.float64]) -> tuple[dict[int, str],
         if column in forbidden and normal.min(initial=0.0) < -WRAPPED and normal.max(initial=0.0) > WRAPPED:
             names[column] = f"lambda_F{axis}"
             del forbidden[column]
+    if kind == "solid":
+        _turn_around(outward, names, forbidden)
     return names, forbidden
+
+
+def _turn_around(outward: NDArray[np.float64], names: dict[int, str], forbidden: dict[int, str]) -> None:
+    """Have a bore along x or y hold its shaft against tilting about z, and not against turning about its own axis."""
+    both = (outward.min(axis=0, initial=0.0) < -WRAPPED) & (outward.max(axis=0, initial=0.0) > WRAPPED)
+    for axis in (0, 1):
+        if both[[1 - axis, 2]].all() and np.abs(outward[:, axis]).max() < WRAPPED:
+            del names[3 + axis]
+            forbidden[3 + axis] = SPIN.format("xy"[axis])
+            names[5] = "lambda_Mz"
+            del forbidden[5]
 
 
 def _null_space(gram: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -67,8 +67,8 @@ class RigidEquilibrium:
     def _arm(self, mode: int) -> float:
         """Return the mean arm of the normals about the axis of a rotation, mm."""
         turned = np.abs(self.rigid_normal[:, mode])
-        own = turned > 0
-        return float(self.pair.weights @ turned / max(float(self.pair.weights @ own), 1e-300)) or 1.0
+        area = float(self.pair.weights @ (turned > 0))
+        return float(self.pair.weights @ turned) / area if area > 0 else 1.0
 
     @property
     def translations(self) -> list[list[int]]:

@@ -26,7 +26,7 @@ SEEN = 0.2  # the same of facets of the second surface that a patch of several s
 AROUND = 0.35  # cosine between the axis and the ways to facets of the second surface that a patch sees from the middle
 ROUND = 0.05  # of the radius: how far, in the mean, normals of round surfaces may pass the middle
 SLIVER = 0.5  # the same of any one facet
-STRAIGHT = 1e-3  # of what normals fix of the middle across them: what they fix of it along the axis of a cylinder
+STRAIGHT = 1e-3  # of the largest second moment of the normals: what they have along the axis of a cylinder
 
 
 @dataclass(frozen=True)
@@ -139,22 +139,25 @@ class _Middle:
 
 
 def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
-    """Return the middle that normals (f, d) of facets pass, in least squares; None where they pass none."""
+    """Return the middle that normals (f, d) of facets pass, in least squares; None where they pass none.
+
+    Along the axis of a cylinder no normal has a component; across it, or of a sphere in all directions, the lines along
+    the normals pass the middle.
+    """
     x, d = Side(surface, surface.trace, normal).middles, surface.dim
-    across = np.eye(d) - normal[:, :, None] * normal[:, None, :]
-    system = across.mean(axis=0)
-    sizes, axes = np.linalg.eigh(system)
-    fixed = sizes > STRAIGHT * sizes[-1]
-    if (~fixed).sum() > d - 2:
+    sizes, axes = np.linalg.eigh(normal.T @ normal / len(normal))
+    turns = sizes > STRAIGHT * sizes[-1]
+    if (~turns).sum() > d - 2:
         return None
-    load = axes.T @ np.einsum("fab,fb->a", across, x) / len(x)
-    point = axes[:, fixed] @ (load[fixed] / sizes[fixed])
-    round_ = axes[:, fixed] if not fixed.all() else np.eye(d)
-    off = np.linalg.norm(np.einsum("fab,fb->fa", across, x - point) @ round_, axis=1)
-    radius = np.linalg.norm((x - point) @ round_, axis=1)
+    round_ = axes[:, turns] if not turns.all() else np.eye(d)
+    way, seen = unit(normal @ round_), x @ round_
+    across = np.eye(round_.shape[1]) - way[:, :, None] * way[:, None, :]
+    middle = np.linalg.solve(across.mean(axis=0), np.einsum("fab,fb->a", across, seen) / len(x))
+    off = np.linalg.norm(np.einsum("fab,fb->fa", across, seen - middle), axis=1)
+    radius = np.linalg.norm(seen - middle, axis=1)
     if (off / radius).mean() > ROUND or (off > SLIVER * radius).any():
         return None
-    return _Middle(point, round_.T, axes[:, ~fixed].T, float(np.median(radius)))
+    return _Middle(round_ @ middle, round_.T, axes[:, ~turns].T, float(np.median(radius)))
 
 
 def _from_middle(own: Side, other: Side) -> list[Patch] | None:

@@ -70,6 +70,9 @@ OF_SURFACES = {  # of solids and rings
 }
 
 
+OF_SURFACES["place"] = TEXTS["place"].format(axis="run")
+
+
 def _first_part(history: xarray.Dataset) -> str:
     """Say which contact of a solid the cuts are of, where its parts lie behind each other."""
     surface = surface_of(history) if model_of(history) == "solid" else None

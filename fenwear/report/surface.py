@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 POINTS = 301  # along a cut
 BESIDE = 1.1  # of the parts' size: how far apart they are laid
 AXES = ("x", "y", "z")
+EDGEWISE = 0.3  # of a surface's area: what is seen of it along an axis, less of what is seen edge-on
+OVER = 1.1  # of the area around it: more of what is seen lies over itself
+HALF = 0.5  # of the way around: longer facets go over the cut
 ARROWS = "→↗↑↖←↙↓↘"
 
 
@@ -41,7 +44,8 @@ class Surface:
         seen: The two axes that are left when it is seen along its normal.
         contact: Name of the contact that each node belongs to (n,); None where it has none.
 
-    Parts that would lie over each other, as both faces of a disc, are laid beside each other on maps.
+    Parts that would lie over each other, as both faces of a disc, are laid beside each other on maps; what would lie
+    over itself, as a bore, is unrolled along the sliding.
     """
 
     body: str
@@ -59,9 +63,34 @@ class Surface:
         return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
 
     @cached_property
+    def unrolled(self) -> bool:
+        """Whether a part of it would lie over itself where it is seen along one axis."""
+        return any(self._folds(self.triangles[self.part[self.triangles[:, 0]] == k]) for k in np.unique(self.part))
+
+    def _folds(self, triangles: NDArray[np.int64]) -> bool:
+        """Return whether triangles (t, 3) cover more than what is around them, or little of themselves, as seen."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        sides = self.x[triangles[:, 1:]] - self.x[triangles[:, :1]]
+        areas = np.cross(sides[:, 0], sides[:, 1])
+        seen = np.abs(areas[:, 3 - sum(self.seen)]).sum()
+        if seen < EDGEWISE * np.linalg.norm(areas, axis=1).sum():
+            return True
+        try:
+            around = 2 * ConvexHull(self.x[np.unique(triangles)][:, list(self.seen)]).volume
+        except QhullError:
+            return True
+        return bool(seen > OVER * around)
+
+    @cached_property
+    def _flat(self) -> Array:
+        """Coordinates of its nodes as seen, or unrolled (n, 2), mm."""
+        return self.sliding if self.unrolled else self.x[:, list(self.seen)]
+
+    @cached_property
     def overlaps(self) -> bool:
         """Whether two of its parts would lie over each other on a map."""
-        seen = self.x[:, list(self.seen)]
+        seen = self._flat
         boxes = [
             (seen[self.part == k].min(axis=0), seen[self.part == k].max(axis=0)) for k in range(self.part.max() + 1)
         ]
@@ -77,7 +106,7 @@ class Surface:
     @cached_property
     def map(self) -> Array:
         """Coordinates on a map (n, 2), mm."""
-        seen = self.x[:, list(self.seen)].copy()
+        seen = self._flat.copy()
         if self.overlaps:
             seen[:, self._beside] += BESIDE * np.ptp(seen[:, self._beside]) * self.part
         return seen
@@ -85,14 +114,14 @@ class Surface:
     @cached_property
     def _beside(self) -> int:
         """The axis of the map along which parts are laid beside each other: the shorter one."""
-        return int(np.ptp(self.x[:, list(self.seen)], axis=0).argmin())
+        return int(np.ptp(self._flat, axis=0).argmin())
 
     @property
     def names(self) -> tuple[str, str]:
         """Names of the map's axes."""
+        axes = ("along the sliding", "across it") if self.unrolled else [AXES[axis] for axis in self.seen]
         first, second = (
-            AXES[axis] + (" of the first part" if self.overlaps and k == self._beside else "")
-            for k, axis in enumerate(self.seen)
+            axis + (" of the first part" if self.overlaps and k == self._beside else "") for k, axis in enumerate(axes)
         )
         return first, second
 
@@ -108,7 +137,13 @@ class Surface:
         """Segments around the map (m, 2, 2), mm."""
         edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=-1).reshape(-1, 2)
         single, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-        return self.map[single[counts == 1]]
+        found = self.map[single[counts == 1]]
+        return np.asarray(found[~self._across_the_cut(single[counts == 1])])
+
+    def _across_the_cut(self, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Return which of some facets or edges (f, k) go over the line at which an unrolled surface is cut (f,)."""
+        along = self.sliding[:, 0]
+        return np.asarray(self.unrolled & (np.ptp(along[nodes], axis=1) > HALF * np.ptp(along)))
 
     def drawn(self, values: Array) -> tuple[Triangulation, Array]:
         """Return triangles of the map and values at their corners: four around the middle of each quadrilateral.
@@ -118,12 +153,13 @@ class Surface:
         """
         from matplotlib.tri import Triangulation
 
-        points, triangles = self.map, self.triangles
+        points, triangles = self.map, self.triangles[~self._across_the_cut(self.triangles)]
         if self.cells.shape[1] == 4:
-            middle = len(points) + np.arange(len(self.cells))
-            points = np.concatenate([points, points[self.cells].mean(axis=1)])
-            values = np.concatenate([values, values[self.cells].mean(axis=1)])
-            around = [(self.cells[:, k], self.cells[:, (k + 1) % 4], middle) for k in range(4)]
+            cells = self.cells[~self._across_the_cut(self.cells)]
+            middle = len(points) + np.arange(len(cells))
+            points = np.concatenate([points, points[cells].mean(axis=1)])
+            values = np.concatenate([values, values[cells].mean(axis=1)])
+            around = [(cells[:, k], cells[:, (k + 1) % 4], middle) for k in range(4)]
             triangles = np.concatenate([np.stack(corners, axis=1) for corners in around])
         return Triangulation(points[:, 0], points[:, 1], triangles), values
 

@@ -17,6 +17,7 @@ from fenwear.report.course import (
     mark_few,
     mean_pressure,
     nominal_width,
+    place_figure,
     run_axis,
     temperature_unit,
 )
@@ -58,6 +59,8 @@ def surface_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: L
         if "max_temperature" in history:
             drawn["temperature"] = ring_temperature_figure(history, chosen, look)
     drawn["peaks"] = series_figure(history, look)
+    if "eccentricity" in history:
+        drawn["place"] = place_figure(history, look)
     if "load_factor" in history:
         drawn["program"] = program_figure(history, look)
     drawn["convergence"] = convergence_figure(history, look)

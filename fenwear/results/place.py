@@ -2,10 +2,11 @@
 
 A body that supports leave free moves until pressure and friction balance its loads. What it has moved by, against where
 it was meshed, is told of its side away from the contact. Of a shaft in a bore, along y, it is the way e from the middle
-of the bore to that of the shaft, both as they were before any wear. Its size is the eccentricity; the attitude angle is
-that from the way in which the load presses the shaft to e, positive as the strip turns. Where rigid bodies wear a bore
-by an arc of psi0 to each side the eccentricity is D / cos psi0, D the radial clearance; friction has the middle of the
-contact at atan mu against the turning: a dry shaft climbs.
+of the bore to that of the shaft: of circles that fit their surfaces as they are deformed, without their wear, in least
+squares. Its size is the eccentricity; the attitude angle is that from the way in which the load presses the shaft to e,
+positive as the strip turns. Where rigid bodies wear a bore by an arc of psi0 to each side the eccentricity is
+D / cos psi0, D the radial clearance; friction has the middle of the contact at atan mu against the turning: a dry shaft
+climbs.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface.equilibrium import is_translation
 from fenwear.results.sheet import Variable
+from fenwear.sliding.wear import Worn
 
 TRUE = 1e-3  # of the radius: how far the points of a round surface may be from a circle
 ARC = 2.5  # radius over the chord of the contact, up to which it is round
@@ -86,9 +88,9 @@ def values(block: Block) -> dict[str, Array]:
     bore = bore_of(system)
     if bore is None:
         return found
-    away = bore.shaft.middle - bore.bore.middle - bore.sign * _moved(system, bore.bore.middle, block.rigid)
-    along_axes = [is_translation(mode) for mode in system.rigid.mode_names]
-    pressed = -bore.sign * _moved(system, bore.bore.middle, (system.rigid.resultant * along_axes)[None])[0]
+    away = bore.shaft.middle - bore.bore.middle - bore.sign * _apart(block)
+    loads = system.bodies.punch.given - system.bodies.strip.given
+    pressed = -bore.sign * loads[[0, -1]]
     cross, along = away[:, 0] * pressed[1] - away[:, 1] * pressed[0], away @ pressed
     turn = np.sign(system.sliding.field.turn[1]) or 1.0
     return found | {
@@ -133,17 +135,17 @@ def _circle(surface: ContactSurface) -> Circle | None:
     return Circle(middle, radius) if true else None
 
 
-def _moved(placed: Placed, middle: Array, amount: Array) -> Array:
-    """Return how the punch moves against the strip at a point of the middle plane, x and z (k, 2), mm.
+def _apart(block: Block) -> Array:
+    """Return how far the punch's surface has moved from the strip's, x and z in the middle along y (k, 2), mm.
 
-    Args:
-        placed: The bodies.
-        middle: Where, x and z, mm.
-        amount: Of the rigid modes (k, modes).
+    The translation, and in a solid the tilt, that fits what gaps have opened by best, over the whole surface.
     """
-    x, motion = placed.pair.punch.x, placed.rigid.motion
-    point = np.insert(middle, 1, (x[:, 1].min() + x[:, 1].max()) / 2) if x.shape[1] == 3 else middle
-    affine = np.column_stack([np.ones(len(x)), x - x.mean(axis=0)])
-    fit, *_ = np.linalg.lstsq(affine, motion.reshape(len(x), -1), rcond=None)
-    there = (np.append(1.0, point - x.mean(axis=0)) @ fit).reshape(motion.shape[1:])
-    return np.asarray(amount @ there[[0, -1]].T)
+    system, pair = block.system, block.system.pair
+    undeformed = np.array([system.gap(0, Worn(*worn)) for worn in zip(block.wear, block.wear_strip, strict=True)])
+    fields = pair.normal[:, [0, -1]]
+    if pair.punch.dim == 3:
+        y = pair.punch.x[:, 1]
+        fields = np.column_stack([fields, (y - (y.min() + y.max()) / 2)[:, None] * fields])
+    root = np.sqrt(pair.weights)
+    fit, *_ = np.linalg.lstsq(root[:, None] * fields, root[:, None] * (block.gap - undeformed).T, rcond=None)
+    return np.asarray(fit[:2].T)

@@ -2,7 +2,7 @@
 
 A translation along V has s = x . V along it, and across it the coordinate of e_n x V. Around an axis s is the
 arc r_0 theta on the circle of the mean radius r_0, from the middle of the contact on; across it is the radius on a
-disc, and the place along the axis on a roller.
+disc, and the place along the axis on a roller. The arc of a whole bore counts from its top.
 """
 
 from __future__ import annotations
@@ -68,11 +68,26 @@ def sliding_chart(field: SlidingField, pair: ContactPair) -> SlidingChart:
     radial = points - np.outer(points @ axis, axis)
     radii = np.linalg.norm(radial, axis=1)
     radius, middle = float(weights @ radii), weights @ radial
+    if (np.abs(in_space(pair.normal) @ axis) < AXIAL).all() and np.linalg.norm(middle) < INSIDE * radius:
+        return SlidingChart(*_around(axis, pair), axis, centre, radius, disc=False)
     if np.linalg.norm(middle) < INSIDE * radius:
         along = _first_axis(normal)
         return SlidingChart(along, np.cross(normal, along), None, np.zeros(3), 0.0, disc=False)
     first = middle / np.linalg.norm(middle)
     return SlidingChart(first, np.cross(axis, first), axis, centre, radius, disc=bool(abs(normal @ axis) > AXIAL))
+
+
+def _around(axis: Array, pair: ContactPair) -> tuple[Array, Array]:
+    """Return the first radius and the way on from it of a whole bore or shaft (3,): where its middle is on a chart.
+
+    As of plane ones where it looks at the other body most, the punch being above: a bore's top, a shaft's bottom.
+    """
+    up = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < AXIAL else np.array([1.0, 0.0, 0.0])
+    first = up - (up @ axis) * axis
+    x, normal = in_space(pair.punch.x), in_space(pair.normal)
+    outside = np.einsum("ic,ic->", x - pair.weights @ x / pair.weights.sum(), normal) > 0  # e_n goes into the punch
+    first *= (1.0 if outside else -1.0) / np.linalg.norm(first)
+    return first, np.cross(axis, first)
 
 
 def _first_axis(normal: Array) -> Array:

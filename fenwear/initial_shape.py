@@ -82,7 +82,7 @@ def initial_shape(system: Tribosystem, loads: Sequence[tuple[float, float]] = ((
 def _under(system: Tribosystem, factor: float) -> Tribosystem:
     """Return the system with all loads times a factor; collective."""
     case, of = system.case, {}
-    for name, body in (("punch", case.punch), ("strip", case.strip)):
+    for name, body in case.bodies.items():
         of[name] = body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
     return with_case(system, case.model_copy(update=of))
 

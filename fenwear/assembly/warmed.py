@@ -81,7 +81,7 @@ def warming_key(system: Tribosystem) -> str:
     if system.made_from is None:
         return ""
     case = system.case
-    used = sorted({*case.punch.regions.values(), *case.strip.regions.values()})
+    used = sorted(case.used_materials)
     return next((f"materials.{name}.{key}" for name in used for key in case.materials[name].dependent), "")
 
 
@@ -124,7 +124,7 @@ def warmed_system(system: Tribosystem, state: HeatState) -> Tribosystem:
 
 def _bodies_at(bodies: Bodies, case: Case, temperatures: tuple[Array, Array]) -> Bodies:
     """Return the bodies on their meshes with the properties of these temperatures; collective."""
-    used = {*case.punch.regions.values(), *case.strip.regions.values()}
+    used = case.used_materials
     punch, strip = bodies.punch, bodies.strip
     if any(ELASTIC & set(case.materials[name].dependent) for name in used):
         punch, strip = (

@@ -130,7 +130,7 @@ def check_operators(case: Case) -> None:
             f"no operator {body.operator!r} is registered, known are {known}: those of one's own are made known in "
             "Python, by fenwear.register_operator",
         )
-        for name, body in (("punch", case.punch), ("strip", case.strip))
+        for name, body in case.bodies.items()
         if body.operator not in (CONDENSED, *OPERATORS)
     ]
     if problems:

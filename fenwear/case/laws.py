@@ -339,6 +339,11 @@ class Wear(Part):
         """Those that there are."""
         return [law for law in (self.punch, self.strip) if law is not None]
 
+    @property
+    def by_body(self) -> dict[str, WearLaw | None]:
+        """The laws of both bodies by their roles; None where one does not wear."""
+        return {"punch": self.punch, "strip": self.strip}
+
     @model_validator(mode="after")
     def _some_law(self) -> Self:
         if self.punch is None and self.strip is None:

@@ -190,7 +190,7 @@ def _tables(case: Case) -> Iterator[str]:
         return
     initial = case.heat.initial
     laws = {"contact.friction": case.contact.friction}
-    for body, law in (("punch", case.wear.punch), ("strip", case.wear.strip)):
+    for body, law in case.wear.by_body.items():
         if law is not None:
             laws[f"wear.{body}.coefficient"] = law.coefficient
     for key, law in laws.items():

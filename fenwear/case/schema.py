@@ -86,7 +86,7 @@ class Case(Part):
         problems = [*self.names.problems]
         problems += [
             f"{body}.regions.{region}: no material {name!r}; known are {', '.join(sorted(self.materials))}"
-            for body, part in (("punch", self.punch), ("strip", self.strip))
+            for body, part in self.bodies.items()
             for region, name in part.regions.items()
             if name not in self.materials
         ]
@@ -104,11 +104,7 @@ class Case(Part):
         problems += self.setup.problems(None if self.heat is None else self.heat.operator, self.contact.solver)
         problems += [*self._kind_problems(), *self._sliding_problems(), *self._operator_problems()]
         problems += [*self._program_problems(), *self._stick_problems()]
-        problems += [
-            f"{body}.regions: missing, but required"
-            for body, part in (("punch", self.punch), ("strip", self.strip))
-            if not part.regions
-        ]
+        problems += [f"{body}.regions: missing, but required" for body, part in self.bodies.items() if not part.regions]
         held = [*self.punch.supports, *self.strip.supports]
         pressed = any(load.force or load.traction for load in self.punch.loads) or self._course_load is not None
         if not pressed and not any(one.moves for one in held):
@@ -121,7 +117,7 @@ class Case(Part):
 
     def _operator_problems(self) -> list[str]:
         """Return what does not go with bodies whose meshes are not what answers to forces."""
-        others = [name for name, body in (("punch", self.punch), ("strip", self.strip)) if body.operator != CONDENSED]
+        others = [name for name, body in self.bodies.items() if body.operator != CONDENSED]
         against = {
             "with heat: temperatures expand the bodies' meshes": self.heat is not None,
             "with contact.solver = 'full', on the bodies' meshes": self.contact.solver == "full",
@@ -135,7 +131,7 @@ class Case(Part):
         """Return what does not go with a plane, an axisymmetric or a solid model."""
         kind, axes, motion = self.model.kind, self.model.axes, self.motion
         names, problems = " or ".join(f"'{axis}'" for axis in axes), []
-        for body, part in (("punch", self.punch), ("strip", self.strip)):
+        for body, part in self.bodies.items():
             vectors: dict[str, tuple[float, ...] | None] = {f"{body}.pivot": part.pivot}
             for number, support in enumerate(part.supports):
                 vectors[f"{body}.supports.{number}.at"] = support.at
@@ -197,6 +193,16 @@ class Case(Part):
         return Names(self.punch.name or "punch", self.strip.name or "strip")
 
     @property
+    def bodies(self) -> dict[str, Body]:
+        """Both bodies by their roles."""
+        return {"punch": self.punch, "strip": self.strip}
+
+    @property
+    def used_materials(self) -> set[str]:
+        """The names of the materials of all regions."""
+        return {name for body in self.bodies.values() for name in body.regions.values()}
+
+    @property
     def in_degrees(self) -> bool:
         """Whether a temperature of it was written in degrees, not in kelvin."""
         return self.heat is not None and any(OFFSET.search(text) for text in self.written.united.values())
@@ -210,7 +216,7 @@ class Case(Part):
     @property
     def warming(self) -> bool:
         """Whether a property of a material that is used depends on the temperature."""
-        used = {*self.punch.regions.values(), *self.strip.regions.values()}
+        used = self.used_materials
         return any(self.materials[name].dependent for name in used)
 
     @property
@@ -255,7 +261,7 @@ class Case(Part):
             problems.append("motion.positions: expected 1 for sliding out of the plane")
         if self.heat is None:
             given = {"contact.friction": self.contact.friction}
-            for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
+            for body, law in self.wear.by_body.items():
                 if law is not None:
                     given[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
             problems += [
@@ -271,7 +277,7 @@ class Case(Part):
             ]
         problems += self._region_problems()
         friction = self.contact.friction
-        for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
+        for body, law in self.wear.by_body.items():
             if law is not None and (law.beta, law.energy) != (None, None) and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
@@ -373,7 +379,7 @@ class Case(Part):
 
     def _thermal_problems(self, heat: Heat) -> list[str]:
         needed = ("conductivity", "heat_capacity", "density", "expansion")
-        used = {*self.punch.regions.values(), *self.strip.regions.values()} & set(self.materials)
+        used = self.used_materials & set(self.materials)
         problems = [
             f"materials.{name}.{key}: missing, but required with heat"
             for name in sorted(used)
@@ -419,7 +425,7 @@ class Case(Part):
         data = self.model_dump(mode="json", exclude_none=True)
         if self._folder is not None and (self._folder / self.geometry.file).is_file():
             data["geometry"]["file"] = str((self._folder / self.geometry.file).resolve())  # wherever it is read next
-        for body, law in (("punch", self.wear.punch), ("strip", self.wear.strip)):
+        for body, law in self.wear.by_body.items():
             if law is not None:
                 data["wear"][body] = law.resolved(data["wear"][body])
         if self.geometry.follow_wear is None:

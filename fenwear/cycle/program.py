@@ -167,7 +167,7 @@ def _loaded(case: Case, factor: float) -> Case:
         return case
     bodies: dict[str, Any] = {
         name: body.model_copy(update={"loads": tuple(load.times(factor) for load in body.loads)})
-        for name, body in (("punch", case.punch), ("strip", case.strip))
+        for name, body in case.bodies.items()
     }
     motion = case.motion
     if isinstance(motion, Cycle) and motion.load is not None:

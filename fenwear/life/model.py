@@ -167,7 +167,7 @@ class Model:
             CaseError: there is one.
         """
         laws = {"contact.friction": self.case.contact.friction}
-        for body, law in (("punch", self.case.wear.punch), ("strip", self.case.wear.strip)):
+        for body, law in self.case.wear.by_body.items():
             if law is not None:
                 laws[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
         for key, law in laws.items():

@@ -299,7 +299,7 @@ class Rig:
         pressure = at.contact.pressure if at.near is None else at.near[0]
         for _ in range(MOST_FRICTIONS):
             conditions = laws.conditions(position.pair, pressure, **self._known(at))
-            after = self._advanced(at, step, laws.friction_at(conditions))
+            after = self._advanced(at, step, laws.friction.values(conditions))
             change, pressure = np.abs(after.contact.pressure - pressure).max(), after.contact.pressure
             if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
                 return after

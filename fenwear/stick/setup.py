@@ -74,7 +74,7 @@ def unheated_rig(
     laws = LocalLaws(sliding.friction, sliding.wear, regions, initial)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     conditions = laws.conditions(middle.pair, mean)
-    wear, mu = laws.wear_at(conditions), laws.friction_at(conditions)
+    wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
     return Rig(interface, make_program(case, steps), wear, mu, laws=None if laws.constant else laws)
 
 

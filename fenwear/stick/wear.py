@@ -120,14 +120,6 @@ class LocalLaws:
             self.regions,
         )
 
-    def friction_at(self, conditions: ContactConditions) -> Array:
-        """Return mu at the nodes (n,).
-
-        Raises:
-            CaseError: it is negative or not finite there.
-        """
-        return self.friction.values(conditions)
-
     def wear_at(self, conditions: ContactConditions) -> LocalWear:
         """Return the wear by local slip.
 

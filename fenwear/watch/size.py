@@ -72,7 +72,7 @@ def _measures(case: Case, bodies: Bodies, rigid: RigidEquilibrium) -> list[Measu
         stroke = distance / half_cycles
         found.append(Measure(size / stroke, 1, 0.05, 1e4, f"the stroke is {stroke:.3g} mm"))
     if rigid.translations:
-        used = {*case.punch.regions.values(), *case.strip.regions.values()}
+        used = case.used_materials
         strain = rigid.mean_pressure / min(case.initial_materials[name].young for name in used)
         text = f"the load presses with {rigid.mean_pressure:,.3g} MPa on the whole surface"
         found.append(Measure(strain, -1 if case.model.kind == "plane" else -2, 1e-9, 0.05, text))

@@ -138,13 +138,13 @@ def mean_pressures(pressure: Array, weights: Array) -> Array:
 
 def pressed(case: Case, pressure: float) -> str:
     """Say that a mean pressure is more than a body can carry; "" if it is not."""
-    for body, law in (("punch", case.wear.punch), ("strip", case.wear.strip)):
+    for body, law in case.wear.by_body.items():
         if law is not None and law.hardness is not None and pressure > law.hardness:
             return (
                 f"the mean pressure of the contact reaches {pressure:,.4g} MPa, more than wear.{body}.hardness, "
                 f"{law.hardness:,.4g} MPa: the surface would yield, and a linear-elastic contact does not"
             )
-    used = {*case.punch.regions.values(), *case.strip.regions.values()}
+    used = case.used_materials
     softest = min(used, key=lambda name: case.initial_materials[name].young)
     young = case.initial_materials[softest].young
     if pressure > STRONGEST * young:

@@ -13,7 +13,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
-from fenwear.stick.heated import Moment, together
+from fenwear.stick.heated import StepStart, coupled_step
 from fenwear.stick.increment import advance
 from fenwear.stick.interface import Loaded, OppositeBodies, Position
 from fenwear.stick.program import Program, TimeStep
@@ -329,8 +329,8 @@ class Rig:
             return advance(self.interface, at.contact, at.imposed, end, friction, position, near or at.near)
 
         flux = float((friction * at.contact.pressure).max()) * self.reach / step.duration
-        moment = Moment(at.next_step, step.duration, step.offset, at.temperature, at.heating)
-        found = together(self.heat, solved, imposed.loaded, at.contact, moment, flux)
+        start = StepStart(at.next_step, step.duration, step.offset, at.temperature, at.heating)
+        found = coupled_step(self.heat, solved, imposed.loaded, at.contact, start, flux)
         after = self._after(at, found.state, replace(imposed, loaded=found.loaded), step)
         return replace(
             after,

@@ -23,8 +23,8 @@ APART = "contact with stick and heat did not come together: expected more stick.
 
 
 @dataclass(frozen=True)
-class Moment:
-    """A time step with heat.
+class StepStart:
+    """A time step with heat, and what is there at its start.
 
     Attributes:
         number: In the cycle.
@@ -42,7 +42,7 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Together:
+class CoupledStep:
     """The contact at the end, loads with the expansion, temperatures (dim,), heat and conductance of the nodes (n,)."""
 
     state: StickState
@@ -53,14 +53,14 @@ class Together:
     iterations: int
 
 
-def together(
+def coupled_step(
     heat: StickHeat,
     solved: Callable[[Loaded, tuple[Array, Array] | None], StickState],
     loaded: Loaded,
     before: StickState,
-    moment: Moment,
+    start: StepStart,
     flux: float,
-) -> Together:
+) -> CoupledStep:
     """Return contact and heat of a time step that belong together.
 
     Args:
@@ -68,7 +68,7 @@ def together(
         solved: Returns the contact under loads, from the pressure and the trial of one that is near.
         loaded: The loads without expansion.
         before: The contact at the start.
-        moment: The step.
+        start: The step, with what is there before it.
         flux: What friction makes at most, about, mW/mm².
 
     Raises:
@@ -87,17 +87,17 @@ def together(
         # Pressures that iterations have mixed are not zero where nodes are open: the last contact tells who conducts.
         conducting = last.closed if tries < ENOUGH else conducting
         made, pressure = np.split(x / units, 2)
-        warm = heat.step(moment.number, moment.temperature, made, conductance(pressure, conducting)).values
-        expanded = heat.expanded(loaded, warm, moment.offset)
+        warm = heat.step(start.number, start.temperature, made, conductance(pressure, conducting)).values
+        expanded = heat.expanded(loaded, warm, start.offset)
         last = solved(expanded, near)
         near, tries = (last.pressure, last.trial), tries + 1
         settled = tries >= ENOUGH or bool((last.closed == conducting).all())
-        return units * np.concatenate([last.heat / moment.duration, last.pressure]), expanded, False
+        return units * np.concatenate([last.heat / start.duration, last.pressure]), expanded, False
 
     def close(change: Array, _: Array) -> bool:
         return settled and float(np.abs(change).max()) < CLOSE
 
-    expanded = fixed_point(once, units * np.concatenate([moment.heating, before.pressure]), close, APART)
-    made, conducts = np.asarray(last.heat / moment.duration), conductance(last.pressure, conducting)
-    warm = heat.step(moment.number, moment.temperature, made, conducts).values
-    return Together(last, expanded, warm, made, conducts, tries)
+    expanded = fixed_point(once, units * np.concatenate([start.heating, before.pressure]), close, APART)
+    made, conducts = np.asarray(last.heat / start.duration), conductance(last.pressure, conducting)
+    warm = heat.step(start.number, start.temperature, made, conducts).values
+    return CoupledStep(last, expanded, warm, made, conducts, tries)

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 from fenwear.arrays import Mask
 from fenwear.assembly import Preparation, Tribosystem, renewed
-from fenwear.case import Case, doubts
+from fenwear.case import Case, plausibility_warnings
 from fenwear.cycle import (
     Block,
     Span,
@@ -202,7 +202,7 @@ class _Run:
         if self.case.run.integration == "explicit" and not system.sticks:
             self.numbers["wear_step_over_explicit_limit"] = stability_number(system)
             self.warnings = _warnings(self.numbers["wear_step_over_explicit_limit"], explicit_growth(system))
-        self.warnings += [*position_warnings(system), *system.bodies.remarks, *doubts(self.case)]
+        self.warnings += [*position_warnings(system), *system.bodies.remarks, *plausibility_warnings(self.case)]
         self.warnings += [*size_warnings(self.case, system.bodies, system.rigid)]
         self.warnings += [*law_warnings(system), *stroke_warnings(system)]
         for warning in self.warnings:

@@ -17,7 +17,7 @@ from markupsafe import escape
 from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
 from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
-from fenwear.case import doubts
+from fenwear.case import plausibility_warnings
 from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError
 from fenwear.report.page import page
@@ -404,14 +404,19 @@ def case_of(name: str, folder: Path) -> Case:
 def test_cases_and_templates_warn_of_nothing(name: str, tmp_path: Path) -> None:
     """What `check` would say of them as they stand."""
     system = assemble(case_of(name, tmp_path), heat="none")
-    assert [*position_warnings(system), *system.bodies.remarks, *doubts(system.case), *initial_warnings(system)] == []
+    assert [
+        *position_warnings(system),
+        *system.bodies.remarks,
+        *plausibility_warnings(system.case),
+        *initial_warnings(system),
+    ] == []
 
 
 @pytest.mark.parametrize("name", SOLIDS)
 def test_solids_warn_of_nothing(name: str, tmp_path: Path) -> None:
     """Without solving for their contact: that of balls is as wide as Hertz's."""
     placed = place_case(case_of(name, tmp_path))
-    assert [*position_warnings(placed), *doubts(placed.case)] == []
+    assert [*position_warnings(placed), *plausibility_warnings(placed.case)] == []
     rim, x = contact_rim(placed), placed.pair.punch.x
     if rim is not None:
         width = rim.hertzian(placed.normal_force)

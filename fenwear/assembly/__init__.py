@@ -34,7 +34,7 @@ from fenwear.assembly.tribosystem import (
     with_reduced_heat,
 )
 from fenwear.assembly.variants import assemble, in_parts, place_case, renewed, set_up_by, vary, with_case
-from fenwear.assembly.warmed import outwarmed, property_change, taken_at, warmed_system, warming_key
+from fenwear.assembly.warmed import properties_outdated, property_change, taken_at, warmed_system, warming_key
 from fenwear.assembly.ways import settle
 
 __all__ = [
@@ -62,11 +62,11 @@ __all__ = [
     "law_named",
     "make_sliding",
     "needs_of",
-    "outwarmed",
     "place",
     "place_at_rest",
     "place_case",
     "preparation",
+    "properties_outdated",
     "property_change",
     "register_contact_law",
     "renewed",

@@ -26,7 +26,7 @@ from fenwear.heat.field import HeatState
 ELASTIC = frozenset(("young", "expansion"))
 
 
-def outwarmed(system: Tribosystem, state: HeatState | None) -> bool:
+def properties_outdated(system: Tribosystem, state: HeatState | None) -> bool:
     """Return whether a property has changed by more than the case's tolerance since it was taken; collective.
 
     Args:

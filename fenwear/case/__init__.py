@@ -6,7 +6,7 @@ from fenwear.case.dependence import register_law
 from fenwear.case.laws import Contact, Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
-from fenwear.case.plausible import doubts
+from fenwear.case.plausible import plausibility_warnings
 from fenwear.case.quantities import Kind
 from fenwear.case.reading import builtin_cases, changed_case, load_case, make_case
 from fenwear.case.schema import Case
@@ -45,8 +45,8 @@ __all__ = [
     "WearLaw",
     "builtin_cases",
     "changed_case",
-    "doubts",
     "load_case",
     "make_case",
+    "plausibility_warnings",
     "register_law",
 ]

@@ -72,7 +72,7 @@ RANGES = (
 TEMPERATURES = ("heat.initial", "heat.ambient", "*.temperatures.*.temperature")
 
 
-def doubts(case: Case) -> list[str]:
+def plausibility_warnings(case: Case) -> list[str]:
     """Return what is to be said of the values of a case, each with its key."""
     values = dict(_leaves(case, ""))
     far = dict(_out_of_range(case, values))

@@ -10,7 +10,7 @@ import typer
 from mpi4py import MPI
 
 import fenwear
-from fenwear.case import Case, doubts
+from fenwear.case import Case, plausibility_warnings
 from fenwear.cli import suggestions
 from fenwear.cli.base import (
     DEFAULT_CASE,
@@ -116,7 +116,12 @@ def check_command(
 
     number = stability_number(system)
     system.check_touching()
-    warnings = [*position_warnings(system), *system.bodies.remarks, *doubts(loaded), *initial_warnings(system)]
+    warnings = [
+        *position_warnings(system),
+        *system.bodies.remarks,
+        *plausibility_warnings(loaded),
+        *initial_warnings(system),
+    ]
     warm = with_reduced_heat(system, keep=True)
     warnings += [*heat_warnings(heat_gain(warm)), *fineness_warnings(warm)]
     for warning in warnings:
@@ -150,7 +155,7 @@ def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: boo
 
     system = system or assemble(case)
     text = check_text(case, system)
-    for warning in doubts(case):
+    for warning in plausibility_warnings(case):
         log(f"warning: {warning}")
     print_case(case)
     log(text)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from fenwear.case import Case, doubts
+from fenwear.case import Case, plausibility_warnings
 from fenwear.case.program import held_at
 from fenwear.cli.base import CaseArgument, FreshOption, JsonOption, SetOption, app, load, log, print_json, show
 from fenwear.errors import CaseError, InputError
@@ -64,7 +64,7 @@ def steady_command(
     gain = heat_gain(with_reduced_heat(found), state.phase_pressure)
     warnings = [
         *system.bodies.remarks,
-        *doubts(loaded),
+        *plausibility_warnings(loaded),
         *steady_warnings(found, state),
         *heat_warnings(gain),
         *fineness_warnings(system),

@@ -23,10 +23,10 @@ from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
-from fenwear.contact.by_runs import SpreadPhases
 from fenwear.contact.gridded import GriddedPhases
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator, Phases, Solve
+from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread import OwnRows, SpreadBlock, SpreadCompliance
 from fenwear.contact.spread_nodes import SpreadNodes
 from fenwear.errors import ConvergenceError

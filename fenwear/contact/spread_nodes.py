@@ -1,7 +1,7 @@
 """Phases of so many nodes in contact that no matrix of them is made, with what all of them wear.
 
 With the common depth omega as an unknown beside the pressures, omega - sum of D_k p_k = 0, they are what
-`fenwear.contact.by_runs` solves.
+`fenwear.contact.row_blocks` solves.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from scipy.sparse import csr_array, diags_array
 
 from fenwear.arrays import Array
 from fenwear.contact.blocks import ManyNodes, PhaseBlock
-from fenwear.contact.by_runs import ByRuns, Meeting, SpreadPhases
 from fenwear.contact.operators import Indices, Solve
+from fenwear.contact.row_blocks import Meeting, RowBlocks, SpreadPhases
 from fenwear.memory import free_memory
 
 FEW = 2000  # nodes in contact up to which each phase is eliminated by itself
@@ -70,7 +70,7 @@ class SpreadNodes(ManyNodes):
         if touching.sum(axis=1).max() <= FEW:
             return super().factor(kept)
         nodes, place = touching.any(axis=0), kept % size
-        found = ByRuns(self._phases, self._meeting(), np.vstack([touching, nodes]), self._count)
+        found = RowBlocks(self._phases, self._meeting(), np.vstack([touching, nodes]), self._count)
         pressures, last = place < n, len(kept) + int(nodes.sum())
         here = np.empty(len(kept), dtype=np.int64)  # of each unknown, among pressures, depths and rigid motions
         here[pressures] = np.arange(int(pressures.sum()))

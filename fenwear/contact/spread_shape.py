@@ -1,6 +1,6 @@
 """The linear system of the cyclic steady state of so many nodes that no matrix of them is made.
 
-As `fenwear.contact.worn_shape` has it; solved by `fenwear.contact.by_runs`, rank 0 leading.
+As `fenwear.contact.worn_shape` has it; solved by `fenwear.contact.row_blocks`, rank 0 leading.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
-from fenwear.contact.by_runs import ByRuns, Meeting, SpreadPhases
 from fenwear.contact.operators import Indices, Solve
+from fenwear.contact.row_blocks import Meeting, RowBlocks, SpreadPhases
 from fenwear.contact.worn_shape import ShapeRows
 
 
@@ -81,7 +81,7 @@ class WornOperator:
         m, n, _ = self.equations.shape
         free = np.zeros(self.equations.size, dtype=bool)
         free[kept] = True
-        found = ByRuns(self.equations.phases, self.meeting, free[: (m + 1) * n].reshape(m + 1, n), self._count)
+        found = RowBlocks(self.equations.phases, self.meeting, free[: (m + 1) * n].reshape(m + 1, n), self._count)
         return found.solve
 
     def _count(self, iterations: int) -> None:

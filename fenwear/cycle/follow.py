@@ -21,7 +21,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, outwarmed, renewed, warmed_system, warming_key
+from fenwear.assembly import Tribosystem, properties_outdated, renewed, warmed_system, warming_key
 from fenwear.bodies.assembly import interpolate
 from fenwear.cycle.block import Block
 from fenwear.cycle.state import RunState
@@ -92,7 +92,7 @@ class _Leaving:
 
 def _is_warm(system: Tribosystem, state: RunState) -> bool:
     """Return whether a whole cycle ends at temperatures for which the properties are to be taken anew; collective."""
-    return state.half_cycle % system.motion.half_cycles == 0 and outwarmed(system, state.temperature)
+    return state.half_cycle % system.motion.half_cycles == 0 and properties_outdated(system, state.temperature)
 
 
 def _carried(state: HeatState | None, moved: Tribosystem) -> HeatState | None:

@@ -10,9 +10,9 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
-from fenwear.contact.by_runs import SpreadPhases
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator
+from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import CaseError, ConvergenceError, InputError

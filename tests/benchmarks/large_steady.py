@@ -30,7 +30,7 @@ from scipy.sparse import csr_array, diags_array
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.contact import by_runs
+from fenwear.contact import row_blocks
 from fenwear.cycle import steady_inequality
 from fenwear.cycle.steady_inequality import SteadyInequality
 from fenwear.interface import Interface, RigidEquilibrium
@@ -98,8 +98,8 @@ def row(side: int, way: str) -> None:
     """Solve and print the row of the table, and the pressures."""
     steady_inequality.LARGE = side * side + 1 if way == "dense" else 0
     iterations: list[int] = []
-    solution = by_runs.gmres_solution
-    by_runs.gmres_solution = lambda *a: solution(*a[:3], lambda i: (iterations.append(i), a[3](i))[1], *a[4:])
+    solution = row_blocks.gmres_solution
+    row_blocks.gmres_solution = lambda *a: solution(*a[:3], lambda i: (iterations.append(i), a[3](i))[1], *a[4:])
     made = system(side)
     _ = made.interface.elastic_length
     begin = time.process_time()

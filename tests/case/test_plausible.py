@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fenwear.case import builtin_cases, doubts, load_case, make_case
+from fenwear.case import builtin_cases, load_case, make_case, plausibility_warnings
 from fenwear.case.plausible import RANGES
 
 TABLE = "contact.friction={table = [[%s, 0.2], [%s, 0.3]]}"
@@ -13,7 +13,7 @@ TABLE = "contact.friction={table = [[%s, 0.2], [%s, 0.3]]}"
 @pytest.mark.parametrize("name", builtin_cases())
 def test_builtin_cases_are_beyond_doubt(name: str) -> None:
     """Nothing is said of them."""
-    assert doubts(load_case(name)) == []
+    assert plausibility_warnings(load_case(name)) == []
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,9 @@ def test_builtin_cases_are_beyond_doubt(name: str) -> None:
 def test_doubts(settings: list[str], key: str, expected: str) -> None:
     """Told with the key and what is usual; the case is valid all the same."""
     said = [
-        text.removeprefix(f"{key}: ") for text in doubts(load_case("example1-heat", settings)) if f"{key}: " in text
+        text.removeprefix(f"{key}: ")
+        for text in plausibility_warnings(load_case("example1-heat", settings))
+        if f"{key}: " in text
     ]
     assert len(said) == 1
     assert any(part in said[0] for part in expected.split("|"))
@@ -63,16 +65,16 @@ def test_doubts(settings: list[str], key: str, expected: str) -> None:
 )
 def test_no_doubts(settings: list[str]) -> None:
     """What may well be meant."""
-    assert doubts(load_case("example1-heat", settings)) == []
+    assert plausibility_warnings(load_case("example1-heat", settings)) == []
 
 
 def test_how_a_case_was_written_is_no_part_of_it() -> None:
     """The same values in other words make the same case."""
     one, other = (load_case("example1", [f"motion.amplitude={text}"]) for text in ("2", "'0.2 cm'"))
     assert one == other
-    assert (len(doubts(one)), len(doubts(other))) == (1, 0)
+    assert (len(plausibility_warnings(one)), len(plausibility_warnings(other))) == (1, 0)
     assert one.at(None).written.bare == {"motion.amplitude"}
-    assert doubts(make_case(one.resolved())) == []
+    assert plausibility_warnings(make_case(one.resolved())) == []
 
 
 def test_every_range_is_one() -> None:

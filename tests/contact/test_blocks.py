@@ -120,7 +120,7 @@ def test_runs_are_the_same(
     monkeypatch.setattr("fenwear.contact.phase_rows.RUN", 30)
     for fails in (False, True) if settings == OPENING else (False,):
         if fails:
-            monkeypatch.setattr("fenwear.contact.by_runs.gmres_solution", _failing)
+            monkeypatch.setattr("fenwear.contact.row_blocks.gmres_solution", _failing)
         *_, last = jump(system, 4000, tolerance=1e-2)
         np.testing.assert_allclose(last.pressure[-2:], usual[2], rtol=0, atol=1e-9 * usual[2].mean())
 

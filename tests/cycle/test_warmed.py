@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from fenwear import Case, Tribosystem, assemble, jump, make_case, march, read_history, run_case, steady
-from fenwear.assembly import outwarmed, taken_at, warmed_system
+from fenwear.assembly import properties_outdated, taken_at, warmed_system
 from fenwear.cycle import Block, Steady, evolve, follow, monotonic
 from fenwear.cycle.state import RunState, beginning
 from fenwear.errors import CaseError, ConvergenceError
@@ -216,9 +216,9 @@ def test_uniform_warmth_is_other_constants(edited: Edited) -> None:
     other = assemble(edited("example1-heat", constant, *SMALL))
     assert cold.bodies.heat is not None
     at = HeatState.nodal(cold.bodies.heat, [np.full(body.owned, 60.0) for body in cold.bodies.heat])
-    assert outwarmed(cold, at)
+    assert properties_outdated(cold, at)
     hot = warmed_system(cold, at)
-    assert not outwarmed(hot, at)
+    assert not properties_outdated(hot, at)
     assert hot.bodies.punch is not cold.bodies.punch
     assert np.array_equal(taken_at(hot)[0], np.full(cold.bodies.heat[0].owned, 60.0))
     for own, its in zip(hot.condensed.punch.arrays().values(), other.condensed.punch.arrays().values(), strict=True):

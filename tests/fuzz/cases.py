@@ -35,7 +35,7 @@ from pool import Verdict, verdicts
 
 from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
 from fenwear.bodies.mesh import write_msh
-from fenwear.case import doubts
+from fenwear.case import plausibility_warnings
 from fenwear.cycle import Block, follow
 from fenwear.errors import FenwearError, MeshQualityError
 
@@ -257,7 +257,7 @@ def compute(case: Case) -> None:
     """
     if make_case(tomllib.loads(case.to_toml()), case.folder).resolved() != case.resolved():
         raise NoResultError("the resolved case reads back as another one")
-    for text in doubts(case):
+    for text in plausibility_warnings(case):
         if PYTHON.search(own_words(text)):
             raise NoResultError(f"a warning speaks Python: {text}")
     last = min(case.run.half_cycles, 2)

@@ -85,7 +85,7 @@ class Meeting:
     balance: Array
 
 
-class ByRuns:
+class RowBlocks:
     """The solution operator of the free unknowns.
 
     Args:

@@ -13,8 +13,8 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.contact import phase_rows
-from fenwear.contact.by_runs import SpreadPhases
 from fenwear.contact.phase_rows import SomeNodes
+from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.interface import Interface

@@ -8,6 +8,7 @@ those of `contact_law.ContactLaw`.
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -21,7 +22,12 @@ LAWS: dict[str, Any] = {GROSS: "fenwear.cycle.gross_sliding", "coulomb": "fenwea
 def law_named(name: str) -> Any:
     """Return a law of contact, a `ContactLaw`, by its name in cases; what a case leaves open slides as a whole."""
     found = LAWS[GROSS if name == AUTO else name]
-    return import_module(found).LAW if isinstance(found, str) else found
+    return _own(found) if isinstance(found, str) else found
+
+
+@cache
+def _own(module: str) -> Any:
+    return import_module(module).LAW
 
 
 def register_contact_law(name: str, law: Any) -> None:

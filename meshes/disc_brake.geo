@@ -1,4 +1,4 @@
-// Two pads on both faces of a whole disc, as in a caliper. Structured hexahedra.
+// Two pads on both faces of a whole disc, as in a caliper, or both on its front. Structured hexahedra.
 //
 // Lengths in mm, angles in degrees; the disc turns about z, its upper (front) face is z = 0, the pads' middles lie on x.
 // Physical groups: every name starts with the body it belongs to, punch_ (the pads) or strip_ (the disc).
@@ -8,6 +8,7 @@ DefineConstant[
   outer_radius = 100,
   front_angle = 50,       // of each pad, below 180
   back_angle = 50,
+  same_face = 0,          // 1: the second pad lies on the front, too, opposite the first; it keeps its name
   pad_height = 10,
   disc_height = 20,
   bore_radius = 35,       // of the disc, where its hub holds it
@@ -29,6 +30,9 @@ EndIf
 If(front_angle <= 0 || front_angle >= 180 || back_angle <= 0 || back_angle >= 180)
   Error("front_angle and back_angle must lie between 0 and 180");
 EndIf
+If(same_face && front_angle + back_angle >= 340)
+  Error("on the same face front_angle and back_angle must add up to less than 340");
+EndIf
 If(across < 1 || along < 1 || around < 6 || around % 3 || hub_elements < 1 || pad_layers < 1 || disc_layers < 1)
   Error("across, along, hub_elements, pad_layers, disc_layers must be at least 1, around a multiple of 3, at least 6");
 EndIf
@@ -36,14 +40,15 @@ EndIf
 // The pads: a line along the radius, turned and lifted.
 pads[] = {};
 For k In {0 : 1}
-  angle = ((k == 0) ? front_angle : back_angle) * Pi / 180; z = (k == 0) ? 0 : -disc_height;
+  behind = (k == 1 && !same_face) ? 1 : 0; turn = (k == 1 && same_face) ? -1 : 1;    // -1: half a turn about z
+  angle = ((k == 0) ? front_angle : back_angle) * Pi / 180; z = behind ? -disc_height : 0;
   p = newp;
-  Point(p) = {inner_radius * Cos(angle / 2), -inner_radius * Sin(angle / 2), z};
-  Point(p + 1) = {outer_radius * Cos(angle / 2), -outer_radius * Sin(angle / 2), z};
+  Point(p) = {turn * inner_radius * Cos(angle / 2), -turn * inner_radius * Sin(angle / 2), z};
+  Point(p + 1) = {turn * outer_radius * Cos(angle / 2), -turn * outer_radius * Sin(angle / 2), z};
   l = newl; Line(l) = {p, p + 1};
   Transfinite Curve{l} = across + 1;
   face[] = Extrude {{0, 0, 1}, {0, 0, z}, angle} { Line{l}; Layers{along}; Recombine; };
-  pad[] = Extrude {0, 0, (k == 0) ? pad_height : -pad_height} { Surface{face[1]}; Layers{pad_layers}; Recombine; };
+  pad[] = Extrude {0, 0, behind ? -pad_height : pad_height} { Surface{face[1]}; Layers{pad_layers}; Recombine; };
   pads[] += pad[1]; rubbing~{k} = face[1]; plate~{k} = pad[0];
   ends~{k}[] = {pad[2], pad[4]}; sides~{k}[] = {pad[3], pad[5]};
 EndFor
@@ -90,6 +95,10 @@ Physical Surface("punch_sides") = {sides_0[], sides_1[]};
 Physical Surface("punch_ends") = {ends_0[], ends_1[]};
 Physical Volume("strip_disc") = disc[];
 Physical Surface("strip_contact_front") = front[];
-Physical Surface("strip_contact_back") = back[];
+If(same_face)
+  Physical Surface("strip_back") = back[];
+Else
+  Physical Surface("strip_contact_back") = back[];
+EndIf
 Physical Surface("strip_bore") = bore[];
 Physical Surface("strip_rim") = round[];

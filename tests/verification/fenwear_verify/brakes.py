@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import steady
@@ -79,3 +80,68 @@ def drum_brake() -> Result:
 def _turning(arm: Array, force: Array) -> float:
     """Return the moment of forces (n, 2), N, at arms (n, 2), mm, that turns counterclockwise with z up, N m."""
     return 1e-3 * float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())
+
+
+PADS = {"front": (60.0, 5000.0), "back": (30.0, 2000.0)}  # angle, degrees, and load, N
+INNER, OUTER, SPEED = 60.0, 100.0, 10.0  # mm; rad/s
+PAD, DISC = 1e-8, 1e-9  # wear coefficients, 1/MPa
+
+
+def pads(across: int) -> Tribosystem:
+    """Return two pads that wear on the same face of a disc; collective."""
+    return builtin(
+        "disc-brake-two-pads",
+        "geometry.parameters.same_face=1",
+        f"geometry.parameters.across={across}",
+        f"geometry.parameters.along={2 * across}",
+        f"geometry.parameters.around={12 * across}",
+        *(f"geometry.parameters.{name}_angle={angle}" for name, (angle, _) in PADS.items()),
+        *(f"punch.loads.{k}.force=[0, 0, {-load}]" for k, (_, load) in enumerate(PADS.values())),
+        f"wear.punch={{coefficient={PAD}}}",
+    )
+
+
+@verification(
+    "two-pads",
+    "Two pads on one disc, all worn in: pressure and how fast pads and disc recede; what couples them",
+    "p r uniform in each pad; rates 1.1936621e-5, 9.5492966e-6 and 2.7852115e-7 mm/s; Maxwell and Betti",
+)
+def two_pads() -> Result:
+    """60 degrees with 5,000 N and 30 with 2,000 N, r 60..100, tilt locked; the disc wears under both."""
+    rows: list[Row] = []
+    rates, errors = {"front": 1.1936621e-5, "back": 9.5492966e-6, "disc": 2.7852115e-7}, []
+    for across in (2, 4):
+        system, worst = pads(across), 0.0
+        worn_in = vary(system, f"wear.strip={{coefficient={DISC}}}")
+        surface, weights = system.pair.punch, system.pair.weights
+        alone, best = system.optimum(1), worn_in.optimum(1)
+        radius = np.hypot(*surface.x[:, :2].T)
+        track = np.hypot(*worn_in.pair.strip.x[:, :2].T)
+        disc = worn_in.phases_wear.worn(best.pressure[None]).strip / (2 * np.pi / SPEED)  # in a turn
+        inside = np.abs(track - (INNER + OUTER) / 2) < 0.3 * (OUTER - INNER)
+        what = f"disc, {across} elements across: recedes (mm/s)"
+        rows.append(profile(what, np.full(inside.sum(), rates["disc"]), disc[inside], 1e-2, scale=rates["disc"]))
+        for name, (angle, load) in PADS.items():
+            own, what = surface.nodes_of(name), f"{name} pad, {across} elements across"
+            exact, approach = load / (np.radians(angle) * (OUTER - INNER) * radius[own]), f"lambda_F_{name}"
+            worst = max(worst, float(np.abs(alone.pressure[own] / exact - 1).max()))
+            both = rates[name] + rates["disc"]
+            rows += [
+                profile(f"{what}: pressure (MPa)", exact, best.pressure[own], 5e-3, scale=exact),
+                number(f"{what}: load (N)", load, weights[own] @ best.pressure[own], 1e-9),
+                number(f"{what}: approach, the disc unworn (mm/s)", rates[name], alone.velocity[approach], 1e-3),
+                number(f"{what}: approach (mm/s)", both, best.velocity[approach], 1e-3),
+            ]
+        errors.append(worst)
+        if across == 2:
+            by_force = system.interface.compliance(0.0).matrix() / weights
+            front, back = (surface.nodes_of(name) for name in PADS)
+            through = by_force[np.ix_(front, back)]
+            scale = float(np.abs(through).max())
+            there, unfelt = by_force[np.ix_(back, front)].T, scale < 1e-6 * by_force[front].max()
+            rows += [
+                profile("disc: gap of each pad by forces on the other, both ways", there, through, 1e-9, scale=scale),
+                number("disc: pads that do not feel each other", 0, unfelt, 0, scale=1),
+            ]
+    rows.append(order("order of the pressure's largest error, the disc unworn", 2, errors, 1))
+    return Result(rows)

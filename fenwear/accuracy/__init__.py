@@ -18,9 +18,10 @@ and r = H / h, the ratio of the distances of their nodes (P. J. Roache, J. Fluid
 
     u = 1.25 d / (r^q - 1),    d = |phi_h - phi_H| or, if that is more, what their fields differ by (`Value.apart`).
 
-Contact limits the order: quadratic elements and better have q = 3/2 where the edges of contact are free (Z. Belhachmi,
-F. Ben Belgacem, Math. Comp. 72, 2003). A largest value at an edge, where the limit is a singularity or a step that wear
-has left, is taken to approach it with q = 1 only. What the coarser run cannot see, errors of the model, of the
+Contact limits the order: displacements of quadratic elements and better have q = 3/2 where the edges of contact are
+free (Z. Belhachmi, F. Ben Belgacem, Math. Comp. 72, 2003), pressures, whose slope there is infinite, q = 1 whatever the
+degree. So depths, volumes and temperatures are taken to have 3/2; pressures, and what is largest at an edge, where the
+limit may be a singularity or a step that wear has left, 1. What the coarser run cannot see, errors of the model, of the
 friction and wear coefficients, is no part of it.
 """
 

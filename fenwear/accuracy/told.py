@@ -19,7 +19,7 @@ from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
 
 SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence indices
-ORDER, AT_EDGES = 1.5, 1.0
+ORDER, OF_PRESSURE = 1.5, 1.0  # of what is integrated, and of pressures and what lies at an edge
 LARGER = 8.0  # by which the tolerance of jumps is raised: as they are of second order, their error by 4
 ROUNDING = 1e-12
 
@@ -90,7 +90,7 @@ def of_mesh(values: Values, coarse: Values, degree: int) -> Contribution:
     """Return what is left to the limit of small elements, from the same numbers on elements of a degree less."""
     ratio = degree / (degree - 1)
     return {
-        quantity: SAFETY * value.apart(coarse[quantity]) / (ratio ** order_of(value) - 1)
+        quantity: SAFETY * value.apart(coarse[quantity]) / (ratio ** order_of(quantity, value) - 1)
         for quantity, value in values.items()
         if quantity in coarse
     }
@@ -101,9 +101,9 @@ def fineness_of(case: Case) -> int:
     return case.geometry.degree if case.grid is None else 2
 
 
-def order_of(value: Value) -> float:
+def order_of(quantity: Quantity, value: Value) -> float:
     """Return the order at which a number is taken to approach its limit."""
-    return AT_EDGES if value.at_edge else ORDER
+    return OF_PRESSURE if quantity.name == "pressure" or value.at_edge else ORDER
 
 
 def _steps(again: Again, before: Values, first: Block, last: Block) -> Iterator[tuple[str, Contribution]]:
@@ -180,7 +180,7 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     found = uncertainty(base, last, watch)
     if below is not None and "mesh" in found.contributions:
         mesh = {
-            quantity: own * ((degree - 1) / degree) ** order_of(found.values[quantity])
+            quantity: own * ((degree - 1) / degree) ** order_of(quantity, found.values[quantity])
             for quantity, own in found.contributions["mesh"].items()
         }
         found = replace(found, contributions={**found.contributions, "mesh": mesh})

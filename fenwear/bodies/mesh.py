@@ -171,7 +171,7 @@ def build_meshes(
     on_root(comm, check)
     owned = owners or (None, None)
     if comm.rank == 0:
-        with _gmsh() as gmsh:
+        with gmsh_model() as gmsh:
             on_root(comm, lambda: _load(gmsh, geometry, find_geometry(geometry, folder), kind, known, names))
             punch, strip = (_distribute(gmsh, *one, comm, kind) for one in zip(BODIES, owned, strict=True))
     else:
@@ -198,7 +198,7 @@ def write_msh(
         CaseError: as `build_meshes`; or `path` cannot be written.
         OutputError: there is no room for it.
     """
-    with _gmsh() as gmsh:
+    with gmsh_model() as gmsh:
         _load(gmsh, geometry, find_geometry(geometry, folder), kind, known, names)
         _name_groups(gmsh, names.by_name)
         try:
@@ -223,7 +223,7 @@ def _library() -> Any:
 
 
 @contextmanager
-def _gmsh() -> Iterator[Any]:
+def gmsh_model() -> Iterator[Any]:
     """Open gmsh quietly, and close it unless someone else had opened it."""
     gmsh = _library()
     was_open = gmsh.isInitialized()

@@ -209,3 +209,32 @@ def mesh_command(
     meshed = (loaded.geometry, loaded.folder, output, loaded.model.law, loaded.diffusion, loaded.names)
     on_root(MPI.COMM_WORLD, lambda: write_msh(*meshed))
     log(f"mesh in {output}")
+
+
+@app.command("import")
+def import_command(
+    source: Annotated[Path, typer.Argument(metavar="MESH", help="Of Abaqus (.inp) or another that meshio reads.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="The .msh file to write.")],
+    groups: Annotated[
+        list[str],
+        typer.Option("--group", metavar="GROUP=SET", help="Such as punch_contact=PAD_LOW; may be repeated."),
+    ] = [],  # noqa: B006
+    unit: Annotated[str, typer.Option(help="Of the mesh's lengths, such as m.")] = "mm",
+) -> None:
+    """Write a mesh of another program with its named sets as a .msh file for geometry.file."""
+    from fenwear.bodies.imported import import_mesh
+    from fenwear.case.units import convert
+
+    if output.suffix != ".msh":
+        raise CaseError(InputError("-o", f"expected a file ending in .msh, got {str(output)!r}"))
+    pairs = [text.partition("=") for text in groups]
+    wrong = next((text for text, (name, _, of) in zip(groups, pairs, strict=True) if not (name and of)), None)
+    if wrong is not None:
+        raise CaseError(InputError("--group", f"expected GROUP=SET, got {wrong!r}"))
+    try:
+        scale = convert(f"1 {unit}", "mm")
+    except ValueError as error:
+        raise CaseError(InputError("--unit", str(error))) from None
+    named = {name.strip(): of.strip() for name, _, of in pairs}
+    found = on_root(MPI.COMM_WORLD, lambda: import_mesh(source, output, named, scale))
+    log(f"{found.text()}\nmesh in {output}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray
 
+from fenwear.case.names import Names, renamed
 from fenwear.report.boundary import boundary_figure
 from fenwear.report.captions import caption
 from fenwear.report.figures import FOLDER, all_figures, read_history
@@ -32,7 +33,8 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDAR
     if not files:
         return {}
     with xarray.open_dataset(files[-1], engine="h5netcdf") as fields:
-        drawn = {"geometry": geometry_figure(fields, case, look)}
+        own = renamed(case, Names.of(case).by_role)  # fields have the groups so
+        drawn = {"geometry": geometry_figure(fields, own, look)}
         if "punch_stress_xx" in fields:
             drawn["surface_stress"] = stress_figure(fields, look)
         if "punch_temperature" in fields:

@@ -16,6 +16,8 @@ from fenwear.case import Case, changed_case, load_case
 from fenwear.case.names import Names
 from fenwear.errors import CaseError
 from fenwear.life.quantities import parse_quantity
+from fenwear.report.draw import field_figures
+from fenwear.report.key_numbers import read_case
 from fenwear.report.page import page
 from fenwear.results.sheet import sheet_text
 from fenwear.run import run_case
@@ -60,7 +62,7 @@ def test_the_case_says_its_groups_by_name(tmp_path: Path) -> None:
 def test_names_change_no_number_and_all_that_is_told(tmp_path: Path) -> None:
     said: list[str] = []
     short = load_case("example1-heat", ["output.report=false", *SMALL])
-    one, _ = run_case(short, output=tmp_path / "short", log=said.append, progress="none")
+    one, first = run_case(short, output=tmp_path / "short", log=said.append, progress="none")
     told: list[str] = []
     two, second = run_case(load_case(named(tmp_path)), output=tmp_path / "own", log=told.append, progress="none")
     for key in ("punch", "strip", "sliding", "heat_mJ"):
@@ -75,6 +77,9 @@ def test_names_change_no_number_and_all_that_is_told(tmp_path: Path) -> None:
     head = sheet_text(two).splitlines()
     assert any(re.search(r" pad +disc", line) for line in head)
     assert not any(re.search(r"\b(punch|strip)\b", line) for line in head)
+    drawn = [field_figures(folder, read_case(folder))["geometry"] for folder in (first, second)]
+    count = [sum(len(ax.lines) + len(ax.collections) for ax in figure.axes) for figure in drawn]
+    assert count[0] == count[1]
     seen = re.sub(r"<pre.*?</pre>|data-[\w-]+=\"[^\"]*\"", "", page(second), flags=re.DOTALL)
     assert "pad" in seen
     assert re.findall(r"(?<![\w.\[])(?:punch|strip)(?![\w.\]])", seen, flags=re.IGNORECASE) == []

@@ -28,10 +28,11 @@ def sliding_tensor(placed: Placed, pressure: Array | None = None) -> SlidingTens
 def sliding_tensor_of_strip(placed: Placed, pressure: Array | None = None) -> SlidingTensor:
     """Return the same at the strip's contact nodes, of its own material that moves under the punch."""
     weights = placed.path if pressure is None else placed.path * pressure
-    values = np.zeros((len(placed.pair.strip.weights), 9))
-    for own, along, facing in zip(weights, placed.sliding_directions, placed.pairs, strict=True):
-        back = facing.material_place.back(along)
-        values += facing.wear_projection @ (own[:, None, None] * back[:, :, None] * back[:, None, :]).reshape(-1, 9)
+    directions, values = placed.sliding_directions, np.zeros((len(placed.pair.strip.weights), 9))
+    for k, facing in enumerate(placed.pairs):
+        back = facing.material_place.back(directions[k])
+        squares = weights[k][:, None, None] * back[:, :, None] * back[:, None, :]
+        values += facing.wear_projection @ squares.reshape(-1, 9)
     return SlidingTensor(values.reshape(-1, 3, 3))
 
 

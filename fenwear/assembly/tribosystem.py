@@ -313,7 +313,7 @@ def _under_all(condensed: Condensed, placed: Placed) -> dict[int, Condensed]:
     for own, bodies in zip(shares.T[1:], others, strict=True):
         if isinstance(condensed.punch, CondensedBody) and isinstance(condensed.strip, CondensedBody):
             on_punch, on_strip = (
-                np.tensordot(own, [body.by_load for body in bodies_of], 1)
+                np.asarray(np.tensordot(own, [body.by_load for body in bodies_of], 1), dtype=np.float64)
                 for bodies_of in ([one.punch for one in base], [one.strip for one in base])
             )
             found[id(bodies)] = replace(
@@ -338,7 +338,8 @@ def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
     """
     left = loads.copy()
     sizes = np.sqrt(comm.allreduce(np.einsum("ko,ko->k", left, left)))
-    scale, chosen, parts = sizes.max(initial=0.0), [], []
+    chosen: list[int] = []
+    scale, parts = sizes.max(initial=0.0), []
     while len(chosen) < len(loads):
         best = 0 if not chosen and sizes[0] > SAME * scale else int(np.argmax(sizes))
         if chosen and sizes[best] <= SAME * scale:

@@ -80,7 +80,8 @@ class HalfCycles:
 
     def _whole(self, state: RunState, phases: range, load: float) -> list[PhaseEnd]:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""
-        worn, temperature, ends = state.worn, state.temperature, []
+        worn, temperature = state.worn, state.temperature
+        ends: list[PhaseEnd] = []
         cycle = known_pressures(state.contacts)
         for number, phase in enumerate(phases):
             if number:

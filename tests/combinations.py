@@ -75,6 +75,14 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         "fretting-partial-slip",
         (*SMALL, "wear.strip.coefficient='1e-7 1/MPa'", "motion.positions=3"),
     ),
+    "what lies between": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "contact.third_body={share=0.6, life='0.3 mm'}",
+            "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
+        ),
+    ),
     "in rings": (
         "ring-on-ring",
         ("geometry.parameters.across=4", "geometry.degree=2", "run.half_cycles=4", "run.integration='explicit'",

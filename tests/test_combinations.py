@@ -25,6 +25,7 @@ from fenwear.life import (
     parse_scatter,
     sensitivity,
 )
+from fenwear.results import between
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
@@ -46,6 +47,8 @@ def check(block: Block) -> None:
         volume = system.bodies.punch.thickness * float(system.pair.weights @ block.end.worn.punch)
         followed = 1e-3 if system.bodies.followed is not None else 1e-9
         assert float(block.totals.of("volume_punch")[-1]) == pytest.approx(volume, rel=followed)
+    if system.layers.debris is not None:
+        assert between.values(block)["debris_balance_error"].max() < 1e-12
     if block.heat is not None:
         assert block.heat.balance_error.max() < 1e-8
 
@@ -100,7 +103,7 @@ def resumed(feature: str, law: str, folder: Path) -> None:
     run("parts", 4, resume=True)
     one, other = (load_history(folder / name) for name in ("whole", "parts"))
     assert one.sizes == other.sizes
-    for name in ("pressure", "wear", "friction_work", "normal_force", "max_temperature"):
+    for name in ("pressure", "wear", "friction_work", "normal_force", "max_temperature", "debris_thickness"):
         if name in one:
             scale = np.abs(one[name].values).max()
             assert np.abs(one[name].values - other[name].values).max() <= 1e-9 * scale, name

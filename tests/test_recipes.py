@@ -11,7 +11,7 @@ import pytest
 
 from fenwear import CaseError, assemble, load_case, make_case, march, register_contact_law, steady
 from fenwear.assembly import laws, place_case
-from fenwear.case.laws import CONTACT_LAWS
+from fenwear.case.contact import CONTACT_LAWS
 from fenwear.cycle.gross_sliding import GrossSliding
 from fenwear.interface import patches
 from fenwear.interface.patches import CHARTS, Side

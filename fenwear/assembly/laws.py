@@ -12,7 +12,7 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from fenwear.case.laws import CONTACT_LAWS
+from fenwear.case.contact import CONTACT_LAWS
 from fenwear.errors import CaseError, InputError
 
 GROSS, AUTO = "gross-sliding", "auto"

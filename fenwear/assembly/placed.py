@@ -30,6 +30,7 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import HERE, in_model, in_space
+from fenwear.layers import Layers, Passing, common_modulus, layers_of
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
@@ -210,6 +211,27 @@ class Placed:
             slid.append(self.motion.sliding(exponent)[:, None] * self.slid**exponent)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction)
 
+    @cached_property
+    def layers(self) -> Layers:
+        """What lies between the surfaces.
+
+        Raises:
+            CaseError: a value of it is not positive somewhere, or the modulus of rough surfaces is missing.
+        """
+        case = self.made_from
+        modulus = None if case is None else common_modulus(case, *self.bodies.regions)
+        return layers_of(self.friction.contact, self.pair, modulus)
+
+    def passing(self, wear: PhasesWear, phases: Sequence[int] | None = None) -> Passing:
+        """Return what phases of the motion, by default all, wear and do to what lies between.
+
+        Args:
+            wear: Of these phases.
+            phases: Their numbers.
+        """
+        chosen = list(range(len(self.motion.phases)) if phases is None else phases)
+        return Passing.over(self.layers, wear, self.path[chosen])
+
     @property
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
@@ -246,16 +268,17 @@ class Placed:
 
     def gap(self, phase: int, worn: Worn) -> Array:
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm."""
-        pair = self.pairs[phase]
+        pair, between = self.pairs[phase], self.layers.opening(worn.between)
         if self.bodies.moved is not None:
             worn = worn - self.bodies.moved
         elif not self.strip_wears:
-            return pair.initial_gap + worn.punch
-        return pair.initial_gap + pair.opening(worn.punch, worn.strip)
+            return pair.initial_gap + worn.punch + between
+        return pair.initial_gap + pair.opening(worn.punch, worn.strip) + between
 
     def unworn(self) -> Worn:
-        """Return the worn depths at the start: none."""
-        return Worn(np.zeros(len(self.pair.punch.weights)), np.zeros(len(self.pair.strip.weights)))
+        """Return the worn depths at the start, none, and what lies between then."""
+        punch, strip = (np.zeros(len(surface.weights)) for surface in (self.pair.punch, self.pair.strip))
+        return Worn(punch, strip, self.layers.beginning())
 
     def outworn(self, worn: Worn) -> bool:
         """Return whether the wear since the meshes were moved is large against the elements at the contact."""

@@ -62,12 +62,12 @@ class Condensed:
     rows: Rows | None = None
     passed: Array | None = None
 
-    def join(self, rigid: RigidEquilibrium) -> Interface:
-        """Return both joined at the place of a pair; collective where ranks share the rows."""
+    def join(self, rigid: RigidEquilibrium, layer: Array | None = None) -> Interface:
+        """Return both joined at the place of a pair, with a linear layer; collective where ranks share the rows."""
         pair, strip, moves = rigid.pair, self.strip, self.strip_moves
         if moves and pair.punch.grid is not None and isinstance(strip, Relocatable):
             strip, moves = strip.at(pair.placement.points_back(pair.punch.x)), False
-        return join(rigid, self.punch, strip, strip_moves=moves, rows=self.rows)
+        return join(rigid, self.punch, strip, strip_moves=moves, rows=self.rows, layer=layer)
 
     def under_loads(self, bodies: Bodies) -> Condensed:
         """Return the same under the loads of these bodies; collective."""
@@ -281,7 +281,7 @@ def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np
 
 def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
-    interface = condensed.join(placed.rigid)
+    interface = condensed.join(placed.rigid, placed.layers.winkler)
     under = _under_all(condensed, placed)
     found: list[Interface] = []
     for k, (rigid, bodies) in enumerate(zip(placed.rigids, placed.loaded, strict=True)):
@@ -293,7 +293,8 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
         else:
             own = under[id(bodies)]
             alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
-            found.append(interface.under(rigid, own.punch, own.strip) if alike else own.join(rigid))
+            layer = placed.layers.winkler
+            found.append(interface.under(rigid, own.punch, own.strip) if alike else own.join(rigid, layer))
     parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
     return Tribosystem(**parts, condensed=condensed, interface=interface, interfaces=tuple(found), exchange=exchange)
 

@@ -1,9 +1,10 @@
 """The validated description of a problem: one typed object, from a TOML file or from Python."""
 
 from fenwear.case.bodies import CONDENSED, Body, Geometry, Grid, Load, Model, Prescribed, Support
+from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Run
 from fenwear.case.dependence import register_law
-from fenwear.case.laws import Contact, Dependence, Stick, Wear, WearLaw
+from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.case.plausible import plausibility_warnings

@@ -1,13 +1,13 @@
-"""The tables of friction and wear: coefficients, constant or dependent on the state, and the laws they belong to."""
+"""The tables of wear and of the rig: coefficients, constant or dependent on the state, and the laws they belong to."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, WrapValidator, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from fenwear.arrays import Array
 from fenwear.case.dependence import (
@@ -23,8 +23,6 @@ from fenwear.case.dependence import (
 from fenwear.case.quantities import Force, Number, Part, Stress, Unit, quantity
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, InputError
-
-CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
 
 
 class Dependence(Part):
@@ -132,36 +130,6 @@ def constant_or_dependence(constant: Any) -> Any:
         Annotated[constant, Tag("number")] | Annotated[Dependence, Tag("dependence")],
         Discriminator(_form),
     ]
-
-
-def _own_or_registered(name: Any, own: Callable[[Any], Any]) -> Any:
-    return name if isinstance(name, str) and name in CONTACT_LAWS else own(name)
-
-
-class Contact(Part):
-    """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
-
-    law: Annotated[Literal["gross-sliding", "coulomb", "auto"], WrapValidator(_own_or_registered)] = Field(
-        default="auto",
-        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
-        "as in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically and "
-        "nothing goes against it, else gross-sliding",
-    )
-    friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
-        default=0.0, description="coefficient of friction mu"
-    )
-    transverse_friction: Number = Field(
-        default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
-    )
-    solver: Literal["condensed", "full"] = Field(
-        default="condensed", description="full: all displacements as unknowns, slow, to compare with"
-    )
-
-    @model_validator(mode="after")
-    def _pure_number(self) -> Self:
-        if isinstance(self.friction, Dependence) and self.friction.unit:
-            raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
-        return self
 
 
 class Stick(Part):

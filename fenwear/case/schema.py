@@ -15,10 +15,11 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from fenwear.case.bodies import CONDENSED, Body, CourseLoad, Geometry, Grid, Load, Model
+from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Program, Run
 from fenwear.case.cycle_table import PLACES
 from fenwear.case.diffusion import diffusion_of
-from fenwear.case.laws import Contact, Dependence, Stick, Wear
+from fenwear.case.laws import Dependence, Stick, Wear
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Rotation
 from fenwear.case.names import Names, renamed
@@ -254,6 +255,9 @@ class Case(Part):
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
+        lies = [name for name in ("third_body", "layer") if getattr(self.contact, name) is not None]
+        if self.contact.solver == "full" and lies:
+            problems.append(f"contact.solver: expected 'condensed' with contact.{lies[0]}")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
         several = not isinstance(motion, OneWay | Rotation | Cycle) and (motion.positions or 1) > 1

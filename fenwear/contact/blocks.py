@@ -172,15 +172,22 @@ class ManyNodes:
         blocks: Of each phase.
         wear: D (m, n), depth at a node by unit pressure there in each phase; None without.
         before: The same with another wear, whose preconditioners may serve.
+        layer: What unit pressure opens at its node in its own phase alone (m, n); None without.
 
     Attributes:
         near: The preconditioners, the one that is used first.
     """
 
     def __init__(
-        self, blocks: Sequence[PhaseBlock], wear: Array | None = None, before: ManyNodes | None = None
+        self,
+        blocks: Sequence[PhaseBlock],
+        wear: Array | None = None,
+        before: ManyNodes | None = None,
+        layer: Array | None = None,
     ) -> None:
-        self.blocks, self.wear = list(blocks), wear
+        if layer is not None and len(blocks) == 1:  # both are on the one diagonal
+            wear, layer = layer if wear is None else wear + layer, None
+        self.blocks, self.wear, self.layer = list(blocks), wear, layer
         self.near: list[Near] = []
         if wear is not None and len(self.blocks) > 1:
             others = sorted([] if before is None else before.near, key=lambda near: near.unlike(wear))
@@ -194,6 +201,9 @@ class ManyNodes:
         if self.wear is not None:
             n = self.wear.shape[1]
             result[:, :n] += (self.wear * parts[:, :n]).sum(axis=0)
+        if self.layer is not None:
+            n = self.layer.shape[1]
+            result[:, :n] += self.layer * parts[:, :n]
         return result.ravel()
 
     def factor(self, kept: Indices) -> Solve:
@@ -208,7 +218,10 @@ class ManyNodes:
         size = self.blocks[0].size
         cuts = np.searchsorted(kept, np.arange(len(self.blocks) + 1) * size)
         own = [kept[cuts[k] : cuts[k + 1]] - np.int32(k * size) for k in range(len(self.blocks))]
-        solves = [block.updating.factor(rows) for block, rows in zip(self.blocks, own, strict=True)]
+        factors = [
+            block.updating if self.layer is None else block.worn(self.layer[k]) for k, block in enumerate(self.blocks)
+        ]
+        solves = [updating.factor(rows) for updating, rows in zip(factors, own, strict=True)]
 
         def apart(b: Array) -> list[Array]:
             return [solve(b[cuts[k] : cuts[k + 1]]) for k, solve in enumerate(solves)]
@@ -301,4 +314,8 @@ class _Together:
         if wear is not None:
             ones = np.eye(wear.shape[1])
             border = (np.broadcast_to(ones, (len(wear), *ones.shape)), wear[:, :, None] * ones)
-        return Phases(np.array([block.matrix() for block in blocks]), None, border).factor(self._kept)(b)
+        whole = np.array([block.matrix() for block in blocks])
+        if self._phases.layer is not None:
+            nodes = np.arange(self._phases.layer.shape[1])
+            whole[:, nodes, nodes] += self._phases.layer
+        return Phases(whole, None, border).factor(self._kept)(b)

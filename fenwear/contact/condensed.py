@@ -7,7 +7,7 @@ For every phase of the motion (a sliding direction d) and every contact node:
 
 tau the traction of friction over the pressure, g the gap of the unloaded bodies with their
 loads' effect and the worn depth. A `WearCompliance` adds to the gaps of all phases what their own pressures
-open, such as the wear of the step they belong to.
+open, such as the wear of the step they belong to, and to those of each phase what gives way under its own.
 """
 
 from __future__ import annotations
@@ -95,6 +95,9 @@ class WearCompliance(Protocol):
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n): its derivative, of phase k to pressures j, is L_k R_j, mm/MPa."""
 
+    def layer(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
+
 
 class ContactSolver(Protocol):
     """Contact in a fixed sequence of phases, kept for many solves."""
@@ -157,7 +160,7 @@ class CondensedContact:
         self._slide(range(m))
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
-        self._slope: Array | None = None  # of what wears in the step
+        self._slopes: tuple[Array, Array | None] | None = None  # of what wears in the step, and of what gives way
         self._elastic: Operator | None = None
         self._operator: Operator | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
@@ -246,19 +249,30 @@ class CondensedContact:
         """Whether all compliances are convolutions on a grid."""
         return bool(self.blocks) and all(isinstance(block.compliance, Convolution) for block in self.blocks)
 
-    def _of_nodes(self, wear: Array | None = None, before: Operator | None = None) -> ManyNodes | GriddedPhases:
+    def _of_nodes(
+        self, wear: Array | None = None, before: Operator | None = None, layer: Array | None = None
+    ) -> ManyNodes | GriddedPhases:
         """Return the derivative without a matrix of all nodes."""
         if self._gridded and wear is None:
             return GriddedPhases(self.blocks)
         known = before if isinstance(before, ManyNodes) else None
-        if self._spread is None:
-            return ManyNodes(self.blocks, wear, known)
+        if self._spread is None or layer is not None:
+            return ManyNodes(self.blocks, wear, known, layer)
         return SpreadNodes(self._spread, self.blocks, wear, known)
 
-    def _as_phases(self, border: tuple[Array, Array] | None = None, local: Array | None = None) -> Phases:
+    def _as_phases(
+        self,
+        border: tuple[Array, Array] | None = None,
+        local: Array | None = None,
+        layer: Array | None = None,
+    ) -> Phases:
         """Return the derivative by matrices of all nodes."""
         scale = self._pressure_scale / self._gap_scale
         dense = np.array([block.matrix() for block in self.blocks]) if self._many else self._dense
+        if layer is not None:
+            nodes = np.arange(self.shape[1])
+            dense = dense.copy()
+            dense[:, nodes, nodes] += layer
         return Phases(dense, None if self._coupling is None else self._coupling * scale, border, local)
 
     def _jacobian(self, x: Array) -> Operator:
@@ -271,26 +285,34 @@ class CondensedContact:
         left, slope = None, self._wearing.local(pressure)
         if slope is None:
             left, slope = self._wearing.border(pressure)
-        last = self._operator
-        if last is None or self._slope is None or not np.array_equal(slope, self._slope):
-            self._slope = slope
+        layer, last = self._wearing.layer(pressure), self._operator
+        if last is None or not self._known(slope, layer):
+            self._slopes = slope, layer
+            layer = None if layer is None else layer * scale
             if left is not None:
-                self._operator = self._as_phases(border=(left, slope * scale))
+                self._operator = self._as_phases(border=(left, slope * scale), layer=layer)
             elif self._many and self._coupling is None:
-                self._operator = self._of_nodes(slope * scale, last)
+                self._operator = self._of_nodes(slope * scale, last, layer)
             else:
-                self._operator = self._as_phases(local=slope * scale)
+                self._operator = self._as_phases(local=slope * scale, layer=layer)
         return self._operator or self._linear
 
     def _worn_on_grid(self, pressure: Array, scale: float) -> Operator:
         """Return the derivative with what wears at a pressure (m, n), on a grid."""
         assert self._wearing is not None
         opening, slope = self._wearing.linear(pressure)
-        last, same = self._operator, self._slope is not None and np.array_equal(slope, self._slope)
-        if last is None or not same:
-            self._slope = slope
+        last = self._operator
+        if last is None or not self._known(slope, None):
+            self._slopes = slope, None
             last = self._operator = GriddedPhases(self.blocks, lambda p: scale * opening(p), scale * slope)
         return last
+
+    def _known(self, slope: Array, layer: Array | None) -> bool:
+        """Return whether the last derivative is that of these slopes."""
+        if self._slopes is None or (self._slopes[1] is None) != (layer is None):
+            return False
+        pairs = zip(self._slopes, (slope, layer), strict=True)
+        return all(one is None or other is None or np.array_equal(one, other) for one, other in pairs)
 
     def solve(
         self,

@@ -155,6 +155,13 @@ class ShapeEquations(ShapeRows):
                 other.__dict__[name] = self.__dict__[name]
         return other
 
+    def given_way(self, layer: Array) -> ShapeEquations:
+        """Return the same with what unit pressures open at their own nodes in their own phase (m, n)."""
+        found = [own.copy() for own in self.compliances]
+        for own, slope in zip(found, layer, strict=True):
+            own[np.diag_indices_from(own)] += slope
+        return replace(self, compliances=found)
+
     def derivative(self, wear: Sequence[csr_array], held: Array) -> WornShape | ByShape:
         """Return the left side's derivative with wear, as the number of unknowns makes it cheapest.
 

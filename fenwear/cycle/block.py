@@ -81,6 +81,7 @@ class Block:
         gap: Gap there (k, n), mm.
         wear: Worn depth of the punch at its end (k, n), mm.
         wear_strip: Of the strip, on its material (k, n_strip), mm.
+        between: State of what lies between at its end, by the rows of `fenwear.layers.Layers` (k, rows, n).
         rigid: Amplitudes of the rigid modes there (k, modes).
         totals: What all half-cycles up to its end add up to, k of them.
         adds: What it adds itself, k of them.
@@ -119,6 +120,7 @@ class Block:
     remedies: Counter[str] = field(default_factory=Counter, kw_only=True)
     load_factor: Array = field(kw_only=True)
     end: RunState = field(kw_only=True)
+    between: Array = field(kw_only=True)
     steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
     traction: Array | None = field(default=None, kw_only=True)
 
@@ -321,6 +323,7 @@ class Recorder:
             remedies=self._remedies,
             load_factor=loads,
             end=end,
+            between=np.array([row.worn.between for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
             traction=middles[-1].friction_ratio if rows[-1].steps is not None else None,
         )

@@ -50,9 +50,10 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
 
 
 def area(system: Tribosystem, worn: Worn) -> float:
-    """Return the integral of the size of depths over both surfaces."""
+    """Return the integral of the size of depths over both surfaces, and of what lies between."""
     pair = system.pair
-    return float(pair.weights @ np.abs(worn.punch) + pair.strip.weights @ np.abs(worn.strip))
+    between = pair.weights @ np.broadcast_to(np.abs(system.layers.opening(worn.between)), pair.weights.shape)
+    return float(pair.weights @ np.abs(worn.punch) + pair.strip.weights @ np.abs(worn.strip) + between)
 
 
 def force_difference(system: Tribosystem, first: Array, second: Array) -> float:

@@ -49,7 +49,7 @@ from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import StepWear, Worn
+from fenwear.sliding.wear import Worn
 
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
@@ -215,10 +215,11 @@ class Stepper:
     def _end(self, state: RunState, before: _Moment, last: _Stage, cycles: float) -> RunState:
         """Return the end of a step whose last stage is solved."""
         now, heat, temperature = before.after(last, cycles), self.coupled.heat, None
+        worn = replace(now.worn, between=self.system.layers.settled(now.worn.between))
         if heat is not None and now.temperature is not None:
             temperature = heat.exchange.at(now.temperature)
             self._heated, self._conductances = last.heated, last.conductances
-        return RunState(state.half_cycle, now.worn, parted(last.contact), temperature, now.totals)
+        return RunState(state.half_cycle, worn, parted(last.contact), temperature, now.totals)
 
     def _passing(self, worn: Worn, cycles: float) -> Passing | None:
         """Return how depths follow in a stage where coefficients depend on them."""
@@ -239,13 +240,13 @@ class Stepper:
         """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0."""
         gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
         if start is None:  # the first of all: what conducts is seen from the contact without heat
-            start = self._solve(gap, None, cycles)
+            start = self._solve(gap, None, (before.worn, cycles))
         solved = self.coupled.solve(
             before.temperature,
             cycles - 0.5,
             start,
             lambda thermal, coupling, near: self._solve(
-                gap if thermal is None else gap + thermal, near, cycles, coupling
+                gap if thermal is None else gap + thermal, near, (before.worn, cycles), coupling
             ),
             self._passing(before.worn, cycles),
             lagged=True,
@@ -255,13 +256,17 @@ class Stepper:
         if begin is not None:
             heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        return _Stage(contact, heated, self.wear.worn(contact.pressure), adds, solved.conductances)
+        worn = self.system.passing(self.wear).worn(contact.pressure, before.worn.between, cycles)
+        return _Stage(contact, heated, worn, adds, solved.conductances)
 
     def _solve(
-        self, gap: Array, start: ContactState | None, cycles: float, coupling: Array | None = None
+        self, gap: Array, start: ContactState | None, begin: tuple[Worn, float], coupling: Array | None = None
     ) -> ContactState:
+        """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
-        return self.contact.solve(gap, start, StepWear(self.wear, cycles), coupling)
+        worn, cycles = begin
+        step = self.system.passing(self.wear).step(worn.between, cycles)
+        return self.contact.solve(gap, start, step, coupling)
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""
@@ -292,7 +297,7 @@ class Stepper:
         phases = list(range(len(contacts)))
         for stroke in reversed(range(1, motion.half_cycles)):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
-            depths.insert(0, depths[0] - self._worn(own, contacts))
+            depths.insert(0, depths[0] - self._worn(own, contacts, depths[0]))
             totals.insert(0, reduce(Totals.__sub__, [adds[k] for k in own], totals[0]))
         for stroke, depth in enumerate(depths):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
@@ -304,9 +309,9 @@ class Stepper:
             found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
         return found
 
-    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState]) -> Worn:
+    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: Worn) -> Worn:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
-        return self.wear.some(phases).worn(pressures)
+        return self.system.passing(self.wear.some(phases), phases).worn(pressures, now.between)
 
     def _phase_record(
         self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals

@@ -16,14 +16,15 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.sliding.wear import PhasesWear, StepWear, Worn
+from fenwear.layers import Passing
+from fenwear.sliding.wear import Worn
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
 COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"
 )
-_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, PhasesWear]
+_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, Passing]
 
 
 @dataclass(frozen=True)
@@ -55,8 +56,9 @@ class PhaseStep:
         conditions = system.conditions(phase)
         self._mu = system.friction.values(conditions)
         self._friction_ratio = system.phase_friction(phase, self._mu)
-        self._wear = system.wear.phases([conditions], [phase])
-        self._meter = PhaseMeter(system, phase, self._mu, self._wear)
+        wear = system.wear.phases([conditions], [phase])
+        self._passing = system.passing(wear, [phase])
+        self._meter = PhaseMeter(system, phase, self._mu, wear)
 
     def solve(
         self,
@@ -89,30 +91,30 @@ class PhaseStep:
         if self._thermal is not None and temperature is not None:
             temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn)
-        if self._constant:
-            return self._end(*self._solve(temperature, gap, before or near, self._wear), before, self._wear)
         start = before or near
+        if self._constant:
+            return self._end(*self._solve(temperature, gap, start, self._passing, worn), before, self._passing, worn)
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            wear = self._update(pressure, temperature, worn, half_cycles, cycle)
+            passing = self._update(pressure, temperature, worn, half_cycles, cycle)
             try:
-                contact, after, heat = self._solve(temperature, gap, start, wear)
+                contact, after, heat = self._solve(temperature, gap, start, passing, worn)
             except ConvergenceError as error:
                 largest = float(np.linalg.norm(self._friction_ratio, axis=1).max())
                 raise ConvergenceError(f"{error}; its friction reaches {largest:.3g} times the pressure") from error
             start = contact
-            return contact.pressure[0], (contact, after, heat, wear), False
+            return contact.pressure[0], (contact, after, heat, passing), False
 
         mean = np.full(len(gap), self.system.rigid.mean_pressure)
-        contact, after, heat, wear = fixed_point(
+        contact, after, heat, passing = fixed_point(
             solve,
             mean if start is None else start.pressure[0],
             lambda change, pressure: bool(np.abs(change).max() < CLOSE * pressure_scale(self.system, pressure)),
             COEFFICIENTS_FAIL,
             team=self.system.team,
         )
-        return self._end(contact, after, heat, before, wear)
+        return self._end(contact, after, heat, before, passing, worn)
 
     def _update(
         self,
@@ -121,7 +123,7 @@ class PhaseStep:
         worn: Worn,
         half_cycles: float,
         cycle: Array | None,
-    ) -> PhasesWear:
+    ) -> Passing:
         """Take friction and wear at this pressure, and at temperature and depths at the start of the phase."""
         system = self.system
         surfaces = None
@@ -134,12 +136,12 @@ class PhaseStep:
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
                 self._thermal.slide(heating_friction(system, mu))
-        return system.wear.phases([conditions], [self.phase])
+        return system.passing(system.wear.phases([conditions], [self.phase]), [self.phase])
 
     def _solve(
-        self, temperature: HeatState | None, gap: Array, start: ContactState | None, wear: PhasesWear
+        self, temperature: HeatState | None, gap: Array, start: ContactState | None, passing: Passing, worn: Worn
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
-        wearing = StepWear(wear) if self.implicit else None
+        wearing = passing.step(worn.between, implicit=self.implicit)
         if self._thermal is None or temperature is None:
             return self._contact.solve(gap, start, wearing), None, None
         return self._thermal.solve(temperature, gap, start, wearing)
@@ -150,10 +152,13 @@ class PhaseStep:
         temperature: HeatState | None,
         heat: HalfCycleHeat | None,
         before: ContactState | None,
-        wear: PhasesWear,
+        passing: Passing,
+        worn: Worn,
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
-        meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, wear)
-        adds, worn = self.system.team.lead(lambda: (meter(contact.pressure[0]), wear.worn(contact.pressure)))
+        meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, passing.wear)
+        adds, lost = self.system.team.lead(
+            lambda: (meter(contact.pressure[0]), passing.worn(contact.pressure, worn.between))
+        )
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
-        return PhaseEnd(record, temperature, heat, worn)
+        return PhaseEnd(record, temperature, heat, lost)

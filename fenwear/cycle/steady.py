@@ -87,6 +87,7 @@ class Steady:
         contact_width: Width in contact there (half_cycles,), mm.
         wear_per_cycle: Depth worn off both bodies in a cycle (n,), mm.
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
+        debris: Thickness of the third body (n,), mm: what a cycle feeds, times its life; None without.
         iterations: Newton iterations.
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
@@ -112,6 +113,7 @@ class Steady:
     system: Tribosystem = field(kw_only=True)
     passes: int = field(default=0, kw_only=True)
     conductances: Array | None = field(default=None, kw_only=True)
+    debris: Array | None = field(default=None, kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -324,6 +326,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -
         coordinates=system.pair.punch.x,
         system=system,
         conductances=None if heat is None else solved.conductances,
+        debris=system.passing(problem.wear).resting(contact.pressure),
     )
 
 

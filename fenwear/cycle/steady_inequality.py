@@ -44,7 +44,7 @@ class SteadyInequality:
         self.system = system
         m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
         self.m, self.n, self.r = m, n, r
-        self.wear = system.phases_wear
+        self.wear, self.closure = system.phases_wear, system.layers.closure
         self.p_scale = rigid.mean_pressure
         self.gap_scale = self.p_scale * interface.elastic_length
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
@@ -77,7 +77,8 @@ class SteadyInequality:
         modes, pairs = self.system.rigid.rigid_normal / self.lengths, list(zip(interfaces, ratios, strict=True))
         balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
         self.equations: ShapeEquations | SpreadShape
-        if self.system.heat is None and (self.n >= LARGE or interfaces[0].rows is not None):
+        linear = self.system.heat is None and self.closure is None
+        if linear and (self.n >= LARGE or interfaces[0].rows is not None):
             self.equations = SpreadShape(SpreadPhases(interfaces, ratios, scale), modes, balances)
         else:
             made: dict[tuple[int, bytes], Array] = {}  # phases of one place and direction share theirs
@@ -86,7 +87,8 @@ class SteadyInequality:
                 if key not in made:
                     made[key] = own.compliance(ratio, scale).matrix()
             self.equations = ShapeEquations([made[key] for key in keys], modes, balances)
-        self._known: tuple[list[csr_array], Array, Operator] | None = None  # the last derivative, and what it is of
+        # The last derivative, and what it is of.
+        self._known: tuple[list[csr_array], Array, Array | None, Operator] | None = None
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""
@@ -100,6 +102,8 @@ class SteadyInequality:
         f = self.equations.multiply(x) + self.offset
         pressure = x[: m * n].reshape(m, n) * self.p_scale
         f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
+        if self.closure is not None:
+            f[: m * n] += self.closure.closure(pressure).ravel() / self.gap_scale
         return f
 
     def _jacobian(self, x: Array) -> Operator:
@@ -107,12 +111,18 @@ class SteadyInequality:
         slopes = self.wear.slopes(pressure * self.p_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
         held = np.where(pressure.max(axis=0) <= 0, DRIVE, 0.0)
+        layer = None if self.closure is None else self.closure.slope(pressure * self.p_scale)
         known = self._known
         if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):
-            return known[2]
+            gives_alike = layer is None or known[2] is None or np.array_equal(layer, known[2])
+            if gives_alike:
+                return known[3]
         scaled = [slope * (self.p_scale / self.wear_scale) for slope in slopes]
-        self._known = (slopes, held, self.equations.derivative(scaled, held))
-        return self._known[2]
+        equations = self.equations
+        if layer is not None and isinstance(equations, ShapeEquations):
+            equations = equations.given_way(layer * (self.p_scale / self.gap_scale))
+        self._known = (slopes, held, layer, equations.derivative(scaled, held))
+        return self._known[3]
 
     def solve(self, thermal: Array | None = None, coupling: Array | None = None) -> ContactState:
         """Return the contact of all phases, starting from the last solution.
@@ -207,6 +217,8 @@ class SteadyInequality:
         pressure, _, _, velocity = self.equations.parts(x)
         outrun = (x[:n] == 0) & (self.equations.modes @ velocity < 0)
         x[self.omega] = -(self.equations.gaps(pressure)[0] + self.offset[:n])
+        if self.closure is not None:
+            x[self.omega] -= self.closure.closure(pressure[0] * self.p_scale) / self.gap_scale
         x[self.omega] = np.where(outrun & (self.m == 1), OPEN, x[self.omega])
         return x
 

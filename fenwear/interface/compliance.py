@@ -4,7 +4,8 @@ Forces f on the punch's nodes, and their reactions on the strip, move the punch'
 
     j_i = sum over k of G_ik f_k,    G = G_punch + R^T (X G_strip X^T) R,
 
-with the transfer X of a strip that passes under the punch and the turn R of its place. What is asked for are components
+with the transfer X of a strip that passes under the punch and the turn R of its place; a layer between them that closes
+in proportion to its pressure adds its closure along e_n to the node's own entry. What is asked for are components
 of j: along e_n alone in gross sliding, along e_n and the tangents where nodes stick. A square matrix comes of it by the
 tractions that go with the unknowns: a pressure with its friction, or one along each axis of the contact frame.
 """
@@ -46,6 +47,7 @@ class Interface:
         rows: Of the contact nodes on each rank; None where every rank has all.
         frame: Axes along which displacements are asked for, e_n first (n, a, d); None for e_n alone.
         like: One that differs by its loads or by where the strip's material is: what bodies answer is known of it.
+        layer: Closure along e_n by unit pressures of what lies between (n,), mm/MPa; None where nothing gives way.
     """
 
     rigid: RigidEquilibrium
@@ -55,10 +57,13 @@ class Interface:
     rows: Rows | None = None
     frame: Array | None = None
     like: Interface | None = None
+    layer: Array | None = None
 
     def under(self, rigid: RigidEquilibrium, punch: SurfaceOperator, strip: SurfaceOperator) -> Interface:
         """Return the same surfaces under other loads, or where others of the strip's material face the punch."""
-        return Interface(rigid, punch, strip, self.strip_moves, self.rows, self.frame, self.like or self)
+        return Interface(
+            rigid, punch, strip, self.strip_moves, self.rows, self.frame, like=self.like or self, layer=self.layer
+        )
 
     @property
     def pair(self) -> ContactPair:
@@ -91,6 +96,19 @@ class Interface:
         """Return the relative displacements (own rows, a, ...), mm, by forces on the punch (n, d, ...), N/mm or N."""
         if self.cost is None:
             return product(self.dense(), forces)
+        found = self._by_bodies(forces)
+        if self.layer is not None:
+            found[:, 0] += np.einsum("id,id...->i...", self._closing, forces)
+        return found
+
+    @cached_property
+    def _closing(self) -> Array:
+        """Closure of what lies between by unit forces along the axes of space at its own node (n, d)."""
+        closure = np.zeros(len(self.pair.weights)) if self.layer is None else self.layer
+        return np.asarray((closure / self.pair.weights)[:, None] * self.axes[:, 0])
+
+    def _by_bodies(self, forces: Array) -> Array:
+        """Return what the bodies alone answer to forces."""
         on_punch = _along(self.axes, self.punch.apply(forces))
         n, d, *rest = forces.shape
         back = self.pair.placement.back(np.moveaxis(forces, 1, -1).reshape(-1, d)).reshape(n, *rest, d)
@@ -130,7 +148,9 @@ class Interface:
             return found if self.rows is None else self.rows.gathered(found)
         if not self.strip_moves and self.pair.placement.turn == ZERO:
             both = zip((self.axes, self._axes_on_strip), (self.punch, self.strip), strict=True)
-            return np.asarray(sum(_along(axes, body.diagonal()) for axes, body in both))
+            found = np.asarray(sum(_along(axes, body.diagonal()) for axes, body in both))
+            found[:, 0] += self._closing
+            return found
         each = (np.array([node]) for node in range(own.stop))
         return np.concatenate([self.asked(node, node)[:, :, 0] for node in each])
 
@@ -150,7 +170,11 @@ class Interface:
         if self.pair.placement.turn != ZERO:
             d = on_strip.shape[-1]
             on_strip = self.pair.placement.vectors(on_strip.reshape(-1, d)).reshape(on_strip.shape)
-        return on_punch + on_strip
+        found = on_punch + on_strip
+        if self.layer is not None:
+            to, by = np.equal.outer(own, np.arange(len(self.pair.weights))[columns]).nonzero()
+            found[to, 0, by] += self._closing[own[to]]
+        return found
 
     def _on_strip(self, own: NDArray[np.int64], rows: Nodes, columns: Nodes) -> Array:
         """Return what forces in the strip's own frame do to it, as contact nodes see it."""
@@ -200,7 +224,8 @@ class Interface:
             known: Tables of convolutions that were made for other phases.
         """
         traction = self.pair.normal + friction_ratio
-        if not self.strip_moves and self.cost is not None and self.frame is None and self.rows is None:
+        plain = self.frame is None and self.rows is None and self.layer is None
+        if not self.strip_moves and self.cost is not None and plain:
             tables = {} if known is None else known
             found = convolution([self.punch, self.strip], traction, self.pair.weights, scale, tables)
             if found is not None:
@@ -331,6 +356,7 @@ def join(
     *,
     strip_moves: bool,
     rows: Rows | None = None,
+    layer: Array | None = None,
 ) -> Interface:
     """Join two bodies at the place of a pair; collective where ranks share the rows.
 
@@ -340,8 +366,9 @@ def join(
         strip: At its trace nodes where it moves as a whole, else at the contact nodes opposite.
         strip_moves: Which of the two.
         rows: Of the contact nodes on each rank; None where every rank has all.
+        layer: Closure of what lies between, see `Interface`.
     """
-    interface = Interface(rigid, punch, strip, strip_moves, rows)
+    interface = Interface(rigid, punch, strip, strip_moves, rows, layer=layer)
     if rows is not None:  # now, while all ranks are here
         _ = interface.diagonal(), interface.by_even, interface.elastic_length
     return interface

@@ -45,6 +45,7 @@ NUMBERS, WEAR, STATES = (
     ("pressure", "gap", "rigid"),
 )
 TOTALS = ("totals", "energy", "pressure_sum")
+BETWEEN = "between"  # the state of what lies between the surfaces, without rows where nothing does that changes
 WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
 MEMORY, REMEMBERED = "memory", "remembered"  # what a law of contact remembers, and its temperatures
 BULK = "bulk"  # what is on its way back on a closed track; NaN where there is none
@@ -152,6 +153,7 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
             file,
             **{name: getattr(state, name) for name in NUMBERS},
             **_depths(WEAR, state.worn),
+            **_between(state.worn),
             **_totals(state.totals),
             **_bulk(state.temperature),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
@@ -199,6 +201,10 @@ def _bulk(temperature: HeatState | None) -> dict[str, Any]:
 
 def _totals(totals: Totals) -> dict[str, Any]:
     return dict(zip(TOTALS, (totals.sums, totals.energy, totals.pressure), strict=True))
+
+
+def _between(worn: Worn) -> dict[str, Any]:
+    return {BETWEEN: worn.between}
 
 
 def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
@@ -265,7 +271,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
     length, periodic = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
-    worn, totals = Worn(*(arrays[name] for name in WEAR)), Totals(*(arrays[name] for name in TOTALS))
+    worn, totals = Worn(*(arrays[name] for name in (*WEAR, BETWEEN))), Totals(*(arrays[name] for name in TOTALS))
     memory = _memory(folder, system, arrays)
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, length, periodic, memory)
 
@@ -315,7 +321,8 @@ def _arrays(folder: Path) -> dict[str, Any]:
         with np.load(folder / ARRAYS) as arrays:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
             memory = [name for name in arrays if name.startswith(f"{MEMORY}.")]
-            return {name: arrays[name] for name in (*NUMBERS, *WEAR, *TOTALS, BULK, *STATES, *followed, *memory)}
+            depths = (*WEAR, BETWEEN)
+            return {name: arrays[name] for name in (*NUMBERS, *depths, *TOTALS, BULK, *STATES, *followed, *memory)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         raise damaged(folder) from None
 
@@ -355,6 +362,8 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
         for name, unworn in _depths(names, system.unworn()).items():
             if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
                 raise damaged(folder)
+    if arrays[BETWEEN].shape != system.unworn().between.shape:
+        raise damaged(folder)
     if arrays["totals"].shape != (len(SUMS),) or any(
         arrays[name].shape != system.pair.weights.shape for name in TOTALS[1:]
     ):

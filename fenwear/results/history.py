@@ -22,7 +22,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
-from fenwear.results import place, sheet, steps
+from fenwear.results import between, place, sheet, steps
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.scar import conforming
@@ -117,7 +117,13 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
     if case.heat is not None:
         terms = {f"heat_{name}": (("half_cycle",), "mJ", text) for name, text in HEAT_TERMS.items()}
         variables = {**variables, **HEAT_VARIABLES, **terms, **({} if case.heat.track is None else BULK)}
-    variables = {**variables, **sheet.variables(system), **place.variables(system), **steps.variables(system)}
+    variables = {
+        **variables,
+        **sheet.variables(system),
+        **between.variables(system),
+        **place.variables(system),
+        **steps.variables(system),
+    }
     variables = {name: (axes, unit, case.names.told(text)) for name, (axes, unit, text) in variables.items()}
     if case.model.kind == "plane":
         return variables
@@ -168,7 +174,7 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    own = {**sheet.values(block), **place.values(block), **steps.values(block)}
+    own = {**sheet.values(block), **between.values(block), **place.values(block), **steps.values(block)}
     return {name: own[name] if name in own else _values(block, name) for name in names}
 
 

@@ -9,7 +9,7 @@ strip's wear spreads along the whole of it, see `fenwear.sliding.track`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,28 +21,39 @@ from fenwear.interface import ContactPair
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
 
+NOTHING: Array = np.zeros((0, 0))  # between the surfaces
+
 
 @dataclass(frozen=True)
 class Worn:
-    """Worn depths.
+    """Worn depths, and the state of what lies between the surfaces.
 
     Attributes:
         punch: At the punch's contact nodes (n,), mm.
         strip: At the strip's contact nodes (n_strip,), on its material, mm.
+        between: By the rows of `fenwear.layers.Layers` (rows, n); without rows where nothing lies between that changes.
     """
 
     punch: Array
     strip: Array
+    between: Array = field(default_factory=lambda: NOTHING)
 
     def __add__(self, other: Worn) -> Worn:
-        return Worn(self.punch + other.punch, self.strip + other.strip)
+        return Worn(self.punch + other.punch, self.strip + other.strip, _added(self.between, other.between))
 
     def __sub__(self, other: Worn) -> Worn:
-        return Worn(self.punch - other.punch, self.strip - other.strip)
+        return self + other.times(-1.0)
 
     def times(self, factor: float) -> Worn:
-        """Return the depths times a factor."""
-        return Worn(factor * self.punch, factor * self.strip)
+        """Return all of it times a factor."""
+        return Worn(factor * self.punch, factor * self.strip, factor * self.between)
+
+
+def _added(one: Array, other: Array) -> Array:
+    """Return the sum of the states of what lies between; where one has none it adds nothing."""
+    if not len(other):
+        return one
+    return one + other if len(one) else other
 
 
 @dataclass(frozen=True)
@@ -98,6 +109,16 @@ class PhasesWear:
     def depth(self, pressure: Array) -> Array:
         """Return the depth worn off the punch in each phase (m, n), mm."""
         return np.zeros_like(pressure) if self.punch is None else self.punch.depth(pressure)
+
+    def taken(self, pressure: Array) -> Array:
+        """Return the depths worn off both bodies together at the contact nodes in each phase (m, n), mm."""
+        bodies = [body.depth(pressure) for body in (self.punch, self.strip) if body is not None]
+        return np.asarray(sum(bodies, np.zeros_like(pressure)))
+
+    def taken_slope(self, pressure: Array) -> Array:
+        """Return the derivatives of `taken` to the pressures (m, n), mm/MPa."""
+        bodies = [body.slope(pressure) for body in (self.punch, self.strip) if body is not None]
+        return np.asarray(sum(bodies, np.zeros_like(pressure)))
 
     def worn(self, pressure: Array) -> Worn:
         """Return what all phases wear off both bodies at pressures (m, n)."""
@@ -206,6 +227,10 @@ class StepWear:
         """Return L (m, n, q) and R (m, q, n) of its derivative L_k R_j."""
         left, right = self.wear.border(pressure)
         return left, self.repeats * right
+
+    def layer(self, _pressure: Array) -> Array | None:
+        """Return what opens each phase's own gaps alone: nothing does."""
+        return None
 
 
 @dataclass(frozen=True)

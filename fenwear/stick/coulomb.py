@@ -318,7 +318,7 @@ class HalfCycles(_Run):
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
-        lost = rig.worn_in(records, first)
+        lost = rig.worn_in(records, first, state.worn.between)
         worn = state.worn + lost
         adds = self.meter(records, first)
         totals = state.totals + adds
@@ -375,7 +375,7 @@ class Jumps(_Run):
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
         adds = [self.meter(records, first) for first, records in parts]
-        lost = [rig.worn_in(records, first) for first, records in parts]
+        lost = [rig.worn_in(records, first, then.worn.between) for first, records in parts]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])
             sums.insert(0, sums[0] - adds[k])

@@ -11,7 +11,7 @@ import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import NOTHING, Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
 from fenwear.stick.increment import advance
@@ -234,9 +234,10 @@ class Rig:
         return max(ways, default=0.0) or 1e-3 * float(self.weights.sum())
 
     def unworn(self) -> Worn:
-        """Return the worn depths at the start: none."""
+        """Return the worn depths at the start, none, and what lies between then."""
         pair = self.interface.middle.pair
-        return Worn(np.zeros(len(pair.weights)), np.zeros(len(pair.strip.weights)))
+        between = self.interface.layers.beginning()
+        return Worn(np.zeros(len(pair.weights)), np.zeros(len(pair.strip.weights)), between)
 
     def beginning(self, shape: Worn | None = None, load: float = 1.0) -> RigState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
@@ -274,7 +275,8 @@ class Rig:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
         moved = self.interface.moved
         rest = worn if moved is None else worn - moved
-        return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip)
+        between = self.interface.layers.opening(worn.between)
+        return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
 
     def imposed(self, step: TimeStep, worn: Worn, load: float = 1.0) -> tuple[Position, Imposed]:
         """Return the place of the strip in a time step, and what is imposed at its end; collective."""
@@ -378,8 +380,15 @@ class Rig:
             found.append(records)
         return at, found
 
-    def worn_in(self, records: Records, first: int) -> Worn:
-        """Return what the steps of a record wear off both bodies, the first of them that of this number."""
+    def worn_in(self, records: Records, first: int, between: Array = NOTHING, *, rate: bool = False) -> Worn:
+        """Return what the steps of a record wear off both bodies, and what becomes of what lies between.
+
+        Args:
+            records: Of steps one after the other.
+            first: Number of the first of them in the cycle.
+            between: State of what lies between before them (rows, n); by default it is left out.
+            rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps.
+        """
         pair, steps = self.interface.middle.pair, self.program.steps
         strip = np.zeros(len(pair.strip.weights))
         if self.wear.strip is not None:
@@ -387,7 +396,15 @@ class Rig:
             for place in sorted(set(places)):
                 depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.interface.position(place).pair.wear_projection @ depth
-        return Worn(records.punch_depth.sum(axis=0), strip)
+        return Worn(records.punch_depth.sum(axis=0), strip, self._change_between(records, between, rate=rate))
+
+    def _change_between(self, records: Records, between: Array, *, rate: bool) -> Array:
+        """Return what steps do to what lies between (rows, n); arguments as of `worn_in`."""
+        debris = self.interface.layers.debris
+        if debris is None or not len(between):
+            return NOTHING
+        over, taken = debris.over(records.slid), records.punch_depth + records.strip_depth
+        return np.array(over.rate(between[0], taken, 0.0) if rate else over.change(between[0], taken))
 
     def _record(self, at: RigState, after: RigState, step: TimeStep) -> Records:
         before, state, position = at.contact, after.contact, self.interface.position(step.offset)
@@ -398,6 +415,8 @@ class Rig:
         stored = np.vdot(force, state.on_punch - before.on_punch) - np.vdot(back, state.on_strip - before.on_strip)
         lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
         work = state.force * (state.displacement - before.displacement) + lowered
+        closed = self.interface.layers.given(state.pressure) - self.interface.layers.given(before.pressure)
+        stored += weights @ (state.pressure * closed)
         slipped, wear = np.linalg.norm(state.slip, axis=1), self.wear
         if self.laws is not None:
             known = {**self._known(at), "slid": after.slid, "speed": slipped / step.duration}

@@ -32,12 +32,13 @@ ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
 
 
 class ContactStatus(NamedTuple):
-    """What a Newton step takes each node for: closed (n,), slipping (n,), their trial (n, m) and mu p there (n,)."""
+    """What a Newton step takes each node for: closed (n,), slipping (n,), their trial (n, m), mu p and p there (n,)."""
 
     closed: Mask
     slipping: Mask
     trial: Array
     radius: Array
+    pressure: Array
 
 
 class Moved(NamedTuple):
@@ -84,6 +85,8 @@ class Step:
         old += position.modes @ before.rigid - position.drive * before.displacement
         self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
         self.approached = now[: self.n] - old[: self.n] - self.free[: self.n]
+        self.approached -= interface.layers.given(before.pressure)
+        self.closure = interface.layers.closure
         # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area. One c for both
         # tangents: t = P(t - c s) turns slip against the traction only where c is a number, not a matrix.
         self.scale = np.abs(position.compliance.diagonal()).reshape(self.d, self.n)
@@ -97,6 +100,8 @@ class Step:
         position = self.position
         j = position.compliance.apply(found.f) if found.moved is None else found.moved.jump
         j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
+        if self.closure is not None:
+            j[: self.n] += self.closure.closure(found.f[: self.n])
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
     def solve(self, status: ContactStatus) -> Found:
@@ -129,6 +134,8 @@ class Step:
             b[-1] = (self.imposed.force or 0.0) / self.area
         else:
             b[:k] += self.position.drive[columns] * unit[:, 0] * (self.imposed.displacement or 0.0)
+        if self.closure is not None:
+            self._give_way(A, b, status, closed)
         if m > 1:
             self._slide(A, b, status, own, len(closed))
         balance = self.units / (self.length * self.area)
@@ -140,6 +147,21 @@ class Step:
         f[n + closed[tied]] = ratio * f[closed[tied]]
         moved = float(x[-1] * self.length) if loose else float(self.imposed.displacement or 0.0)
         return Found(f, x[k : k + r] * self.units, moved, sign * (-1) ** r)
+
+    def _give_way(self, A: Array, b: Array, status: ContactStatus, closed: NDArray[np.int64]) -> None:
+        """Add what gives way beside the bodies to the rows c g = 0, linearised at the pressure of the status.
+
+        Without pressure it may give way as much as it likes: the rows are made of one size again.
+        """
+        if self.closure is None:
+            return
+        rows, pressure = np.arange(len(closed)), status.pressure[closed]
+        slope = self.closure.slope(pressure)
+        A[rows, rows] += slope / self.scale[0, closed]
+        b[rows] -= (self.closure.closure(pressure) - slope * pressure) / self.scale[0, closed]
+        size = 1 + slope / self.scale[0, closed]
+        A[rows] /= size[:, None]
+        b[rows] /= size
 
     def _slide(self, A: Array, b: Array, status: ContactStatus, own: NDArray[np.int64], k: int) -> None:
         """Turn the rows c s = 0 of nodes that slip in two directions into t - P(t - c s) = 0, linearised."""
@@ -164,7 +186,8 @@ class Step:
         radius = self.mu * kept
         wrong = max(np.abs(pressure - kept).max(), np.abs(traction - project(trial, radius)).max())
         slipping = (np.linalg.norm(trial, axis=1) > radius) & (pushed > 0)
-        return ContactStatus(pushed > 0, slipping, trial, radius), float(wrong / max(pressure.max(), 1e-300))
+        status = ContactStatus(pushed > 0, slipping, trial, radius, np.maximum(pressure, 0.0))
+        return status, float(wrong / max(pressure.max(), 1e-300))
 
     def state(self, found: Found, iterations: int, *, unique: bool) -> StickState:
         """Return the state at the end of the step, free of what rounding leaves in the laws."""

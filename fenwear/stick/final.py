@@ -216,6 +216,8 @@ def _of_edges(rig: Rig, edges: Sequence[Edge]) -> FinalShape | None:
 def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
     """Return where the contact of a zone of nodes ends, mm; None where too few nodes are beside it.
 
+    None, too, where what lies between gives way by a law that is not linear.
+
     Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
     edge c follow from the second and third node. The first one carries what the discrete edge makes of it.
     """
@@ -223,6 +225,8 @@ def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
     x, n, zone = position.pair.x, len(rig.weights), np.arange(first, last + 1)
     places = (last if side > 0 else first) + side * np.array([2, 3])
     if places.min() < 0 or places.max() >= n:
+        return None
+    if rig.interface.layers.closure is not None:
         return None
     r, k = position.modes.shape[1], len(zone)
     scale = float(np.median(position.compliance.diagonal()[:n]))

@@ -156,7 +156,7 @@ def _status(pressure: Array, trial: Array, friction: Array) -> ContactStatus:
     closed = pressure > 0
     closed = closed if closed.any() else ~closed
     limit = friction * pressure
-    return ContactStatus(closed, closed & (np.linalg.norm(trial, axis=1) > limit), trial, limit)
+    return ContactStatus(closed, closed & (np.linalg.norm(trial, axis=1) > limit), trial, limit, pressure)
 
 
 def _by_displacement(step: Step, status: ContactStatus, force: float) -> ContactStatus | None:

@@ -36,6 +36,7 @@ from fenwear.interface import (
 )
 from fenwear.interface.frame import contact_frame
 from fenwear.interface.placement import in_model
+from fenwear.layers import Layers, common_modulus, layers_of
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.wear import Worn
@@ -157,6 +158,7 @@ class OppositeBodies:
         self.punch, self.strip, self.field = punch, strip, field
         self._load = Loaded(rigid.resultant, punch.by_load, strip.by_load)
         self._positions = {0.0: position_of(rigid, punch, strip, field)}
+        self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
 
     @property
     def middle(self) -> Position:
@@ -219,6 +221,9 @@ class StickInterface(OppositeBodies):
         self.field = sliding.field
         self.dim = bodies.punch.dim
         middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
+        self.layers = Layers(len(middle.weights))
+        if case is not None:
+            self.layers = layers_of(case.contact, middle, common_modulus(case, *bodies.regions))
         if bodies.followed is None:
             check_distance(middle)
         onto = identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
@@ -307,7 +312,9 @@ class StickInterface(OppositeBodies):
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)
-        found = position_of(rigid, self.punch, self.strip, self.field, strip_moves=self.moves)
+        found = position_of(
+            rigid, self.punch, self.strip, self.field, strip_moves=self.moves, layer=self.layers.winkler
+        )
         return along_tangents(found) if self.far else found
 
 
@@ -329,6 +336,7 @@ def position_of(
     field: SlidingField,
     *,
     strip_moves: bool = False,
+    layer: Array | None = None,
 ) -> Position:
     """Return both bodies opposite each other.
 
@@ -337,10 +345,11 @@ def position_of(
         punch, strip: How the bodies answer, along all axes.
         field: The motion of the strip.
         strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
+        layer: Closure by unit pressures of what lies between (n,), mm/MPa; None where it does not give way so.
     """
     frame = contact_frame(rigid.pair.normal)
     drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), frame.shape[2]))
-    return Position(Interface(rigid, punch, strip, strip_moves, frame=frame), drive.ravel())
+    return Position(Interface(rigid, punch, strip, strip_moves, frame=frame, layer=layer), drive.ravel())
 
 
 def along_tangents(position: Position) -> Position:

@@ -8,6 +8,7 @@ Rosenbrock method of second order (J. G. Verwer et al., SIAM J. Sci. Comput. 20,
 
 which is of second order for any matrix A, and stable for jumps far beyond the explicit limit where A is
 near dF/dy: the slip of each node, times its pressure's answer to depth while the contact stays as it is.
+What lies between goes on with the depths: y has its state, too.
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
+from fenwear.layers.between import DEBRIS
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig, RigState
 from fenwear.stick.heat import Course
@@ -140,7 +142,8 @@ def _rate(
 def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> FrettingCycle:
     first, warm = at.next_step, at.temperature
     at, parts = rig.cycle(at)
-    return FrettingCycle(number, worn, parts, rig.worn_in(Records.joined(parts), first), 0.0, first, at, warm=warm)
+    rate = rig.worn_in(Records.joined(parts), first, worn.between, rate=True)
+    return FrettingCycle(number, worn, parts, rate, 0.0, first, at, warm=warm)
 
 
 def _course(cycle: FrettingCycle, steps: int) -> Course:
@@ -152,28 +155,33 @@ def _course(cycle: FrettingCycle, steps: int) -> Course:
 
 def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
     """Return the cycle after a jump."""
-    n = len(now.worn.punch)
+    n, depths, shape = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip), now.worn.between.shape
 
     def parted(y: Array) -> Worn:
-        return Worn(y[:n], y[n:])
+        return Worn(y[:n], y[n:depths], rig.interface.layers.settled(y[depths:].reshape(shape)))
 
     def whole(worn: Worn) -> Array:
-        return np.concatenate([worn.punch, worn.strip])
+        return np.concatenate([worn.punch, worn.strip, worn.between.ravel()])
 
-    matrix = np.eye(n + len(now.worn.strip)) - GAMMA * cycles * _derivative(rig, now)
-    factor = scipy.linalg.lu_factor(matrix)
     begin, rate = whole(now.worn), whole(now.rate)
+
+    def risen(y: Array) -> Array:
+        return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
+
+    matrix = np.eye(depths + now.worn.between.size) - GAMMA * cycles * _derivative(rig, now)
+    factor = scipy.linalg.lu_factor(matrix)
     first = scipy.linalg.lu_solve(factor, rate)
     start = _slid_on(now, cycles)
-    middle = _rate(rig, start, parted(np.maximum(begin + cycles * first, begin)), now.number + cycles, now)
+    middle = _rate(rig, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
     second = scipy.linalg.lu_solve(factor, whole(middle.rate) - 2 * first)
-    end = np.maximum(begin + cycles * (1.5 * first + 0.5 * second), begin)
+    end = whole(parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
     then = _rate(rig, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
     missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
-    area = np.concatenate([pair.weights, pair.strip.weights])
-    scale = area @ (end - begin) + REST * (area @ end)
-    error = float(area @ np.abs(missing) / max(scale, 1e-300))
+    felt = [pair.weights * (row == DEBRIS[0]) for row in rig.interface.layers.rows]  # what is ejected opens nothing
+    area = np.concatenate([pair.weights, pair.strip.weights, *felt])
+    scale = area @ np.abs(end - begin) + REST * (area @ end)
+    error = float(area @ np.abs(missing)) / max(float(scale), 1e-300)
     return replace(then, error=max(error, then.error))
 
 
@@ -186,39 +194,57 @@ def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
 
 
 def _derivative(rig: Rig, now: FrettingCycle) -> Array:
-    """Return A, the derivative of a cycle's wear to the depths while contact zone and slip stay (n + n_s, n + n_s)."""
+    """Return A, the derivative of a cycle's wear to depths and what lies between, at the contact zone and slip of now.
+
+    Square, of the depths (n + n_s) and the state of what lies between (rows n).
+    """
     records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
-    total = n + len(now.worn.strip)
+    depths, debris = n + len(now.worn.strip), rig.interface.layers.debris
+    total = depths + now.worn.between.size
     A = np.zeros((total, total))
     slid, groups = records.slid, dict[tuple[float, bytes], list[int]]()
+    fed = None if debris is None else debris.over(slid).fed
     for k in range(len(records)):
         place = steps[(now.first_step + k) % len(steps)].offset if rig.interface.moves else 0.0
         groups.setdefault((place, (records.pressure[k] > 0).tobytes()), []).append(k)
     for (place, _), members in groups.items():
         position = rig.interface.position(place)
         closed = np.flatnonzero(records.pressure[members[0]] > 0)
-        answer = _stiffness(position, closed)  # of pressure to depth
+        answer = _stiffness(rig, position, closed, records.pressure[members[0]])  # of pressure to depth
         left = np.zeros((total, len(closed)))
-        slopes = np.zeros((2, n))
+        slopes, kept = np.zeros((2, n)), np.zeros(n)
         for row, law in enumerate((rig.wear.punch, rig.wear.strip)):
             if law is not None:
                 for k in members:
                     step = steps[(now.first_step + k) % len(steps)]
-                    slopes[row] += law.slope(records.pressure[k], slid[k], step.duration)
+                    own = law.slope(records.pressure[k], slid[k], step.duration)
+                    slopes[row] += own
+                    kept += 0.0 if fed is None else fed[k] * own
         left[closed, np.arange(len(closed))] = slopes[0, closed]
-        left[n:] = position.pair.wear_projection[:, closed].toarray() * slopes[1, closed]
-        right = np.concatenate([np.eye(n)[closed], position.pair.wear_interpolation[closed].toarray()], axis=1)
-        A -= left @ (answer @ right)
+        left[n:depths] = position.pair.wear_projection[:, closed].toarray() * slopes[1, closed]
+        right = [np.eye(n)[closed], position.pair.wear_interpolation[closed].toarray()]
+        if debris is not None:
+            left[depths + closed, np.arange(len(closed))] = kept[closed]
+            left[depths + n + closed, np.arange(len(closed))] = (slopes.sum(axis=0) - kept)[closed]
+            right += [-np.eye(n)[closed], np.zeros((len(closed), n))]
+        A -= left @ (answer @ np.concatenate(right, axis=1))
+    if debris is not None:
+        lost, at = debris.over(slid).loss, depths + np.arange(n)
+        A[at, at] -= lost
+        A[at + n, at] += lost
     return A
 
 
-def _stiffness(position: Position, closed: NDArray[np.int64]) -> Array:
+def _stiffness(rig: Rig, position: Position, closed: NDArray[np.int64], pressure: Array) -> Array:
     """Return how the pressures of closed nodes fall by a depth at each, under a constant load (k, k), MPa/mm."""
     k, r = len(closed), position.modes.shape[1]
     n = len(position.pair.weights)
     unit = float(np.median(position.compliance.diagonal()[:n]))
     system = np.zeros((k + r, k + r))
     system[:k, :k] = position.compliance.entries(closed, closed) / unit
+    closure = rig.interface.layers.closure
+    if closure is not None:
+        system[np.arange(k), np.arange(k)] += closure.slope(pressure[closed]) / unit
     system[:k, k:] = position.modes[closed]
     system[k:, :k] = position.balance[:, closed]
     right = np.eye(k + r)[:, :k]

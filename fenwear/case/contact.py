@@ -1,0 +1,51 @@
+"""The table of the contact: its law, its friction, and what lies between the surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, WrapValidator, model_validator
+
+from fenwear.case.laws import Dependence, constant_or_dependence
+from fenwear.case.layers import Layers, ThirdBody
+from fenwear.case.quantities import Number, Part
+
+CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
+
+
+def _own_or_registered(name: Any, own: Callable[[Any], Any]) -> Any:
+    return name if isinstance(name, str) and name in CONTACT_LAWS else own(name)
+
+
+class Contact(Part):
+    """Unilateral contact with Coulomb friction: in gross sliding of known direction, or with stick."""
+
+    law: Annotated[Literal["gross-sliding", "coulomb", "auto"], WrapValidator(_own_or_registered)] = Field(
+        default="auto",
+        description="gross-sliding: every node slips in the direction of the motion; coulomb: nodes stick or slip, "
+        "as in fretting; auto: coulomb where the bodies take up more than a tenth of the stroke elastically and "
+        "nothing goes against it, else gross-sliding",
+    )
+    friction: constant_or_dependence(Annotated[Number, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        default=0.0, description="coefficient of friction mu"
+    )
+    transverse_friction: Number = Field(
+        default=0.0, description="mu_d, of the traction -mu_d p across the sliding direction, equation (5)"
+    )
+    solver: Literal["condensed", "full"] = Field(
+        default="condensed", description="full: all displacements as unknowns, slow, to compare with"
+    )
+
+    third_body: ThirdBody | None = Field(
+        default=None, description="debris that stays between the surfaces; without this table none does"
+    )
+    layer: Annotated[Layers, Field(discriminator="kind")] | None = Field(
+        default=None, description="what gives way between the bodies beside their own elasticity, such as roughness"
+    )
+
+    @model_validator(mode="after")
+    def _pure_number(self) -> Self:
+        if isinstance(self.friction, Dependence) and self.friction.unit:
+            raise ValueError(f"friction: expected no unit: its values are pure numbers, got {self.friction.unit!r}")
+        return self

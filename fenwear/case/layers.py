@@ -1,0 +1,129 @@
+"""The tables of what lies between the surfaces: debris that stays (the third body), and layers that give way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from fenwear.case.dependence import VARIABLES
+from fenwear.case.laws import Dependence, constant_or_dependence
+from fenwear.case.quantities import Length, Number, Part, Stress, quantity
+
+STIFFNESS = "MPa/mm"
+
+
+class _OfPlace(Part):
+    """A table whose dependent values depend on the place alone."""
+
+    @model_validator(mode="after")
+    def _place_alone(self) -> Self:
+        for name, unit in self.units().items():
+            value = getattr(self, name)
+            if not isinstance(value, Dependence):
+                continue
+            other = [one for one in VARIABLES if one not in ("x", "y", "z") and value.depends_on(one)]
+            if other or value.regions is not None or value.law is not None:
+                got = other[0] if other else "regions" if value.regions is not None else "a law"
+                raise ValueError(f"{name}: expected an expression or a table of the place x, y, z alone, got {got}")
+            try:
+                value.scale(unit)
+            except ValueError as error:
+                raise ValueError(f"{name}: unit: {error}") from None
+        return self
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {}
+
+
+class ThirdBody(_OfPlace):
+    """Debris that stays between the surfaces as a layer of thickness t >= 0, until it is lost.
+
+    Over the sliding distance s of a place, dt/ds = share * (worn depth of both bodies)' - t / life: what is worn is
+    kept in part, and lost as it slides. The gap is the worn one less t.
+    """
+
+    share: Annotated[Number, Field(ge=0, le=1)] = Field(
+        description="of what both bodies lose at a place, by volume, that stays there as debris; the rest is ejected "
+        "at once"
+    )
+    life: constant_or_dependence(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="sliding distance over which 1 - 1/e of what lies at a place is ejected; of the place where edges "
+        "lose faster"
+    )
+    initial: Annotated[Length, Field(ge=0)] = Field(
+        default=0.0, description="thickness at the start, such as of a powder or a solid lubricant"
+    )
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {"life": "mm"}
+
+
+class LinearLayer(_OfPlace):
+    """A layer that closes by p / stiffness, after Winkler."""
+
+    kind: Literal["linear"] = Field(description="closes in proportion to the pressure")
+    stiffness: constant_or_dependence(Annotated[float, *quantity(STIFFNESS), Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="pressure over closure"
+    )
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {"stiffness": STIFFNESS}
+
+
+class PowerLayer(Part):
+    """A layer that closes by reference (p / pressure)^exponent, as ground joints of machine tools do."""
+
+    kind: Literal["power"] = Field(description="closes by a power of the pressure")
+    reference: Annotated[Length, Field(gt=0)] = Field(description="closure at the pressure")
+    pressure: Annotated[Stress, Field(gt=0)] = Field(description="that closes it by the reference")
+    exponent: Annotated[Number, Field(gt=0, le=1)] = Field(
+        default=0.5, description="of the pressure; 0.5 of ground joints"
+    )
+
+
+class ExponentialLayer(Part):
+    """A layer whose pressure grows by p = pressure (exp(closure / length) - 1)."""
+
+    kind: Literal["exponential"] = Field(description="its pressure grows by an exponential of the closure")
+    length: Annotated[Length, Field(gt=0)] = Field(
+        description="closure by which the pressure grows e times, as of rough surfaces: 0.3 to 0.5 of their rms height"
+    )
+    pressure: Annotated[Stress, Field(gt=0)] = Field(description="scale of the pressure, reached at 0.69 lengths")
+
+
+class RoughLayer(Part):
+    """Rough surfaces after Greenwood and Williamson: round asperities of one radius and Gaussian heights."""
+
+    kind: Literal["rough"] = Field(description="asperities after Greenwood and Williamson")
+    roughness: Annotated[Length, Field(gt=0)] = Field(
+        description="Sa of both surfaces together, the root of the sum of both squares; their rms height is 1.2533 Sa"
+    )
+    asperity_radius: Annotated[Length, Field(gt=0)] = Field(description="mean radius of the asperities' tips")
+    asperity_density: Annotated[float, *quantity("1/mm^2"), Field(gt=0)] = Field(description="asperities on an area")
+    modulus: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None, description="E* of the asperities; by default that of the materials at the contact"
+    )
+
+
+Layers = LinearLayer | PowerLayer | ExponentialLayer | RoughLayer
+
+
+def place_values(value: Any, place: Mapping[str, Any], n: int, unit: str, key: str) -> Any:
+    """Return a constant or what depends on the place at n nodes (n,), in a unit.
+
+    Raises:
+        CaseError: it is not positive somewhere; names the key.
+    """
+    import numpy as np
+
+    if isinstance(value, Dependence):
+        return value.values(place, (n,), value.scale(unit), key, least=1e-300)
+    return np.full(n, float(value))

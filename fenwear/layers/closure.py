@@ -1,0 +1,120 @@
+"""Layers that give way: the closure delta of a place by the pressure on it, beside the elasticity of the bodies.
+
+    power          delta = r (p / p_1)^m
+    exponential    p = p_1 (exp(delta / l) - 1)
+    rough          p = (4/3) E* eta sqrt(R) sigma^(3/2) F(d / sigma),  F(h) = integral from h of (z - h)^(3/2) phi(z) dz
+
+The last is the law of Greenwood and Williamson (Proc. R. Soc. Lond. A 295, 1966, 300): eta round asperities of radius R
+on an area, of Gaussian heights z sigma with density phi; d the distance of the mean planes. With the parabolic cylinder
+function D (Abramowitz and Stegun, 19.5.3) F(h) = Gamma(5/2) / sqrt(2 pi) exp(-h^2/4) D_(-5/2)(h), and F' = -(3/2) times
+the same integral of (z - h)^(1/2). The closure counts from where the mean planes are `FIRST` sigma apart, beyond which
+less than 1e-9 of the asperities touch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+
+LEAST = 1e-12  # of the largest pressure: where a power below 1 has a slope that is not infinite
+FIRST, LAST, POINTS = 6.0, -12.0, 6000  # distances over sigma between which F is inverted; how often it is tabulated
+
+
+class Closure(Protocol):
+    """A law of closure."""
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm, at pressures (...), MPa; zero without pressure."""
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa."""
+
+
+@dataclass(frozen=True)
+class PowerClosure:
+    """delta = reference (p / pressure)^exponent."""
+
+    reference: float
+    pressure: float
+    exponent: float
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm."""
+        return np.asarray(self.reference * (np.maximum(pressure, 0.0) / self.pressure) ** self.exponent)
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa; finite without pressure, too."""
+        floor = max(LEAST * float(pressure.max(initial=0.0)), 1e-300 if self.exponent == 1 else LEAST * self.pressure)
+        ratio = np.maximum(pressure, floor) / self.pressure
+        return np.asarray(self.reference * self.exponent / self.pressure * ratio ** (self.exponent - 1))
+
+
+@dataclass(frozen=True)
+class ExponentialClosure:
+    """p = pressure (exp(delta / length) - 1)."""
+
+    length: float
+    pressure: float
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm."""
+        return np.asarray(self.length * np.log1p(np.maximum(pressure, 0.0) / self.pressure))
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa."""
+        return np.asarray(self.length / (self.pressure + np.maximum(pressure, 0.0)))
+
+
+@dataclass(frozen=True)
+class RoughClosure:
+    """Greenwood and Williamson's law.
+
+    Attributes:
+        height: sigma, standard deviation of the heights, mm.
+        stiffness: (4/3) E* eta sqrt(R) sigma^(3/2), MPa.
+    """
+
+    height: float
+    stiffness: float
+
+    def closure(self, pressure: Array) -> Array:
+        """Return delta (...), mm."""
+        touching = np.maximum(pressure, 0.0) / self.stiffness + _inverse().first
+        return np.asarray(self.height * (FIRST - _inverse().distance(np.log(touching))))
+
+    def slope(self, pressure: Array) -> Array:
+        """Return its derivative (...), mm/MPa."""
+        touching = np.maximum(pressure, 0.0) / self.stiffness + _inverse().first
+        return np.asarray(-self.height * _inverse().slope(np.log(touching)) / (touching * self.stiffness))
+
+
+def asperity_integral(distance: NDArray[Any], power: float = 1.5) -> Array:
+    """Return the integral of (z - h)^power phi(z) from h = distance on, phi the Gaussian density."""
+    from scipy.special import gamma, pbdv
+
+    h = np.asarray(distance, dtype=float)
+    return np.asarray(gamma(power + 1) / np.sqrt(2 * np.pi) * np.exp(-(h**2) / 4) * pbdv(-power - 1, h)[0])
+
+
+class _Inverse:
+    """The distance h as a function of ln F(h): Hermite's cubics between exact values and slopes."""
+
+    def __init__(self) -> None:
+        from scipy.interpolate import CubicHermiteSpline
+
+        h = np.linspace(FIRST, LAST, POINTS)
+        values, slopes = asperity_integral(h), -1.5 * asperity_integral(h, 0.5)
+        self.first = float(values[0])
+        self.distance = CubicHermiteSpline(np.log(values), h, values / slopes)
+        self.slope = self.distance.derivative()
+
+
+@lru_cache(maxsize=1)
+def _inverse() -> _Inverse:
+    return _Inverse()

@@ -1,0 +1,150 @@
+"""A step of half-cycles or cycles with what lies between: what its own pressures open, and how its state goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.layers.between import Layers
+from fenwear.layers.debris import DebrisCycle
+from fenwear.sliding.wear import PhasesWear, StepWear, Worn
+
+
+@dataclass(frozen=True)
+class Passing:
+    """What phases of the motion, one after the other, wear and do to what lies between.
+
+    Attributes:
+        layers: What lies between.
+        wear: Of these phases.
+        debris: What they do to it; None without.
+    """
+
+    layers: Layers
+    wear: PhasesWear
+    debris: DebrisCycle | None
+
+    @classmethod
+    def over(cls, layers: Layers, wear: PhasesWear, slid: Array) -> Passing:
+        """Return what phases do that slide by these distances (m, n), mm."""
+        return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid))
+
+    def worn(self, pressure: Array, before: Array, cycles: float | None = None) -> Worn:
+        """Return what the phases wear, and how the state of what lies between changes.
+
+        Args:
+            pressure: (m, n), MPa.
+            before: State at the start of the step (rows, n).
+            cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
+        """
+        worn = self.wear.worn(pressure)
+        if self.debris is None:
+            return worn
+        return Worn(worn.punch, worn.strip, np.array(self.debris_changes(pressure, before, cycles)))
+
+    def debris_changes(self, pressure: Array, before: Array, cycles: float | None) -> tuple[Array, Array]:
+        """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
+        if self.debris is None:
+            return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
+        taken = self.wear.taken(pressure)
+        if cycles is None:
+            return self.debris.change(before[0], taken)
+        return self.debris.rate(before[0], taken, cycles)
+
+    def resting(self, pressure: Array) -> Array | None:
+        """Return the thickness of the debris that such cycles leave in the end (n,), mm; None without."""
+        if self.debris is None:
+            return None
+        return (self.debris.fed * self.wear.taken(pressure)).sum(axis=0) / self.debris.loss
+
+    def step(self, before: Array, cycles: float | None = None, *, implicit: bool = True) -> LayerStep | None:
+        """Return what the pressures of a step open in it; explicitly what gives way alone, None where nothing does.
+
+        Args:
+            before, cycles: As of `worn`.
+            implicit: Whether the wear of the step, and what becomes of it, opens its own gaps.
+        """
+        if not implicit and self.layers.closure is None:
+            return None
+        return LayerStep(self, before, cycles, implicit)
+
+
+@dataclass(frozen=True)
+class LayerStep:
+    """The wear of a step at the pressures of its phases, and what lies between, as a compliance of the contact.
+
+    Put into the inequality it makes the step implicit: pressure, wear and the state of what lies between belong to its
+    end, so that it is stable for any number of cycles.
+
+    Attributes:
+        passing: The phases.
+        before: State of what lies between at the start (rows, n).
+        cycles: Of the step; None for the phases once.
+        implicit: Whether wear opens the gaps of the step itself; else what gives way alone.
+    """
+
+    passing: Passing
+    before: Array
+    cycles: float | None
+    implicit: bool = True
+
+    @property
+    def _length(self) -> float:
+        return 1.0 if self.cycles is None else self.cycles
+
+    @property
+    def _wear(self) -> StepWear:
+        return StepWear(self.passing.wear, self._length)
+
+    def opening(self, pressure: Array) -> Array:
+        """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
+        passing, found = self.passing, np.zeros_like(pressure)
+        if self.implicit:
+            found = found + self._wear.opening(pressure)
+            if passing.debris is not None:
+                found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
+        closure = passing.layers.closure
+        return found if closure is None else found + closure.closure(pressure)
+
+    def local(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
+        if not self.implicit:
+            return np.zeros_like(pressure)
+        found = self._wear.local(pressure)
+        return None if found is None else found - self._covered(pressure)
+
+    def border(self, pressure: Array) -> tuple[Array, Array]:
+        """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
+        left, right = self._wear.border(pressure)
+        if self.passing.debris is None:
+            return left, right
+        unit = np.eye(pressure.shape[1])
+        left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
+        return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
+
+    def linear(self, pressure: Array) -> tuple[Callable[[Array], Array], Array]:
+        """Return the derivative of `opening` as a product with pressures (m, n), and slopes at own nodes (m, n)."""
+        covered, layer = self._covered(pressure), self.layer(pressure)
+        product, slopes = self._wear.linear(pressure)
+        if not self.implicit:
+            product, slopes, covered = np.zeros_like, np.zeros_like(slopes), np.zeros_like(covered)
+
+        def opened(change: Array) -> Array:
+            found = product(change) - (covered * change).sum(axis=0)
+            return found if layer is None else found + layer * change
+
+        return opened, slopes - covered + (0.0 if layer is None else layer)
+
+    def layer(self, pressure: Array) -> Array | None:
+        """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
+        closure = self.passing.layers.closure
+        return None if closure is None else closure.slope(pressure)
+
+    def _covered(self, pressure: Array) -> Array:
+        """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
+        if self.passing.debris is None:
+            return np.zeros_like(pressure)
+        return self.passing.debris.slope(self.cycles) * self.passing.wear.taken_slope(pressure)

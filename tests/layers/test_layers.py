@@ -1,0 +1,118 @@
+"""What lies between, in contact: march, implicit march, jump and end agree, the balances close, wrong input is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from combinations import SMALL, STICK
+
+from fenwear import Case, CaseError, Tribosystem, assemble, load_case, steady
+from fenwear.cycle import Block, evolve
+
+DEBRIS = "contact.third_body={share=0.6, life='0.3 mm'}"
+LAYERS = {
+    "linear": "{kind='linear', stiffness='1e6 MPa/mm'}",
+    "power": "{kind='power', reference='1 um', pressure='100 MPa'}",
+    "exponential": "{kind='exponential', length='1 um', pressure='10 MPa'}",
+    "rough": "{kind='rough', roughness='0.2 um', asperity_radius='50 um', asperity_density='1000 1/mm^2'}",
+}
+LAWS = ("gross-sliding", "coulomb")
+
+
+def case_of(law: str, *more: str) -> Case:
+    stick = STICK if law == "coulomb" else ("stick={}",)
+    return load_case("fretting-partial-slip", [*SMALL, f"contact.law='{law}'", *stick, *more])
+
+
+def end(system: Tribosystem, how: str, tolerance: float = 1e-3) -> Block:
+    block = list(evolve(system, integration=how, tolerance=tolerance))[-1]
+    assert block.equilibrium_error.max() < 1e-12
+    assert block.complementarity_error.max() < 1e-9
+    return block
+
+
+@pytest.mark.parametrize(
+    "layer", [pytest.param(name, marks=() if name == "rough" else pytest.mark.slow) for name in LAYERS]
+)
+@pytest.mark.parametrize("law", LAWS)
+def test_layers_give_way_alike_in_all_steps(law: str, layer: str) -> None:
+    """Marches, explicit and implicit, and jumps come to the same; a layer lowers the pressure."""
+    system = assemble(case_of(law, "run.half_cycles=4", f"contact.layer={LAYERS[layer]}"))
+    bare = assemble(case_of(law, "run.half_cycles=4"))
+    depths = [end(system, how).end.worn.punch for how in ("explicit", "implicit", "jump")]
+    scale = depths[0].max()
+    assert np.abs(depths[2] - depths[1]).max() < 1e-3 * scale
+    assert np.abs(depths[2] - depths[0]).max() < (2e-2 if law == "coulomb" else 1e-3) * scale  # its first half-cycle
+    assert end(system, "explicit").pressure.max() < 0.9 * end(bare, "explicit").pressure.max()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_debris_is_worn_stored_or_ejected(law: str) -> None:
+    """In every step, to rounding; marches and jumps have it as thick."""
+    system = assemble(case_of(law, "run.half_cycles=8", DEBRIS, f"contact.layer={LAYERS['exponential']}"))
+    weights, thick = system.pair.weights, {}
+    for how in ("explicit", "implicit", "jump"):
+        block = end(system, how)
+        stored, ejected = block.end.worn.between
+        worn = float(block.totals.of("volume_punch")[-1]) / system.bodies.punch.thickness
+        assert float(weights @ (stored + ejected)) == pytest.approx(worn, rel=1e-12)
+        assert (stored >= 0).all()
+        thick[how] = stored
+    for how in ("implicit", "jump"):
+        wrong = 5e-2 if law == "coulomb" else 5e-3  # its first half-cycle
+        assert np.abs(thick[how] - thick["explicit"]).max() < wrong * thick["explicit"].max()
+
+
+def test_the_steady_state_has_what_is_fed_times_its_life() -> None:
+    """A run of jumps to the end has its thickness and its pressures, with a layer, too; debris changes no pressure."""
+    more = (DEBRIS, f"contact.layer={LAYERS['exponential']}", "wear.punch.coefficient='1e-4 1/MPa'")
+    system = assemble(case_of("gross-sliding", "run.half_cycles=400000", *more))
+    state, last = steady(system), end(system, "jump", 1e-2)
+    assert state.debris is not None
+    slid = sum(phase.distance for phase in system.motion.phases)
+    assert state.debris == pytest.approx(0.6 * 0.3 * state.wear_per_cycle / slid, rel=1e-2)
+    assert np.abs(last.end.worn.between[0] - state.debris).max() < 1e-5 * state.debris.max()
+    assert np.abs(last.pressure[-1] - state.pressure[-1]).max() < 1e-3 * state.pressure.max()
+    without = steady(assemble(case_of("gross-sliding", *more[1:])))
+    assert state.pressure == pytest.approx(without.pressure, rel=1e-9)
+
+
+def test_debris_that_stays_for_ever_carries_like_what_was_worn() -> None:
+    """All of it kept, nothing lost: the gap never changes, nor does the pressure, however much is worn."""
+    system = assemble(case_of("gross-sliding", "run.half_cycles=8", "contact.third_body={share=1, life='1e9 m'}"))
+    block = end(system, "explicit")
+    assert np.ptp(block.pressure[0::2], axis=0).max() < 1e-9 * block.pressure.max()
+    assert block.end.worn.between[0] == pytest.approx(block.end.worn.punch, rel=1e-9)
+
+
+def test_energy_of_a_layer_is_metered() -> None:
+    """What a layer stores closes the balance of energy in partial slip, to rounding."""
+    system = assemble(case_of("coulomb", f"contact.layer={LAYERS['power']}"), heat="none")
+    rig = system.lawful.rig
+    at, _ = rig.cycle(rig.beginning())
+    _, parts = rig.cycle(at)
+    assert max(one.balance_error(rig.weights) for one in parts) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("setting", "text"),
+    [
+        ("contact.third_body={share=1.2, life=1}", "contact.third_body.share"),
+        ("contact.third_body={share=0.5, life=-1}", "contact.third_body.life"),
+        ("contact.third_body={share=0.5, life=1, initial=-1}", "contact.third_body.initial"),
+        ("contact.third_body={share=0.5, life={expression='p', unit='mm'}}", "place x, y, z alone, got p"),
+        ("contact.layer={kind='linear', stiffness=0}", "contact.layer"),
+        ("contact.layer={kind='power', reference=1, pressure=1, exponent=2}", "exponent"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_by_its_key(setting: str, text: str) -> None:
+    """The message names the key."""
+    with pytest.raises(CaseError, match=text):
+        case_of("gross-sliding", setting)
+
+
+def test_values_of_a_place_are_positive_everywhere() -> None:
+    """A life that is none somewhere is refused with the place."""
+    case = case_of("gross-sliding", "contact.third_body={share=0.5, life={expression='x', unit='mm'}}")
+    with pytest.raises(CaseError, match=r"contact\.third_body\.life: expected more than zero, got .* at x ="):
+        assemble(case)

@@ -25,8 +25,8 @@ from fenwear.report.style import (
     save_gif,
     strip_moves,
 )
-from fenwear.report.surface import model_of
-from fenwear.report.surface_animation import SurfaceFrames
+from fenwear.report.surface import along_contact, model_of
+from fenwear.report.surface_animation import MapFrames
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,7 +68,7 @@ class HistoryFrames:
             ax.set_ylabel(f"worn depth of\nthe {body} (µm)")
             top = 1.05e3 * max(float(depth.max()), 1e-12)
             ax.set_ylim((0, top) if body == "punch" else (top, 0))
-        contact_axis(below[-1])
+        contact_axis(below[-1], along_contact(history)[1])
         below[-1].set_xlim(*worn_range(history))
         self._title = self.figure.suptitle(" ", x=0.02, ha="left", fontsize="medium")
 
@@ -81,7 +81,7 @@ class HistoryFrames:
             if len(rows):
                 values = until.pressure.values[rows[-1]]
                 highest = max(highest, float(values.max()))
-                line.set_data(*parted(until.x.values, values, self._gaps))
+                line.set_data(*parted(along_contact(self.history)[0], values, self._gaps))
         self._above.set_ylim(0, 1.1 * highest)
         for body, (x, depth, _) in self._surfaces.items():
             worn = 1e3 * depth.sel(half_cycle=slice(None, half_cycle)).values[-1]
@@ -105,8 +105,8 @@ def draw_animation(directory: Path) -> Path:
     """Draw figures/history.gif of a run; return its path."""
     history = read_history(directory)
     half_cycles = frames_of(history)
-    plane = model_of(history) == "plane"
-    frames = HistoryFrames(history, half_cycles) if plane else SurfaceFrames(history, half_cycles)
+    solid = model_of(history) == "solid"
+    frames = MapFrames(history, half_cycles) if solid else HistoryFrames(history, half_cycles)
     frames.figure.set_dpi(90)
     name_bodies([frames.figure], names_in(directory))
     images = []

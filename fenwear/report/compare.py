@@ -13,23 +13,10 @@ import xarray
 
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.errors import CaseError, InputError
-from fenwear.report.compare_stick import has_stick, stick_comparison
-from fenwear.report.compare_surfaces import surface_comparison
-from fenwear.report.course import directions_present, mark_few
+from fenwear.report.compare_figure import has_stick, runs_figure
 from fenwear.report.figures import of_half_cycles
-from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
-from fenwear.report.shapes import worn_range
-from fenwear.report.style import (
-    DIRECTIONS,
-    contact_axis,
-    direction_words,
-    legend_beside,
-    name_bodies,
-    panels,
-    run_style,
-    strip_moves,
-)
+from fenwear.report.style import name_bodies
 from fenwear.report.surface import model_of
 from fenwear.results.cycles import by_cycles, resolves
 from fenwear.results.degrees import in_kelvin
@@ -183,61 +170,7 @@ def _read(directory: Path) -> xarray.Dataset:
 
 def comparison_figure(comparison: Comparison) -> Figure:
     """Draw shape and pressures at the end of each run, and what it comes to over its cycles."""
-    for kind, draw in ((has_stick, stick_comparison), (_no_plane, surface_comparison)):
-        if any(kind(history) for history in comparison.histories):
-            return draw(comparison.names, comparison.histories)
-    return _plane_comparison(comparison)
-
-
-def _plane_comparison(comparison: Comparison) -> Figure:
-    """Draw shape and pressures at the end of each run, its largest pressure and temperature over the half-cycles."""
-    runs = list(zip(comparison.names, comparison.histories, strict=True))
-    present = [d for d in DIRECTIONS if any(d in directions_present(h) for h in comparison.histories)]
-    hot = [h for h in comparison.histories if "max_temperature" in h]
-    stripped = [h for h in comparison.histories if "wear_strip" in h]
-    count = 2 + len(present) + (1 if hot else 0) + (1 if stripped else 0)
-    figure, axes = panels(count, 2.5, share_x=False)
-    strip = axes.pop(1) if stripped else None
-    shape, *pressures = axes[: 1 + len(present)]
-    for number, (name, history) in enumerate(runs):
-        # Thinner from run to run: where two agree, both are seen.
-        style = {**run_style(number), "linewidth": max(1.2, 3.0 - 0.7 * number)}
-        few = mark_few(history.half_cycle)
-        shape.plot(history.x, 1e3 * history.wear.isel(half_cycle=-1), label=name, **style)
-        if strip is not None and "wear_strip" in history:
-            strip.plot(history.x_strip, 1e3 * history.wear_strip.isel(half_cycle=-1), label=name, **style)
-        for ax, d in zip(pressures, present, strict=True):
-            rows = history.direction.values == d
-            if rows.any():
-                ax.plot(history.x, history.pressure.values[rows][-1], label=name, **style)
-        for ax, variable in zip(axes[1 + len(present) :], ("max_pressure", "max_temperature"), strict=False):
-            if variable in history:
-                ax.plot(history.half_cycle, _larger_of_cycle(history, variable), label=name, **style, **few)
-    shape.set_title("Worn shape of the punch at the end", loc="left")
-    shape.set_ylabel("worn depth w (µm)")
-    if strip is not None:
-        strip.set_title("Worn shape of the strip at the end", loc="left")
-        strip.set_ylabel("worn depth (µm)")
-        ends = [worn_range(history) for history in stripped]
-        strip.set_xlim(min(end[0] for end in ends), max(end[1] for end in ends))
-        strip.set_ylim(bottom=0)
-        strip.set_xlabel("position along the strip x (mm)")
-    for ax, d in zip(pressures, present, strict=True):
-        ax.set_title(f"Pressure at the end, {strip_moves(runs[0][1])} {direction_words(runs[0][1])[d]}", loc="left")
-        ax.set_ylabel("pressure p (MPa)")
-    for ax in (shape, *pressures):
-        ax.set_ylim(bottom=0)
-        contact_axis(ax)
-    titles = (("Largest contact pressure", "pressure (MPa)"), ("Largest temperature", "temperature (K)"))
-    for ax, (title, label) in zip(axes[1 + len(present) :], titles, strict=False):
-        ax.set_title(title, loc="left")
-        ax.set_ylabel(label)
-        ax.set_xscale("log")
-        ax.set_xlabel("half-cycle n")
-    for ax in (*axes, *([] if strip is None else [strip])):
-        legend_beside(ax, "run")
-    part_lines([figure], np.concatenate([gaps_of(history) for history in comparison.histories]))
-    return figure
+    return runs_figure(comparison.names, comparison.histories)
 
 
 def draw_comparison(comparison: Comparison, path: Path) -> Path:
@@ -273,15 +206,6 @@ def _rows(tables: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
 
 def _differing(rows: dict[str, list[Any]]) -> dict[str, list[Any]]:
     return {key: row for key, row in rows.items() if any(value != row[0] for value in row)}
-
-
-def _no_plane(history: xarray.Dataset) -> bool:
-    return model_of(history) != "plane"
-
-
-def _larger_of_cycle(history: xarray.Dataset, name: str) -> xarray.DataArray:
-    """Return the larger value of the last two directions: the line shall not jump between them."""
-    return history[name].rolling(half_cycle=len(directions_present(history)), min_periods=1).max()
 
 
 def _not_finite(value: Any) -> bool:

@@ -18,6 +18,7 @@ from fenwear.report.style import (
     STANDARD,
     Look,
     direction_style,
+    from_zero,
     legend_beside,
     level_line,
     panels,
@@ -36,15 +37,16 @@ MANY = 100.0  # last over first of a logarithmic axis, at least
 
 
 def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
-    """Draw largest pressure, width in contact and, with heat, largest temperature."""
-    hot = "max_temperature" in history
-    figure, axes = panels(3 if hot else 2, 2.5, look=look)
+    """Draw largest pressure, width or area in contact and, with heat, largest temperature."""
     over = {
         "max_pressure": "largest pressure (MPa)",
         "contact_width": "width in contact (mm)",
+        "contact_area": "area in contact (mm²)",
         "max_temperature": f"largest temperature ({temperature_unit(history)})",
     }
-    for ax, (name, label) in zip(axes, over.items(), strict=False):
+    over = {name: label for name, label in over.items() if name in history}
+    figure, axes = panels(len(over), 2.5, look=look)
+    for ax, (name, label) in zip(axes, over.items(), strict=True):
         by_direction(ax, history, name, look)
         ax.set_ylabel(label)
     if "pressure_sum" in history and len(ends := cycle_ends(history)):
@@ -56,27 +58,28 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         level_line(axes[0], mean, f"mean {mean:.4g}")
         level_line(axes[1], nominal_width(history), f"nominal {nominal_width(history):.4g}")
     for ax in axes[:2]:
-        ax.set_ylim(bottom=0)
+        from_zero(ax)
+    for ax in axes:
         legend_beside(ax, strip_moves(history))
-    if hot:
-        legend_beside(axes[2], strip_moves(history))
     run_axis(axes[-1], history, look)
     return figure
 
 
 def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the change against one cycle ago and the distance to the optimal pressure."""
-    figure, axes = panels(2, 2.7, look=look)
     over = {
-        "periodicity": "change in a cycle,\nlargest of a node (-)",
-        "optimum_distance": "distance to the optimum,\nlargest of a node (-)",
+        "periodicity": "change in a cycle, largest of a node (-)",
+        "optimum_distance": "distance to the optimum, largest of a node (-)",
     }
+    over = {name: label for name, label in over.items() if name == "periodicity" or history[name].notnull().any()}
+    figure, axes = panels(len(over), 2.7, look=look)
     for ax, (name, label) in zip(axes, over.items(), strict=True):
         by_direction(ax, history, name, look)
         ax.set_ylabel(label)
         legend_beside(ax, strip_moves(history))
     axes[0].set_yscale("log")
-    axes[1].set_ylim(bottom=0)
+    for ax in axes[1:]:
+        from_zero(ax)
     run_axis(axes[-1], history, look)
     return figure
 
@@ -93,31 +96,34 @@ def volume_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         axes[1].plot(x, history[f"wear_rate{end}"], color=colour, label=f"{body}, current", **mark_few(x))
         axes[1].plot(x, history[f"mean_wear_rate{end}"], color=colour, linestyle="--", label=f"{body}, mean")
     axes[0].set_ylabel("worn volume (mm³)")
-    axes[1].set_ylabel("specific wear rate\n(mm³/(N m))")
+    axes[1].set_ylabel("specific wear rate (mm³/(N m))")
     for ax in axes:
-        ax.set_ylim(bottom=0)
+        from_zero(ax)
         legend_beside(ax, "")
     run_axis(axes[-1], history, look, logarithmic=False)
     return figure
 
 
 def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
-    """Draw the largest worn depths and the widths of the scars."""
-    figure, axes = panels(2, 2.7, look=look)
+    """Draw the largest worn depths and the sizes of the scars, unless they are worn all the way round."""
+    sizes = [n for n in ("scar_length", "scar_width") if any(f"{n}{end}" in history for end in BODIES.values())]
+    figure, axes = panels(1 + len(sizes), 2.5, look=look)
     x = look.course(history)
     for body, end in BODIES.items():
         if f"max_wear{end}" not in history:
             continue
         colour = BODY_COLOURS[body]
         axes[0].plot(x, 1e3 * history[f"max_wear{end}"], color=colour, label=body, **mark_few(x))
-        if f"scar_width{end}" not in history:  # worn all the way round
-            continue
-        axes[1].plot(x, history[f"scar_width{end}"], color=colour, label=f"{body}, at 1 %", **mark_few(x))
-        axes[1].plot(x, history[f"scar_width_5{end}"], color=colour, linestyle="--", label=f"{body}, at 5 %")
+        for ax, name in zip(axes[1:], sizes, strict=True):
+            for share, dashes in (("", "-"), ("_5", "--")):
+                if f"{name}{share}{end}" in history:
+                    of = f"{body}, at {5 if share else 1} %"
+                    ax.plot(x, history[f"{name}{share}{end}"], dashes, color=colour, label=of, **mark_few(x))
     axes[0].set_ylabel("largest worn depth (µm)")
-    axes[1].set_ylabel("scar width (mm)")
+    for ax, name in zip(axes[1:], sizes, strict=True):
+        ax.set_ylabel(f"{name.replace('_', ' ')} (mm)")
     for ax in axes:
-        ax.set_ylim(bottom=0)
+        from_zero(ax)
         legend_beside(ax, "")
     run_axis(axes[-1], history, look)
     return figure
@@ -139,9 +145,9 @@ def place_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     legend_beside(axes[0], "")
     axes[1].plot(x, 1e3 * history.eccentricity, color="0", **mark_few(x))
     axes[1].set_ylabel("eccentricity (µm)")
-    axes[1].set_ylim(bottom=0)
+    from_zero(axes[1])
     axes[2].plot(x, history.attitude_angle, color="0", **mark_few(x))
-    axes[2].set_ylabel("attitude angle\n(degrees)")
+    axes[2].set_ylabel("attitude angle (degrees)")
     low, high = axes[2].get_ylim()
     axes[2].set_ylim(min(low, -1.0), max(high, 1.0))
     for ax in axes[1:]:
@@ -160,7 +166,7 @@ def friction_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     axes[1].set_ylabel("work of friction (J)")
     legend_beside(axes[0], "")
     for ax in axes:
-        ax.set_ylim(bottom=0)
+        from_zero(ax)
     run_axis(axes[-1], history, look, logarithmic=False)
     return figure
 

@@ -15,9 +15,8 @@ from fenwear.report.figures import FOLDER, all_figures, read_history
 from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.key_numbers import names_in, read_case
 from fenwear.report.sections import geometry_figure, stress_figure
-from fenwear.report.style import STANDARD, Look, name_bodies
+from fenwear.report.style import STANDARD, Look, name_bodies, wrapped
 from fenwear.report.surface import model_of
-from fenwear.report.surface_figures import surface_figures
 from fenwear.results.disk import write_text
 
 if TYPE_CHECKING:
@@ -39,7 +38,7 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDAR
             drawn["surface_stress"] = stress_figure(fields, look)
         if "punch_temperature" in fields:
             drawn["boundary_temperature"] = boundary_figure(fields, look)
-    return drawn
+    return wrapped(drawn)
 
 
 def draw_figures(
@@ -48,10 +47,9 @@ def draw_figures(
     """Draw all figures of a run, and their captions, into its folder `figures`; return the paths."""
     folder = directory / FOLDER
     history = read_history(directory)
+    drawn = all_figures(history, half_cycles, look)
     if model_of(history) == "plane":
-        drawn = all_figures(history, half_cycles, look) | field_figures(directory, read_case(directory), look)
-    else:
-        drawn = surface_figures(history, half_cycles, look)
+        drawn |= field_figures(directory, read_case(directory), look)
     part_lines(drawn.values(), gaps_of(history))
     name_bodies(drawn.values(), names := names_in(directory))
     folder.mkdir(exist_ok=True)

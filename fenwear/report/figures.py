@@ -9,35 +9,48 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray
 
-from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 from fenwear.report.course import (
     convergence_figure,
-    cycle_ends,
     directions_present,
     friction_figure,
     heat_balance_figure,
     is_conforming,
-    late_pressures,
     mean_pressure,
     peak_figure,
     place_figure,
     scar_figure,
-    shown_unit,
+    temperature_unit,
     volume_figure,
 )
+from fenwear.report.maps import cuts_figure, map_figure, quantities
 from fenwear.report.program import program_figure
-from fenwear.report.shapes import profile_figure, surfaces_of, wear_map_figure, worn_range
-from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, level_line, panels, shades
+from fenwear.report.shapes import profile_figure, shape_figure, wear_map_figure
+from fenwear.report.shown import chosen_half_cycles, cycle_means, early_half_cycles, early_of, nearest_half_cycles
+from fenwear.report.stick import stick_figures
+from fenwear.report.style import (
+    STANDARD,
+    Look,
+    contact_axis,
+    from_zero,
+    legend_beside,
+    level_line,
+    panels,
+    shades,
+    wrapped,
+)
+from fenwear.report.surface import along_contact, model_of
+from fenwear.results.cycles import by_cycles, resolves
 from fenwear.results.history import HISTORY
 from fenwear.results.reading import load_history
+from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FOLDER, CAPTIONS = "figures", "captions.txt"
-EARLY = 3.0  # times the largest pressure of later states: what is beyond it has a panel of its own
-DPI = 200
+FOLDER = "figures"
+MAPS = 6  # at most
 
 
 def read_history(directory: Path) -> xarray.Dataset:
@@ -62,49 +75,6 @@ def of_half_cycles(directory: Path, history: xarray.Dataset) -> xarray.Dataset:
     return history
 
 
-def chosen_half_cycles(history: xarray.Dataset, wanted: Sequence[int] = ()) -> list[int]:
-    """Return the recorded half-cycles nearest to the wanted ones, or six spread over the run."""
-    recorded = history.half_cycle.values
-    # Most of them beyond the end: they were chosen for a longer run.
-    if 2 * sum(n <= recorded[-1] for n in wanted) <= len(wanted):
-        wanted = [int(n) for n in np.unique(np.geomspace(1, recorded[-1], 6).round().astype(int))]
-    return nearest_half_cycles(history, [*wanted, int(recorded[-1])])
-
-
-def nearest_half_cycles(history: xarray.Dataset, wanted: Sequence[int]) -> list[int]:
-    """Return the recorded half-cycles nearest to the wanted ones."""
-    recorded = history.half_cycle.values
-    return sorted({int(recorded[np.abs(recorded - n).argmin()]) for n in wanted})
-
-
-def cycle_means(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[int, Array]:
-    """Return mean pressures up to the ends of the cycles that the half-cycles belong to, by their last half-cycle."""
-    if "pressure_sum" not in history:
-        return {}
-    ends = cycle_ends(history)
-    own = np.searchsorted(ends, half_cycles)
-    wanted = [int(n) for n in np.unique(ends[own[own < len(ends)]])]
-    return dict(zip(wanted, late_pressures(history, wanted), strict=True)) if wanted else {}
-
-
-def pressure_top(history: xarray.Dataset, half_cycles: Sequence[int]) -> float:
-    """Return the upper end of an axis of pressure: the edges of a fresh flat punch peak far beyond all that follows."""
-    late = float(history.pressure.sel(half_cycle=list(half_cycles[len(half_cycles) // 2 :])).max())
-    return 1.15 * max(late, float(history.pressure.median("half_cycle").max()))
-
-
-def early_half_cycles(history: xarray.Dataset, half_cycles: Sequence[int]) -> list[int]:
-    """Return the first half-cycles whose pressures lie far beyond all later ones, as edges of flat punches do."""
-    peaks = {n: float(history.pressure.sel(half_cycle=n).max()) for n in half_cycles}
-    last = max(list(peaks.values())[len(peaks) // 2 :])
-    early = []
-    for n in half_cycles[:-1]:
-        if peaks[n] <= EARLY * last:
-            break
-        early.append(n)
-    return early
-
-
 def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw the pressure in both directions, at each chosen half-cycle and the one beside it.
 
@@ -114,87 +84,81 @@ def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: L
     rows = {d: history.isel(half_cycle=np.flatnonzero(history.direction.values == d)) for d in present}
     chosen = {d: nearest_half_cycles(own, half_cycles) for d, own in rows.items()}
     early = {d: early_half_cycles(own, chosen[d]) for d, own in rows.items()}
-    has_early = any(early.values())
-    figure, axes = panels(len(present) + has_early, 3.0, look=look)
-    conforming = is_conforming(history)
+    figure, axes = panels(len(present) + any(early.values()), 3.0, look=look)
+    x = along_contact(history)[0]
     for ax, d in zip(axes, present, strict=False):
         for colour, n in shades(chosen[d]):
             drawn = axes[-1] if n in early[d] else ax
-            ax_line = {"color": colour, "label": look.name(history, n), "gid": str(n)}
-            drawn.plot(history.x, rows[d].pressure.sel(half_cycle=n), linestyle="-" if d > 0 else "--", **ax_line)
-        if conforming:
-            mean = mean_pressure(history)
-            level_line(ax, mean, f"mean {mean:.4g} MPa")
-    for ax in axes:
-        ax.set_ylabel("contact pressure p (MPa)")
-        ax.set_ylim(bottom=0)
-        legend_beside(ax, look.of_one)
-    contact_axis(axes[-1])
-    return figure
+            style = {
+                "color": colour,
+                "label": look.name(history, n),
+                "gid": str(n),
+                "linestyle": "-" if d > 0 else "--",
+            }
+            drawn.plot(x, rows[d].pressure.sel(half_cycle=n), **style)
+    return _along(history, figure, axes, "contact pressure p (MPa)", axes[: len(present)], look)
 
 
 def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw mean pressures of all directions up to some cycles: what is well posed where a contact's edge moves."""
     means = cycle_means(history, half_cycles)
-    peaks = {n: float(mean.max()) for n, mean in means.items()}
-    late = max(list(peaks.values())[len(peaks) // 2 :])
-    early = [n for n in means if peaks[n] > EARLY * late]
+    early = early_of(means)
     figure, axes = panels(2 if early else 1, 3.0, look=look)
+    x = along_contact(history)[0]
     for colour, n in shades(list(means)):
         ax = axes[-1] if n in early else axes[0]
-        ax.plot(history.x, means[n], color=colour, label=look.name(history, n), gid=str(n))
-    if is_conforming(history):
-        mean = mean_pressure(history)
-        level_line(axes[0], mean, f"mean {mean:.4g} MPa")
-    for ax in axes:
-        ax.set_ylabel("mean pressure (MPa)")
-        ax.set_ylim(bottom=0)
-        legend_beside(ax, look.of_one)
-    contact_axis(axes[-1])
-    return figure
-
-
-def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
-    """Draw what is worn off the bodies at the chosen half-cycles; the strip's depth downwards."""
-    surfaces = surfaces_of(history)
-    figure, axes = panels(len(surfaces), 3.0, look=look)
-    for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
-        for colour, n in shades(half_cycles):
-            values = 1e3 * depth.sel(half_cycle=n).values
-            ax.plot(x, values, color=colour, label=look.name(history, n), gid=str(n))
-        ax.set_ylabel(f"worn depth of the {body} (µm)")
-        top = 1.05e3 * max(float(depth.max()), 1e-12)
-        ax.set_ylim((0, top) if body == "punch" else (top, 0))
-        legend_beside(ax, look.of_one)
-    axes[-1].set_xlim(*worn_range(history))
-    contact_axis(axes[-1])
-    return figure
+        ax.plot(x, means[n], color=colour, label=look.name(history, n), gid=str(n))
+    return _along(history, figure, axes, "mean pressure (MPa)", axes[:1], look)
 
 
 def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
     """Draw the temperature along both contact surfaces at the chosen half-cycles."""
     figure, axes = panels(2, 3.0, look=look)
-    for ax, body in zip(axes, ("punch", "strip"), strict=True):
-        values = history[f"temperature_{body}"]
+    x, label = along_contact(history)
+    for ax, body in zip(axes, BODIES, strict=True):
         for colour, n in shades(half_cycles):
-            ax.plot(history.x, values.sel(half_cycle=n), color=colour, label=look.name(history, n), gid=str(n))
-        ax.set_ylabel(f"temperature of the {body} ({shown_unit(values.attrs.get('units', 'K'))})")
+            values = history[f"temperature_{body}"].sel(half_cycle=n)
+            ax.plot(x, values, color=colour, label=look.name(history, n), gid=str(n))
+        ax.set_ylabel(f"temperature of the {body} ({temperature_unit(history)})")
         legend_beside(ax, look.of_one)
-    contact_axis(axes[-1])
+    contact_axis(axes[-1], label)
+    return figure
+
+
+def _along(
+    history: xarray.Dataset, figure: Figure, axes: Sequence[Axes], name: str, with_mean: Sequence[Axes], look: Look
+) -> Figure:
+    """Name the axes of pressures along a contact, some with their mean."""
+    if is_conforming(history):
+        mean = mean_pressure(history)
+        for ax in with_mean:
+            level_line(ax, mean, f"mean {mean:.4g} MPa")
+    for ax in axes:
+        ax.set_ylabel(name)
+        from_zero(ax)
+        legend_beside(ax, look.of_one)
+    contact_axis(axes[-1], along_contact(history)[1])
     return figure
 
 
 def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look = STANDARD) -> dict[str, Figure]:
     """Draw every figure that the history has data for, by its name."""
     chosen = chosen_half_cycles(history, wanted)
-    drawn = {
-        "profiles": profile_figure(history, chosen, look),
-        "shape": shape_figure(history, chosen, look),
-        "wear_map": wear_map_figure(history, look),
-        "pressure": pressure_figure(history, chosen, look),
-    }
-    if cycle_means(history, chosen):
-        drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
+    drawn, model = {}, model_of(history)
+    if model == "solid":
+        drawn |= {name: map_figure(history, one, chosen[-MAPS:], look) for name, one in quantities(history).items()}
+        drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)
+        drawn["cuts_across"] = cuts_figure(history, chosen, look, along=False)
+    else:
+        if model == "plane":
+            drawn["profiles"] = profile_figure(history, chosen, look)
+            drawn["wear_map"] = wear_map_figure(history, look)
+        drawn["shape"] = shape_figure(history, chosen, look)
+        drawn["pressure"] = pressure_figure(history, chosen, look)
+        if cycle_means(history, chosen):
+            drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
+        if "max_temperature" in history:
+            drawn["temperature"] = temperature_figure(history, chosen, look)
     drawn["peaks"] = peak_figure(history, look)
     if "eccentricity" in history:
         drawn["place"] = place_figure(history, look)
@@ -206,6 +170,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
         drawn["program"] = program_figure(history, look)
     drawn["convergence"] = convergence_figure(history, look)
     if "max_temperature" in history:
-        drawn["temperature"] = temperature_figure(history, chosen, look)
         drawn["heat_balance"] = heat_balance_figure(history, look)
-    return drawn
+    if resolves(history):
+        drawn |= stick_figures(by_cycles(history), look)
+    return wrapped(drawn)

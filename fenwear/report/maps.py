@@ -10,11 +10,25 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.report.course import temperature_unit
-from fenwear.report.figures import early_half_cycles, pressure_top
-from fenwear.report.style import GREY, NARROW, STANDARD, Look, legend_beside, name_panel, panels, shades
+from fenwear.report.shown import early_half_cycles, pressure_top
+from fenwear.report.style import (
+    GREY,
+    NARROW,
+    STANDARD,
+    Look,
+    bar_place,
+    colour_bar,
+    from_zero,
+    legend_beside,
+    name_panel,
+    panels,
+    panels_of_maps,
+    shades,
+)
 from fenwear.report.surface import Surface, centre_of_wear, surface_of
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LEVELS = 16
@@ -95,45 +109,35 @@ def map_figure(
             title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
         size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
         name_panel(ax, f"{title}\n≤ {size} {quantity.unit}")
-    every: Any = axes
-    bar = figure.colorbar(drawn, ax=every, shrink=min(1.0, 3.5 / figure.get_figheight()), aspect=25)
     name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
-    bar.set_label(f"{name}\nover the largest one" if relative else f"{name} ({quantity.unit})")
+    label = f"{name} over the largest one" if relative else f"{name} ({quantity.unit})"
+    colour_bar(figure, drawn, axes, label, **bar_place(look))
     return figure
 
 
-def _map_panels(surface: Surface, count: int, look: Look) -> tuple[Figure, list[Any]]:
+def _map_panels(surface: Surface, count: int, look: Look) -> tuple[Figure, list[Axes]]:
     """Return a figure of equal maps with the surface's border on each."""
-    from matplotlib import rc_context
     from matplotlib.collections import LineCollection
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
 
     size = np.ptp(surface.map, axis=0)
-    columns = min(count, 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3)
-    narrow = look.width < NARROW
-    columns = min(columns, 2) if narrow else columns
+    columns = 1 if size[0] > LONG**2 * size[1] else 2 if size[0] > LONG * size[1] else 3
+    columns = min(count, columns, 2 if look.width < NARROW else columns)
     rows = -(-count // columns)
-    height = rows * (min(max((look.width - 1.6) / columns * size[1] / size[0], 0.9), 4.5) + 0.55) + 0.8
-    with rc_context({"axes.titlesize": "small", "font.size": 8.0 if narrow else 10.0}):
-        figure = Figure(figsize=(look.width, height), layout="constrained")
-        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    figure, axes = panels_of_maps(rows, columns, size, look)
+    shown = list(axes.ravel()[:count])
     for ax in axes.ravel()[count:]:
         ax.set_visible(False)
-    for ax in axes.ravel()[:count]:
+    for ax in shown:
         ax.add_collection(LineCollection(list(surface.border), colors=GREY, linewidths=0.8))
         for name, (across, up) in surface.labels:
             ax.text(across, up, name, ha="center", va="center", fontsize="small", color=GREY)
-        ax.set_aspect("equal")
         ax.margins(0.03)
-        ax.xaxis.set_major_locator(MaxNLocator(4, prune="both"))
-    for column in range(columns):  # the last row may be shorter
-        lowest = axes[max(row for row in range(rows) if row * columns + column < count), column]
-        lowest.set_xlabel(f"{surface.names[0]} (mm)")
+    for lowest in shown[-columns:]:  # the last row may be shorter
+        lowest.set_xlabel(surface.axis_labels[0])
         lowest.tick_params(labelbottom=True)
     for ax in axes[:, 0]:
-        ax.set_ylabel(f"{surface.names[1]} (mm)")
-    return figure, list(axes.ravel()[:count])
+        ax.set_ylabel(surface.axis_labels[1])
+    return figure, shown
 
 
 def _levels(
@@ -165,8 +169,10 @@ def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look 
     early = early_half_cycles(history, half_cycles)
     # What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
     late = [n for n in half_cycles if n not in early]
-    rows = [(q, late if q.variable == "pressure" else half_cycles) for q in drawn]
-    rows += [(q, early) for q in drawn if early and q.variable == "pressure"]
+    rows = []
+    for quantity in drawn:
+        rows += [(quantity, part) for part in ((late, early) if quantity.variable == "pressure" else (half_cycles,))]
+    rows = [row for row in rows if row[1]]
     figure, axes = panels(len(rows), 2.3, share_x=False, look=look)
     at = centre_of_wear(history)
     for ax, (quantity, shown) in zip(axes, rows, strict=True):
@@ -177,7 +183,7 @@ def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look 
                 ax.plot(*surface.cut(values, at, along=along), color=colour, label=look.name(history, n))
         ax.set_ylabel(f"{quantity.short} ({quantity.unit})")
         if not quantity.variable.startswith("temperature"):
-            ax.set_ylim(bottom=0)
+            from_zero(ax)
         ax.margins(x=0.01)
         legend_beside(ax, look.of_one)
     place, other = (float(at[1]), "across") if along else (float(at[0]), "along")

@@ -14,23 +14,25 @@ import xarray
 from fenwear.errors import CaseError, OutputError
 from fenwear.report.captions import caption
 from fenwear.report.draw import draw_figures
-from fenwear.report.figures import FOLDER, chosen_half_cycles, read_history
+from fenwear.report.figures import FOLDER, read_history
 from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, names_in, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
-from fenwear.report.stick import write_stick_report
+from fenwear.report.shown import chosen_half_cycles
 from fenwear.report.style import STANDARD, Look
 from fenwear.report.surface import model_of
 from fenwear.report.turned import Turned, turned_map
 from fenwear.report.uncertainty import uncertainty_rows
 from fenwear.results.disk import write_text, writing
 from fenwear.results.history import CASE, HISTORY
-from fenwear.results.sheet import BODIES, LINES, UNCERTAINTY, shown
+from fenwear.results.sheet import BODIES, LINES, OF_CONTACT, UNCERTAINTY, shown
 
 REPORT = "report.html"
-SECTIONS = ("geometry", "profiles", "shape", "wear_map", "pressure", "mean_pressure", "program", "peaks", "place",
-            "volume", "scar", "friction", "surface_stress", "temperature", "boundary_temperature", "pressure_map",
-            "wear_strip_map", "temperature_map", "temperature_strip_map", "cuts_along", "cuts_across")  # fmt: skip
+SECTIONS = ("geometry", "loops", "zones", "tractions", "traction_map", "sliding", "energy", "stress_range",
+            "profiles", "shape", "wear_map", "wear_strip_map", "pressure", "mean_pressure", "pressure_map",
+            "cuts_along", "cuts_across", "program", "peaks", "place", "volume", "scar", "friction",
+            "surface_stress", "temperature", "boundary_temperature", "temperature_map", "temperature_strip_map")  # fmt: skip
+WAYS = ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise")
 FIELDS = {"von_mises": "von Mises stress", "temperature": "temperature"}
 
 
@@ -62,10 +64,7 @@ def write_report(
 def _write_report(
     directory: Path, log: Callable[[str], None], complete: bool, look: Look, formats: Sequence[str]
 ) -> list[Path]:
-    case = read_case(directory)
-    if case.get("contact", {}).get("law") == "coulomb":
-        return write_stick_report(directory, formats, look)
-    paths = draw_figures(directory, case.get("output", {}).get("figures_at", ()), look, formats)
+    paths = draw_figures(directory, read_case(directory).get("output", {}).get("figures_at", ()), look, formats)
     if complete:
         from fenwear.report.animation import draw_animation
 
@@ -173,22 +172,15 @@ def _turned(history: xarray.Dataset) -> Turned | None:
 
 
 def _number(path: str, value: float, *, cut: int = 0) -> Number:
+    """Return a number as it is read: as the sheet has it, where it is one of its lines."""
+    line = (LINES | OF_CONTACT).get(path[cut:])
+    if line is not None:
+        return Number(path, line.label, value, number_text(shown(value, line)), line.unit)
     return Number(path, label_of(path[cut:]), value, number_text(value), unit_of(path))
 
 
 def _table(caption: str, values: dict[str, int | float], *, cut: int = 0) -> Table:
     return Table(caption, [_number(path, value, cut=cut) for path, value in values.items()])
-
-
-def _sheet_table(name: str, sheet: dict[str, int | float]) -> Table:
-    """Return what a tribometer measures of the sliding or of a body, in the units in which it is read."""
-    numbers = []
-    for path, value in sheet.items():
-        of, _, key = path.partition(".")
-        if of == name:
-            line = LINES[key]
-            numbers.append(Number(path, line.label, value, number_text(shown(value, line)), line.unit))
-    return Table(name.capitalize() if name in BODIES else "What a tribometer measures", numbers)
 
 
 def numbers_of(summary: dict[str, Any]) -> dict[str, int | float]:
@@ -205,15 +197,16 @@ def _tables(summary: dict[str, Any], history: xarray.Dataset) -> list[Table]:
         return [_table("At the last recorded half-cycle", last)]
     numbers = numbers_of(summary)
     single = {path: value for path, value in numbers.items() if "[" not in path and "." not in path}
-    sheet = {p: v for p, v in numbers.items() if p.partition(".")[0] in ("sliding", *BODIES) and "[" not in p}
-    tables = [_sheet_table(name, sheet) for name in ("sliding", *BODIES) if name in summary]
-    tables.append(_table("The run", single))
-    for d in ("rightward", "leftward", "forward", "backward", "counterclockwise", "clockwise"):
-        if d in summary:
-            inside = {p: v for p, v in numbers.items() if p.startswith(f"{d}.") and "[" not in p}
-            moving = "turning" if "clockwise" in d else "moving"
-            tables.append(_table(f"Last half-cycle with the strip {moving} {d}", inside, cut=len(d) + 1))
-    return tables
+    captions = {"sliding": "What a tribometer measures", **{body: body.capitalize() for body in BODIES}}
+    ways = {d: "turning" if "clockwise" in d else "moving" for d in WAYS}
+    captions |= {d: f"Last half-cycle with the strip {moving} {d}" for d, moving in ways.items()}
+    captions |= {f"contacts.{name}": f"Contact {name}" for name in summary.get("contacts", {})}
+    tables = []
+    for name, above in captions.items():
+        inside = {p: v for p, v in numbers.items() if p.startswith(f"{name}.") and "[" not in p}
+        if inside:
+            tables.append(_table(above, inside, cut=len(name) + 1))
+    return [*tables, _table("The run", single)]
 
 
 def _places(summary: dict[str, Any]) -> Places | None:

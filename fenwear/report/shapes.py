@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.report.gaps import gaps_of, parted
-from fenwear.report.style import STANDARD, Look, contact_axis, legend_beside, panels, shades
+from fenwear.report.style import (
+    STANDARD,
+    Look,
+    colour_bar,
+    contact_axis,
+    from_zero,
+    legend_beside,
+    panels,
+    shades,
+)
+from fenwear.report.surface import along_contact
 from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
@@ -27,8 +37,8 @@ def surfaces_of(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
     """Return abscissae, worn depths and unworn heights (mm) of the surfaces that wear, by the body."""
     found = {}
     for body, end in BODIES.items():
-        if f"wear{end}" in history and (body == "punch" or f"x{end}" in history):
-            x = history[f"x{end}"].values
+        if f"wear{end}" in history:
+            x = along_contact(history, body)[0]
             height = history[f"height{end}"].values if f"height{end}" in history else np.zeros_like(x)
             found[body] = (x, history[f"wear{end}"], height)
     return found
@@ -94,11 +104,29 @@ def _trace(ax: Axes, outline: Array, cuts: NDArray[np.int64], **style: Any) -> N
 
 def worn_range(history: xarray.Dataset) -> tuple[float, float]:
     """Return the ends of the punch's contact and of the strip's scar, mm."""
-    ends = [history.x.values]
-    if "wear_strip" in history and "x_strip" in history:
-        ends.append(history.x_strip.values[history.wear_strip.values.max(axis=0) > 0])
+    ends = [along_contact(history)[0]]
+    if "wear_strip" in history:
+        ends.append(along_contact(history, "strip")[0][history.wear_strip.values.max(axis=0) > 0])
     x = np.concatenate(ends)
     return float(x.min()), float(x.max())
+
+
+def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+    """Draw what is worn off the bodies at the chosen half-cycles; the strip's depth downwards."""
+    surfaces = surfaces_of(history)
+    figure, axes = panels(len(surfaces), 3.0, look=look)
+    for ax, (body, (x, depth, _)) in zip(axes, surfaces.items(), strict=True):
+        for colour, n in shades(half_cycles):
+            values = 1e3 * depth.sel(half_cycle=n).values
+            ax.plot(x, values, color=colour, label=look.name(history, n), gid=str(n))
+        ax.set_ylabel(f"worn depth of the {body} (µm)")
+        from_zero(ax)
+        if body == "strip":
+            ax.invert_yaxis()
+        legend_beside(ax, look.of_one)
+    axes[-1].set_xlim(*worn_range(history))
+    contact_axis(axes[-1], along_contact(history)[1])
+    return figure
 
 
 def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
@@ -111,9 +139,7 @@ def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
         rows, values = np.append(0.0, course[shown]), np.vstack([np.zeros(len(x)), 1e3 * depth.values[shown]])
         at, values = parted(x, values, gaps_of(history))
         drawn = ax.pcolormesh(at, rows, values, shading="gouraud", cmap="Blues", vmin=0, rasterized=True)
-        bar = figure.colorbar(drawn, ax=ax)
-        bar.set_label(f"worn depth of\nthe {body} (µm)", size=ax.yaxis.label.get_fontsize())
-        bar.ax.tick_params(labelsize=ax.yaxis.label.get_fontsize())
+        colour_bar(figure, drawn, ax, f"worn depth of\nthe {body} (µm)")
         ax.set_ylabel(look.label)
     left, right = worn_range(history)
     axes[-1].set_xlim(left, right)

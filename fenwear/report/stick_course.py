@@ -1,21 +1,24 @@
-"""What the figures of a run with stick share: its axis in cycles, distance or time, names of its cycles, tractions."""
+"""What the figures of a run with stick share: its axis in cycles, distance or time, its cycles, lines along it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, InputError
-from fenwear.report.style import STANDARD, Look, legend_beside, panels, shades
+from fenwear.report.style import Look, contact_axis
+from fenwear.report.surface import along_contact, model_of, surface_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
+SHARES = (0.25, 0.5, 0.75, 1.0)  # of a half-cycle: what is drawn of it
+THROUGH_MIDDLE = "place along the sliding, through the middle (mm)"
 MANY = 20  # cycles from which on a logarithmic axis shows more
 
 
@@ -66,33 +69,39 @@ def first_and_last(history: xarray.Dataset) -> list[int]:
     return sorted({0, history.sizes["cycle"] - 1})
 
 
-def traction_panels(
-    history: xarray.Dataset,
-    steps: Sequence[int],
-    line: Callable[[Array], tuple[Any, Any]],
-    limit: Callable[[Axes], None],
-    look: Look = STANDARD,
-) -> Figure:
-    """Draw the tangential traction between its bounds in the first and the last cycle.
+def shown_steps(history: xarray.Dataset) -> list[int]:
+    """Return the time steps that end at the quarters of the first half-cycle."""
+    half = int((history.half_cycle_of_step == 1).sum())
+    return [max(round(share * half) - 1, 0) for share in SHARES]
 
-    Args:
-        history: Of a run with stick.
-        steps: Time steps that have a line.
-        line: From values at the contact nodes (n,) to places and values along a line.
-        limit: Labels the axis along it, and cuts it to the contact.
-        look: Width and axis.
-    """
-    places = first_and_last(history)
-    figure, axes = panels(len(places), 2.8, look=look)
-    mu = float(history.attrs["friction"])
-    for ax, place in zip(axes, places, strict=True):
-        cycle = history.isel(cycle=place)
-        for colour, step in shades(steps):
-            now = cycle.isel(step=step)
-            ax.plot(*line(now.traction.values), color=colour, label=f"{float(now.fraction):.3g}")
-        x, bound = line(mu * cycle.pressure.max("step").values)
-        ax.fill_between(x, -bound, bound, color="0.85", linewidth=0, zorder=0, label="µ p")
-        ax.set_ylabel(f"{title(history, place, look)}:\ntraction (MPa)")
-        legend_beside(ax, "part of the cycle")
-    limit(axes[-1])
-    return figure
+
+def touched(history: xarray.Dataset) -> Mask:
+    """Return which nodes ever touch (n,), all where none does."""
+    ever = (history.pressure.values > 0).any(axis=(0, 1))
+    return ever if ever.any() else np.ones_like(ever)
+
+
+def middle_of_contact(history: xarray.Dataset) -> Array:
+    """Return the places along and across the sliding of the middle of what touches in a solid (2,), mm."""
+    weight = history.weight.values * touched(history)
+    return np.array([np.average(history[name].values, weights=weight) for name in ("along", "across")])
+
+
+Line = Callable[[Array], tuple[Array, Array]]  # from values at the nodes of the punch to places, mm, and values there
+
+
+def line_along(history: xarray.Dataset) -> Line:
+    """Return what takes values at the nodes to those along the contact; of a solid on a cut through its middle."""
+    if model_of(history) == "solid":
+        return partial(surface_of(history).cut, at=middle_of_contact(history), along=True)
+    x = along_contact(history)[0]
+    return lambda values: (x, values)
+
+
+def to_contact(ax: Axes, history: xarray.Dataset) -> None:
+    """Label the axis along the contact and leave out what lies far beside it."""
+    solid = model_of(history) == "solid"
+    x = history.along.values if solid else along_contact(history)[0]
+    ends, beside = x[touched(history)], 0.2 * float(np.ptp(x[touched(history)])) + 1e-9
+    contact_axis(ax, THROUGH_MIDDLE if solid else along_contact(history)[1])
+    ax.set_xlim(max(ends.min() - beside, x.min()), min(ends.max() + beside, x.max()))

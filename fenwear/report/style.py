@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,14 +21,19 @@ if TYPE_CHECKING:
 
 WIDTH = 7.0  # inches
 NARROW = 5.0  # inches: below it letters are smaller
-ROW = 60  # letters that a row of names takes where the figure is narrow
+HIGH_WIDE, HIGH_NARROW = 0.75, 0.5  # of the height of a panel that its axes have
+UNIT = re.compile(r"\((?:[^()]|\([^()]*\))*\)")  # stays in one line
+LETTER = 0.55  # width over height
+SHORTEST = 14  # letters of a line of a label
+HIGHEST = 9.0  # inches: a page
+ROW = 50  # letters that a row of names takes where the figure is narrow
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 # After Okabe and Ito, without what fades on white paper; the dashes tell them apart in black and white.
 COLOURS = (BLUE, RED, GREEN, "#AA4499", "#000000", "#8C6D00", "#117A8B")
 DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 DIRECTIONS = {1: ("rightward", "-", BLUE), -1: ("leftward", "--", RED)}  # of plane models whose strip does not turn
 BODY_COLOURS = {"punch": BLUE, "strip": RED}
-LIGHTEST = 0.72  # of viridis: what is lighter fades on white
+LIGHTEST = 0.76  # of plasma, whose hues differ from its dark end on: what is lighter fades on white
 ALONG_CONTACT = "position along the contact x (mm)"
 AXES = {"cycles": ("cycles", "cycle"), "distance": ("sliding distance (m)", "sliding distance (m)"),
         "time": ("time (s)", "time (s)")}  # fmt: skip
@@ -121,7 +128,7 @@ def shades(values: Sequence[int]) -> list[tuple[Any, int]]:
     from matplotlib import colormaps
 
     lightness = np.linspace(0.0, LIGHTEST, max(len(values), 2))
-    return [(colormaps["viridis"](shade), n) for shade, n in zip(lightness, values, strict=False)]
+    return [(colormaps["plasma"](shade), n) for shade, n in zip(lightness, values, strict=False)]
 
 
 def run_style(number: int) -> dict[str, Any]:
@@ -130,15 +137,79 @@ def run_style(number: int) -> dict[str, Any]:
 
 
 def legend_beside(ax: Axes, title: str) -> None:
-    """Name the lines beside a panel, or below it where it is narrow: none of them runs there."""
+    """Name the lines beside a panel, or above it where it is narrow, once for all panels with the same names there."""
     figure: Any = ax.figure
+    names = [str(text) for text in ax.get_legend_handles_labels()[1]]
     if figure.get_size_inches()[0] >= NARROW:
         ax.legend(title=title or None, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-    else:
-        longest = max((len(str(text)) for text in ax.get_legend_handles_labels()[1]), default=1)
+    elif names not in [_named(other) for other in figure.axes if other is not ax]:
+        longest = max(map(len, names), default=1)
         columns = min(3, max(1, ROW // (longest + 8)))  # a sample of the line takes the width of some letters, too
-        ax.legend(title=title or None, loc="lower center", bbox_to_anchor=(0.5, 1.02), frameon=False, ncols=columns,
+        ax.legend(title=title or None, loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=columns,
                   fontsize="small", title_fontsize="small", handlelength=1.5, columnspacing=1.0)  # fmt: skip
+
+
+def _named(ax: Axes) -> list[str]:
+    """Return the names in the legend of a panel."""
+    legend = ax.get_legend()
+    return [text.get_text() for text in legend.get_texts()] if legend else []
+
+
+def from_zero(ax: Axes) -> None:
+    """Let the upward axis begin at zero, and leave room above what is drawn, were it a level line alone."""
+    tops = [np.nanmax(y) for line in ax.get_lines() if len(y := np.asarray(line.get_ydata())) and np.isfinite(y).any()]
+    ax.set_ylim(0, 1.08 * max(tops, default=0.0) or None)
+
+
+def colour_bar(figure: Figure, drawn: Any, axes: Any, label: str, **where: Any) -> Any:
+    """Return a bar of colours with its label, in letters of the size of the panels' labels."""
+    bar = figure.colorbar(drawn, ax=axes, **where)
+    size = np.ravel(axes)[0].yaxis.label.get_fontsize()
+    bar.set_label(label, size=size)
+    bar.ax.tick_params(labelsize=size)
+    return bar
+
+
+def panels_of_maps(rows: int, columns: int, size: Array, look: Look = STANDARD) -> tuple[Figure, Any]:
+    """Return a figure of equal maps (rows, columns), each of an extent (2,) in mm, and room for a bar of colours.
+
+    The bar stands beside the maps; below them where the figure is narrow.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    narrow = look.width < NARROW
+    each = (look.width - (0.7 if narrow else 1.8)) / columns - 0.1
+    height = rows * (each * size[1] / size[0] + 0.45) + (1.1 if narrow else 0.5)
+    with rc_context({"axes.titlesize": "small", "font.size": 7.0 if narrow else 9.0}):
+        figure = Figure(figsize=(look.width, min(height, HIGHEST)), layout="compressed")
+        axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    for ax in axes.ravel():
+        ax.set_aspect("equal")
+        ax.xaxis.set_major_locator(MaxNLocator(3, prune="both"))
+        ax.yaxis.set_major_locator(MaxNLocator(3))
+    return figure, axes
+
+
+def bar_place(look: Look) -> dict[str, Any]:
+    """Return where the bar of colours of maps stands, and its shape."""
+    return {"location": "bottom", "aspect": 30} if look.width < NARROW else {"location": "right", "aspect": 30}
+
+
+def wrapped(drawn: dict[str, Figure]) -> dict[str, Figure]:
+    """Break the labels of upward axes where they are longer than their panels are high; return the figures."""
+    for figure in drawn.values():
+        used = HIGH_WIDE if figure.get_figwidth() >= NARROW else HIGH_NARROW
+        for ax in figure.axes:
+            if (place := ax.get_subplotspec()) is None:
+                continue
+            high = used * 72 * figure.get_figheight() / place.get_gridspec().nrows
+            letters = max(SHORTEST, int(high / (LETTER * ax.yaxis.label.get_fontsize())))
+            if max(map(len, ax.get_ylabel().split("\n"))) > letters:
+                text = UNIT.sub(lambda unit: unit[0].replace(" ", "\u00a0"), ax.get_ylabel())
+                ax.set_ylabel(textwrap.fill(text, letters, break_long_words=False))
+    return drawn
 
 
 def name_panel(ax: Axes, text: str) -> None:
@@ -159,9 +230,9 @@ def reference_line(ax: Axes, height: float, name: str, at: float = 0.0) -> None:
                 color=GREY, fontsize="small")  # fmt: skip
 
 
-def contact_axis(ax: Axes) -> None:
+def contact_axis(ax: Axes, label: str = ALONG_CONTACT) -> None:
     """Label the axis along the contact."""
-    ax.set_xlabel(ALONG_CONTACT)
+    ax.set_xlabel(label)
     for shared in ax.get_shared_x_axes().get_siblings(ax):
         shared.margins(x=0.01)
 

@@ -14,6 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fenwear.arrays import Array
+from fenwear.report.style import ALONG_CONTACT
 
 if TYPE_CHECKING:
     from matplotlib.tri import Triangulation
@@ -117,11 +118,12 @@ class Surface:
         return int(np.ptp(self._flat, axis=0).argmin())
 
     @property
-    def names(self) -> tuple[str, str]:
-        """Names of the map's axes."""
+    def axis_labels(self) -> tuple[str, str]:
+        """What the map's axes are."""
         axes = ("along the sliding", "across it") if self.unrolled else [AXES[axis] for axis in self.seen]
         first, second = (
-            axis + (" of the first part" if self.overlaps and k == self._beside else "") for k, axis in enumerate(axes)
+            f"{axis} (mm)" + (",\nfirst part" if self.overlaps and k == self._beside else "")
+            for k, axis in enumerate(axes)
         )
         return first, second
 
@@ -221,7 +223,10 @@ def centre_of_wear(history: xarray.Dataset) -> Array:
     return np.array([np.average(last[name].values, weights=last.weight.values) for name in ("along", "across")])
 
 
-def radial(history: xarray.Dataset, end: str = "") -> tuple[Array, str]:
-    """Return where the nodes of rings lie along their contact, mm, and what the axis of a figure says of it."""
+def along_contact(history: xarray.Dataset, body: str = "punch") -> tuple[Array, str]:
+    """Return where the nodes of a contact that is a line lie along it, mm, and what the axis of a figure says of it."""
+    end = "" if body == "punch" else "_strip"
+    if model_of(history) == "plane":
+        return history[f"x{end}"].values, ALONG_CONTACT
     r, z = history[f"r{end}"].values, history[f"z{end}"].values
     return (r, "radius r (mm)") if np.ptp(r) >= np.ptp(z) else (z, "height z (mm)")

@@ -20,8 +20,8 @@ import xarray
 from markupsafe import Markup
 
 from fenwear.arrays import Array
-from fenwear.report.figures import pressure_top
 from fenwear.report.maps import Quantity, quantities
+from fenwear.report.shown import pressure_top
 from fenwear.report.surface import model_of, surface_of
 
 AROUND = 72  # parts of a ring

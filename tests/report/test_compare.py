@@ -60,12 +60,13 @@ def test_only_what_differs_between_the_cases(folders: list[Path]) -> None:
 def test_curves_are_the_histories(folders: list[Path], tmp_path: Path) -> None:
     """The last shape and pressures of each run, in its own dashes; temperature of the hot one alone."""
     comparison = compare(folders)
-    shape, rightward, leftward, peak, temperature = comparison_figure(comparison).axes
+    shape, rightward, leftward, peak, depth, temperature = comparison_figure(comparison).axes
     for k, history in enumerate(comparison.histories):
         np.testing.assert_allclose(shape.lines[k].get_ydata(), 1e3 * history.wear[-1], rtol=1e-12)
         np.testing.assert_array_equal(rightward.lines[k].get_ydata(), history.pressure[-2])
         np.testing.assert_array_equal(leftward.lines[k].get_ydata(), history.pressure[-1])
         assert peak.lines[k].get_ydata()[-1] == history.max_pressure[-2:].max()
+        assert depth.lines[k].get_ydata()[-1] == history.max_wear[-1]
     assert [line.get_label() for line in temperature.lines] == ["hot"]
     assert len({str(line.get_linestyle()) for line in shape.lines}) == 3
     assert draw_comparison(comparison, tmp_path / "runs.pdf").read_bytes().startswith(b"%PDF")

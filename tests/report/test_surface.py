@@ -16,13 +16,12 @@ from fenwear import load_case
 from fenwear.report.animation import draw_animation
 from fenwear.report.compare import compare, comparison_figure, draw_comparison
 from fenwear.report.course import is_conforming
-from fenwear.report.figures import read_history
+from fenwear.report.figures import all_figures, read_history
 from fenwear.report.maps import LEVELS, map_figure, quantities
 from fenwear.report.page import numbers_of
 from fenwear.report.pictures import SHOWN, draw_pictures
 from fenwear.report.solid_pictures import deformed, displacement, filling_view, points, solid_view
-from fenwear.report.surface import Surface, centre_of_wear, model_of, radial, surface_of
-from fenwear.report.surface_figures import surface_figures
+from fenwear.report.surface import Surface, along_contact, centre_of_wear, model_of, surface_of
 from fenwear.report.turned import AROUND, turned_figure
 from fenwear.run import run_case
 
@@ -132,7 +131,7 @@ def _area(x: np.ndarray, triangles: np.ndarray) -> float:
 def test_every_figure(folder: Path) -> None:
     """Each has titles and labelled axes; none speaks of a mean pressure where the surfaces do not conform."""
     history = read_history(folder)
-    drawn = surface_figures(history)
+    drawn = all_figures(history)
     expected = {"peaks", "convergence"} | (
         {"pressure_map", "wear_map", "cuts_along", "cuts_across"}
         if model_of(history) == "solid" else {"shape", "pressure"}
@@ -218,7 +217,7 @@ def test_centre_of_wear(folders: dict[str, Path]) -> None:
 
 def test_rings_over_the_radius(folders: dict[str, Path]) -> None:
     """The contact of rings is drawn over the radius."""
-    x, label = radial(read_history(folders["ring-on-ring"]))
+    x, label = along_contact(read_history(folders["ring-on-ring"]))
     assert (x[0], x[-1]) == pytest.approx((20, 30))
     assert label == "radius r (mm)"
 

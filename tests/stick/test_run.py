@@ -63,14 +63,14 @@ def test_history_holds_loops_zones_energy_and_stress(ran: tuple[dict, Path]) -> 
 
 
 def test_report_is_drawn_and_drawn_again(ran: tuple[dict, Path]) -> None:
-    """Seven figures and a page; `plot` makes the same."""
+    """All figures of a run and those of its time steps, and a page with each of them; `plot` makes the same."""
     summary, folder = ran
     lines = sheet_text(summary).splitlines()
     assert any(line.startswith("largest tangential force in the last cycle (N)") for line in lines)
     names = {path.name for path in write_report(folder)}
-    assert {"loops.png", "zones.png", "tractions.png", "surface_stress.png", "report.html"} <= names
+    assert {"loops.png", "zones.png", "tractions.png", "stress_range.png", "volume.png", "report.html"} <= names
     page = (folder / "report.html").read_text("utf-8")
-    assert page.count("<img") == 7
+    assert page.count("<img") == sum(name.endswith(".png") for name in names)
     assert "energy ratio" in page
 
 

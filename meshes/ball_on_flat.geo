@@ -1,6 +1,8 @@
 // A ball on a flat: the lower cap of a ball, cut square, and a block. Structured hexahedra, finest at the contact.
 //
 // Lengths in mm; x and y from the middle, z up from the contact. The ball touches the flat in one point.
+// With flat_radius both are crossed cylinders, whose contact is an ellipse, of equal radii a circle: the ball is one
+// along y, the flat one along x.
 // Physical groups: every name starts with the body it belongs to, punch_ (the ball) or strip_ (the flat).
 
 DefineConstant[
@@ -8,6 +10,7 @@ DefineConstant[
   contact_width = 0.4,    // side of the square in which the surfaces may touch
   ball_margin = 0.6,      // by which the ball goes on beyond it on each side
   ball_height = 0.8,
+  flat_radius = 0,        // of crossed cylinders: that of the one along x; 0: a ball on a flat
   flat_length = 4,        // along x
   flat_width = 4,         // along y
   flat_height = 1.6,
@@ -29,10 +32,17 @@ EndIf
 If(radius <= 0 || contact_width <= 0 || ball_margin <= 0 || ball_height <= 0 || flat_height <= 0 || stroke < 0)
   Error("lengths must be positive");
 EndIf
+If(flat_radius < 0 || (flat_radius > 0 && flat_width / 2 >= 0.7 * flat_radius))
+  Error("flat_radius must be 0, or so large that flat_width / 2 is less than 0.7 of it");
+EndIf
+If(flat_radius > 0 && flat_radius - Sqrt(flat_radius^2 - flat_width^2 / 4) >= 0.8 * flat_height)
+  Error("flat_height must be larger: the edges of the lower cylinder come too near to its bottom");
+EndIf
 If(contact_width / 2 + ball_margin >= 0.7 * radius)
   Error("contact_width / 2 + ball_margin must be less than 0.7 radius");
 EndIf
-If(radius - Sqrt(radius^2 - 2 * (contact_width / 2 + ball_margin)^2) >= 0.8 * ball_height)
+crossed = flat_radius > 0;
+If(radius - Sqrt(radius^2 - (crossed ? 1 : 2) * (contact_width / 2 + ball_margin)^2) >= 0.8 * ball_height)
   Error("ball_height must be larger: the cap's corners come too near to its top");
 EndIf
 If(flat_length <= contact_width + 2 * stroke || flat_width <= contact_width)
@@ -95,7 +105,13 @@ For body In {0 : 1}
   For k In {0 : 1}
     For j In {0 : my - 1}
       For i In {0 : mx - 1}
-        n = newp; Point(n) = {x[i], y[j], (k == 1) ? heights[body] : (body == 1) ? 0 : radius - Sqrt(radius^2 - x[i]^2 - y[j]^2)};
+        n = newp; z = heights[body];
+        If(k == 0 && body == 0)
+          z = radius - Sqrt(radius^2 - x[i]^2 - (crossed ? 0 : y[j]^2));
+        ElseIf(k == 0)
+          z = crossed ? Sqrt(flat_radius^2 - y[j]^2) - flat_radius : 0;
+        EndIf
+        Point(n) = {x[i], y[j], z};
         p[] += n;
       EndFor
     EndFor
@@ -117,8 +133,8 @@ For body In {0 : 1}
     For j In {0 : my - 2}
       For i In {0 : mx - 1}
         l = newl;
-        If(body == 0 && k == 0)
-          n = newp; Point(n) = {x[i], 0, radius};
+        If(k == 0 && body == crossed)
+          n = newp; Point(n) = {x[i], 0, crossed ? -flat_radius : radius};
           Circle(l) = {p[i + mx * j], n, p[i + mx * (j + 1)]};
         Else
           Line(l) = {p[i + mx * (j + my * k)], p[i + mx * (j + 1 + my * k)]};
@@ -143,7 +159,13 @@ For body In {0 : 1}
         n = newll; Curve Loop(n) = {a, b, -c, -d};
         s = news;
         If(body == 0 && k == 0)
-          Surface(s) = {n} In Sphere {centre};
+          If(crossed)
+            Surface(s) = {n};
+          Else
+            Surface(s) = {n} In Sphere {centre};
+          EndIf
+        ElseIf(k == 0 && crossed)
+          Surface(s) = {n};
         Else
           Plane Surface(s) = {n};
         EndIf

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipk
 
-from fenwear import assemble, jump, load_case, make_case, steady
+from fenwear import assemble, jump, load_case, make_case, march, steady
 from fenwear.case.templates import fill_in, find_template, template_names, write_case_of
 from fenwear.errors import CaseError
 
 USUAL = [
     *("ball-on-disc", "ball-on-flat", "block-on-ring", "brake-pad"),
-    *("bushing", "cylinder-on-flat", "fretting", "pin-on-disc", "plain-bearing"),
+    *("bushing", "crossed-cylinders", "cylinder-on-flat", "disc-brake", "fretting", "pin-on-disc", "plain-bearing"),
 ]
 
 
@@ -64,9 +66,10 @@ def test_usual_values() -> None:
         assert distance == pytest.approx(1e6, rel=1e-4)
 
 
-def test_the_pad_is_the_built_in_case() -> None:
-    """One truth of a brake pad: its usual dimensions make the built-in case."""
-    made, built_in = case_of("brake-pad").resolved(), load_case("brake-pad").resolved()
+@pytest.mark.parametrize(("name", "case"), [("brake-pad", "brake-pad"), ("disc-brake", "disc-brake-two-pads")])
+def test_usual_dimensions_make_the_built_in_case(name: str, case: str) -> None:
+    """One truth of a brake."""
+    made, built_in = case_of(name).resolved(), load_case(case).resolved()
     assert made.pop("title") != built_in.pop("title")
     assert made == built_in
 
@@ -144,3 +147,29 @@ def test_ring_wears_over_its_circumference() -> None:
     depth = last.wear_strip[-1]
     assert np.ptp(depth) < 1e-12 * depth.max()
     assert 2 * np.pi * radius * depth.max() == pytest.approx(0.1 * (system.pair.weights @ last.wear[-1]), rel=1e-9)
+
+
+def test_crossed_cylinders_touch_in_hertz_ellipse() -> None:
+    """Of radii 5 and 10 mm under 100 N: largest pressure, and the half-axes by the pressure's second moments.
+
+    Reference: Johnson, Contact Mechanics, 4.24 to 4.28, with e the ellipse's eccentricity and a its longer half-axis.
+    """
+    tables = tomllib.loads(fill_in(find_template("crossed-cylinders"), ["load=100 N", "contact_width=0.6 mm"]))
+    tables["geometry"]["degree"], tables["contact"]["friction"] = 1, 0
+    tables["geometry"]["parameters"] |= {"core": 0, "across": 10}
+    system = assemble(make_case(tables))
+    pressure = next(iter(march(system, 1))).pressure[0]
+    modulus, curvatures = 210e3 / (1 - 0.3**2) / 2, (1 / 20, 1 / 10)
+
+    def ratio(m: float) -> float:
+        return float((ellipe(m) / (1 - m) - ellipk(m)) / (ellipk(m) - ellipe(m)))
+
+    m = brentq(lambda m: ratio(m) - curvatures[1] / curvatures[0], 1e-6, 1 - 1e-6)
+    a = (3 * 100 / (2 * np.pi * modulus * curvatures[0] * m) * (ellipk(m) - ellipe(m))) ** (1 / 3)
+    b = a * np.sqrt(1 - m)
+    assert pressure.max() == pytest.approx(3 * 100 / (2 * np.pi * a * b), rel=0.04)
+    carried = pressure * system.pair.weights
+    for along, half_axis in ((0, b), (1, a)):
+        assert np.sqrt(5 * np.average(system.pair.punch.x[:, along] ** 2, weights=carried)) == pytest.approx(
+            half_axis, rel=0.04
+        )

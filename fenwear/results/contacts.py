@@ -35,7 +35,7 @@ LINES = {
     **{
         f"{body}.{key}": sheet.LINES[key]._replace(label=f"{body}: {sheet.LINES[key].label}")
         for body in sheet.BODIES
-        for key in ("worn_volume_mm3", "largest_depth_mm", *(f"at_{axis}_mm" for axis in "rxyz"), *SCARS)
+        for key in ("worn_volume_mm3", "largest_depth_mm", *(f"at_{axis}_mm" for axis in sheet.PLACES), *SCARS)
     },
 }
 
@@ -83,13 +83,12 @@ def _carried(last: Block, own: Mask) -> dict[str, Any]:
 
 def _worn(placed: Placed, surface: ContactSurface, own: Mask, depth: Array, volume: float) -> dict[str, Any]:
     """Return what is worn off the nodes (n,) of one contact of a body."""
-    axes, geometry = sheet.axes(placed), scar_geometry(placed, surface)
+    geometry = scar_geometry(placed, surface)
     whole, deepest = float(surface.weights @ depth), int(np.where(own, depth, -np.inf).argmax())
-    place = without_noise(surface.x[deepest], surface.extent())
     return {
         "worn_volume_mm3": volume * float(surface.weights[own] @ depth[own]) / whole if whole else 0.0,
         "largest_depth_mm": float(depth[deepest]),
-        **{f"at_{axis}_mm": float(x) for axis, x in zip(axes, place, strict=False)},
+        **{f"at_{axis}_mm": float(x[deepest]) for axis, x in sheet.places(placed, surface, geometry).items()},
         **{
             f"scar_{name}_{100 * share:g}_percent_mm": float(extent[0])
             for share in sheet.SHARES.values()

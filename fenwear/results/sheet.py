@@ -22,14 +22,17 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Placed
+from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.results.scar import scar_geometry
+from fenwear.results.scar import ScarGeometry, scar_geometry
 from fenwear.results.zone import without_noise
 
 Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 BODIES = {"punch": "", "strip": "_strip"}  # and how the names of their variables end
 SHARES = {"": 0.01, "_5": 0.05}  # of the largest depth, where widths are read, and how their names end
+ROUND, NEARLY = "diameter", 1.1  # what a scar has that is round: its length and width differ by a tenth at most
+PLACES = {**{axis: axis for axis in "rxyz"}, "across": "place across the sliding"}
 WEAR_RATE = "mm3/(N m)"
 UNCERTAINTY, WITHIN = "uncertainty", "... numerical uncertainty"
 COLUMN = 12  # characters of a column of the printed sheet
@@ -94,7 +97,8 @@ def variables(placed: Placed) -> dict[str, Variable]:
             continue
         missing = {"worn_area": not plane, "worn_mass": density is None}
         own = {name: variable for name, variable in OF_A_BODY.items() if not missing.get(name)}
-        own |= of_the_scar(axes(placed), scar_geometry(placed, surface).names)
+        geometry = scar_geometry(placed, surface)
+        own |= of_the_scar(tuple(places(placed, surface, geometry)), geometry.names)
         found |= {f"{name}{end}": (over, unit, text.format(body=body)) for name, (over, unit, text) in own.items()}
     return found
 
@@ -102,7 +106,7 @@ def variables(placed: Placed) -> dict[str, Variable]:
 def of_the_scar(along: tuple[str, ...], extents: tuple[str, ...]) -> dict[str, Variable]:
     """Return the variables of a scar: where it is deepest, and its extents by their names."""
     found: dict[str, Variable] = {
-        f"max_wear_{axis}": (("half_cycle",), "mm", f"where the worn depth of the {{body}} is largest, {axis}")
+        f"max_wear_{axis}": (("half_cycle",), "mm", f"where the worn depth of the {{body}} is largest, {PLACES[axis]}")
         for axis in along
     }
     way = "along the contact" if along == ("x",) else "across the sliding"
@@ -112,6 +116,17 @@ def of_the_scar(along: tuple[str, ...], extents: tuple[str, ...]) -> dict[str, V
             text = f"{name} of the {{body}}'s scar {texts[name]} at {100 * share:g} % of its largest depth"
             found[f"scar_{name}{end}"] = (("half_cycle",), "mm", text)
     return found
+
+
+def places(placed: Placed, surface: ContactSurface, geometry: ScarGeometry) -> dict[str, Array]:
+    """Return what tells where on a surface a scar is deepest, by its name: coordinates of the nodes (n,), mm.
+
+    Of what is worn all the way round in a solid that across the sliding alone, in the plane none.
+    """
+    if surface.dim == 3 and "length" not in geometry.names:
+        return {"across": geometry.coordinates[:, 0]}
+    found = dict(zip(axes(placed), without_noise(surface.x, surface.extent()).T, strict=False))
+    return found if geometry.names else {}
 
 
 def axes(placed: Placed) -> tuple[str, ...]:
@@ -145,8 +160,7 @@ def values(block: Block) -> dict[str, Array]:
         if law is None:
             continue
         volume = totals.of(f"volume_{body}")
-        deepest = without_noise(surface.x[depth.argmax(axis=1)], surface.extent())
-        geometry = scar_geometry(system, surface)
+        deepest, geometry = depth.argmax(axis=1), scar_geometry(system, surface)
         own = {
             "worn_area": volume / thickness,
             "worn_volume": volume,
@@ -156,7 +170,7 @@ def values(block: Block) -> dict[str, Array]:
             "law_wear_rate": 1e3 * _over(adds.of(f"volume_{body}"), adds.of("load_path")),
             "mean_law_wear_rate": 1e3 * _over(volume, totals.of("load_path")),
             "max_wear": depth.max(axis=1),
-            **{f"max_wear_{axis}": deepest[:, k] for k, axis in enumerate(axes(system))},
+            **{f"max_wear_{axis}": x[deepest] for axis, x in places(system, surface, geometry).items()},
             **{
                 f"scar_{name}{at}": extent
                 for at, share in SHARES.items()
@@ -246,10 +260,10 @@ LINES = {
     "mean_law_wear_rate_mm3_per_N_m": Line("... of the law, mean", "mm³/(N m)"),
     "law_wear_rate_mm3_per_N_m": Line("... of the law, last", "mm³/(N m)"),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
-    **{f"at_{axis}_mm": Line(f"at {axis}", "mm") for axis in "rxyz"},
+    **{f"at_{axis}_mm": Line(f"at {words}", "mm") for axis, words in PLACES.items()},
     **{
-        f"scar_{name}_{100 * share:g}_percent_mm": Line(f"scar {name} at {100 * share:g} % of the depth", "mm")
-        for name in ("length", "width")
+        f"scar_{name}_{100 * share:g}_percent_mm": Line(f"scar {words} at {100 * share:g} % of the depth", "mm")
+        for name, words in (("length", "length (along the sliding)"), ("width", "width"), (ROUND, "diameter"))
         for share in SHARES.values()
     },
 }
@@ -272,7 +286,7 @@ OF_SUMMARY = {
     "mean_law_wear_rate_mm3_per_N_m": "mean_law_wear_rate",
     "law_wear_rate_mm3_per_N_m": "law_wear_rate",
     "largest_depth_mm": "max_wear",
-    **{f"at_{axis}_mm": f"max_wear_{axis}" for axis in "rxyz"},
+    **{f"at_{axis}_mm": f"max_wear_{axis}" for axis in PLACES},
     **{
         f"scar_{name}_{100 * share:g}_percent_mm": f"scar_{name}{end}"
         for name in ("length", "width")
@@ -304,8 +318,15 @@ def sheet(last: Block) -> dict[str, Any]:
     for body, end in BODIES.items():
         own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
         if own:
-            found[body] = own
+            found[body] = own | _diameters(own)
     return found
+
+
+def _diameters(own: Mapping[str, float]) -> dict[str, float]:
+    """Return the diameters of a scar that is as long as it is wide, within a tenth: the means of both, mm."""
+    keys = [f"scar_{{}}_{100 * share:g}_percent_mm" for share in SHARES.values()]
+    both = {key.format(ROUND): [own.get(key.format(name), 0.0) for name in ("length", "width")] for key in keys}
+    return {key: sum(one) / 2 for key, one in both.items() if 0 < max(one) <= NEARLY * min(one)}
 
 
 def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | None]]]:

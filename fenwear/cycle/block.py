@@ -85,8 +85,8 @@ class Block:
         rigid: Amplitudes of the rigid modes there (k, modes).
         totals: What all half-cycles up to its end add up to, k of them.
         adds: What it adds itself, k of them.
-        optimum_distance: Largest distance to the optimal pressure of the present contact zone, over the pressure
-            scale, see `fenwear.cycle.state.pressure_scale` (k,).
+        optimum_distance: Share of the load that is carried elsewhere than in the optimum: half the integral of the
+            difference to the optimal pressure of the present contact zone, over the pressure's (k,).
         periodicity: Largest change of pressure against the same phase one cycle earlier, over the
             pressure scale (k,); NaN in the first cycle.
         equilibrium_error: Largest error of the force and moment balance relative to the contact force (k,).
@@ -269,19 +269,19 @@ class Recorder:
 
     def change(self) -> float:
         """Return the periodicity of the last half-cycle."""
-        return float(self._changes(self._rows[-1:])[0][0])
+        return float(self._changes(self._rows[-1:])[0])
 
-    def _changes(self, rows: Sequence[HalfCycle]) -> tuple[Array, Array]:
-        """Return the periodicity of half-cycles, and the scale of their pressures (k,), MPa."""
+    def _changes(self, rows: Sequence[HalfCycle]) -> Array:
+        """Return the periodicity of half-cycles (k,)."""
         if rows[0].steps is not None:  # their numbers need not be equal
             pairs = [(row.steps.pressure, row.steps.before) for row in rows if row.steps is not None]
             found = np.array([pressure_scales(self.system, now[None])[0] for now, _ in pairs])
-            return np.array([np.abs(now - before).max() for now, before in pairs]) / found, found
+            return np.array([np.abs(now - before).max() for now, before in pairs]) / found
         pressure = np.array([[p.contact.pressure[0] for p in row.phases] for row in rows])
         unknown = np.full(pressure.shape[2], np.nan)
         before = np.array([[unknown if p.before is None else p.before for p in row.phases] for row in rows])
-        scales = pressure_scales(self.system, pressure)
-        return np.abs(pressure - before).max(axis=(1, 2)) / scales, scales
+        changes: Array = np.abs(pressure - before).max(axis=(1, 2)) / pressure_scales(self.system, pressure)
+        return changes
 
     @property
     def full(self) -> bool:
@@ -291,7 +291,7 @@ class Recorder:
     def take(self, end: RunState) -> Block:
         """Return the block that ends with `end`, and begin the next one."""
         rows, system = self._rows, self.system
-        changes, scales = self._changes(rows)
+        changes, weights = self._changes(rows), system.pair.weights
         middles = [row.phases[len(row.phases) // 2] for row in rows]
         directions = [system.motion.phases[middle.phase].direction for middle in middles]
         pressure = np.concatenate([middle.contact.pressure for middle in middles])
@@ -314,7 +314,7 @@ class Recorder:
             np.concatenate([middle.contact.rigid for middle in middles]),
             _stacked([row.totals for row in rows]),
             _stacked(adds),
-            np.abs(pressure - optima).max(axis=1) / scales,
+            np.abs(pressure - optima) @ weights / (2 * np.maximum(pressure @ weights, 1e-300)),
             changes,
             self._balances(),
             self._complementarity(),

@@ -54,7 +54,7 @@ VARIABLES = {
     "optimum_distance": (
         ("half_cycle",),
         "1",
-        "largest distance of a node's pressure to the optimal one, over the pressure scale: mostly at an edge",
+        "share of the load that is carried elsewhere than in the optimum: half the integral of their difference",
     ),
     "periodicity": (("half_cycle",), "1", "largest change of pressure against one cycle ago over the pressure scale"),
     "equilibrium_error": (("half_cycle",), "1", "error of the force and moment balance relative to the load"),

@@ -29,8 +29,8 @@ TEXTS = {
     "length along the sliding, and (c) its width across.",
     "friction": "(a) Normal force and friction force of each half-cycle and (b) work of friction from the start, over "
     "the {axis}.",
-    "convergence": "(a) Largest change of pressure against one cycle ago and (b) largest difference to the optimal "
-    "pressure, both over the pressure scale (integral of p² over integral of p), over the {axis}.",
+    "convergence": "(a) Largest change of pressure against one cycle ago, over the pressure scale (integral of p² "
+    "over integral of p), and (b) share of the load that is carried elsewhere than in the optimum, over the {axis}.",
     "temperature": "Temperature along the contact surfaces of (a) the punch and (b) the strip at {chosen}.",
     "heat_balance": "Heat of each half-cycle over the {axis}: what friction makes is the sum of the others.",
     "boundary_temperature": "Temperature (a) round the punch from the middle of its contact on, corners by (x, z) in "

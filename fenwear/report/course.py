@@ -69,7 +69,7 @@ def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure
     """Draw the change against one cycle ago and the distance to the optimal pressure."""
     over = {
         "periodicity": "change in a cycle, largest of a node (-)",
-        "optimum_distance": "distance to the optimum, largest of a node (-)",
+        "optimum_distance": "load elsewhere than in the optimum (-)",
     }
     over = {name: label for name, label in over.items() if name == "periodicity" or history[name].notnull().any()}
     figure, axes = panels(len(over), 2.7, look=look)

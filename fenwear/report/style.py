@@ -205,7 +205,7 @@ def wrapped(drawn: dict[str, Figure]) -> dict[str, Figure]:
             if (place := ax.get_subplotspec()) is None:
                 continue
             high = used * 72 * figure.get_figheight() / place.get_gridspec().nrows
-            letters = max(SHORTEST, int(high / (LETTER * ax.yaxis.label.get_fontsize())))
+            letters = max(SHORTEST, int(high / (LETTER * float(ax.yaxis.label.get_fontsize()))))
             if max(map(len, ax.get_ylabel().split("\n"))) > letters:
                 text = UNIT.sub(lambda unit: unit[0].replace(" ", "\u00a0"), ax.get_ylabel())
                 ax.set_ylabel(textwrap.fill(text, letters, break_long_words=False))

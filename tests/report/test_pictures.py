@@ -61,6 +61,7 @@ def _write(directory: Path, half_cycle: int, *, heat: bool = True) -> xarray.Dat
 def test_pictures_and_animation(tmp_path: Path) -> None:
     """A picture of each field at each half-cycle, coloured where the bell is, and an animation of each field."""
     pytest.importorskip("pyvista")
+    (tmp_path / "case.toml").touch()
     _write(tmp_path, 1)
     _write(tmp_path, 2)
     try:

@@ -144,7 +144,8 @@ def _along(
 def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look = STANDARD) -> dict[str, Figure]:
     """Draw every figure that the history has data for, by its name."""
     chosen = chosen_half_cycles(history, wanted)
-    drawn, model = {}, model_of(history)
+    drawn: dict[str, Figure] = {}
+    model = model_of(history)
     if model == "solid":
         drawn |= {name: map_figure(history, one, chosen[-MAPS:], look) for name, one in quantities(history).items()}
         drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)

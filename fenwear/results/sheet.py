@@ -125,8 +125,8 @@ def places(placed: Placed, surface: ContactSurface, geometry: ScarGeometry) -> d
     """
     if surface.dim == 3 and "length" not in geometry.names:
         return {"across": geometry.coordinates[:, 0]}
-    found = dict(zip(axes(placed), without_noise(surface.x, surface.extent()).T, strict=False))
-    return found if geometry.names else {}
+    x = without_noise(surface.x, surface.extent())
+    return {axis: x[:, k] for k, axis in enumerate(axes(placed))} if geometry.names else {}
 
 
 def axes(placed: Placed) -> tuple[str, ...]:

@@ -272,7 +272,7 @@ def test_strip_below_its_own_track(folders: dict[str, Path]) -> None:
     assert [trace["name"] for trace in figure["data"]] == [q.title for q in quantities(history).values()]
 
 
-@pytest.mark.parametrize(("names", "lines"), [(["pin-on-disc", "ball-on-flat"], 6), (["ring-on-ring"] * 2, 2),
+@pytest.mark.parametrize(("names", "lines"), [(["pin-on-disc", "ball-on-flat"], 6), (["ring-on-ring"] * 2, 3),
                                               (["ring-on-ring", "pin-on-disc"], 0)])  # fmt: skip
 def test_compared(folders: dict[str, Path], tmp_path: Path, names: list[str], lines: int) -> None:
     """Runs of one model have their cuts, or lines over the radius, on common axes; others their series."""

@@ -16,7 +16,8 @@ at the contact: with K for the mesh without supports,
 which is symmetric in i and j but for the second term, where the half-space's own field is taken by its nodal values.
 Its error falls with twice the order of the elements. On a curved surface the half-space leaves tractions near the
 contact, too, of the order of its width over the radius, as Hertz's theory leaves them out: facets below the grid bear
-none. Loads f move the contact likewise, F_j . u(y_j) = f . (U_j + u_j).
+none, and what goes on beside it nearly in its plane bears them more and more up to twice the grid. Loads f move the
+contact likewise, F_j . u(y_j) = f . (U_j + u_j).
 
 Points are Chebyshev's of the first kind over the contact grid, and polynomials through them take the correction in
 between: L C L^T for forces on the grid. How fast the coefficients of the polynomials fall tells whether they may.
@@ -45,6 +46,7 @@ from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.material import Isotropic, measure, strain_of
 from fenwear.parallel import total
 
+IN_PLANE, DEEP = 0.9, 0.25  # normal's component and depth over distance up to which a surface goes on in the plane
 POINTS = 4  # quadrature's degree above twice that of the elements: the half-space's field is no polynomial
 
 
@@ -210,7 +212,8 @@ def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
     degree = 2 * elastic.space.ufl_element().degree + POINTS
     outer = meshtags(mesh, d - 1, *_outer(elastic, ground.grid))
     ds = ufl.Measure("ds", domain=mesh, subdomain_data=outer, metadata={"quadrature_degree": degree})
-    work = -ufl.inner(alike.stress(field) * ufl.FacetNormal(mesh), v) * measure(mesh, kind) * ds(1)
+    normal = ufl.FacetNormal(mesh)
+    work = -_borne(ground.grid, x, normal) * ufl.inner(alike.stress(field) * normal, v) * measure(mesh, kind) * ds(1)
     cells = _others(elastic, ground)
     if mesh.comm.allreduce(len(cells)):
         tags = meshtags(mesh, d, cells, np.ones(len(cells), dtype=np.int32))
@@ -225,6 +228,20 @@ def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:
             force.value[:] = np.eye(d)[axis]
             found[:, k, axis] = assembled_vector(form)
     return found
+
+
+def _borne(grid: RegularGrid, x: Any, normal: Any) -> Any:
+    """Return the share of the tractions that the boundary bears: all, but less where it goes on beside the grid."""
+    beside = ufl.as_ufl(1.0)
+    distance = ufl.as_ufl(0.0)
+    for axis, middle, side in zip(grid.axes, grid.middle, grid.sides, strict=True):
+        away = abs(x[axis] - float(middle))
+        beside = ufl.max_value(beside, 2 * away / float(side))
+        distance = ufl.max_value(distance, away)
+    near_plane = ufl.And(
+        ufl.gt(normal[grid.normal] ** 2, IN_PLANE**2), ufl.lt(abs(x[grid.normal] - grid.level), DEEP * distance)
+    )
+    return ufl.conditional(near_plane, ufl.min_value(beside - 1, 1.0), 1.0)
 
 
 def _nodal(elastic: ElasticBody, ground: Ground, points: Array) -> Array:

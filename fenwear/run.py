@@ -26,7 +26,15 @@ from fenwear.cycle import (
 from fenwear.cycle.program import at_loads
 from fenwear.cycle.state import RunState, joined
 from fenwear.cycle.totals import none_yet
-from fenwear.errors import CaseError, ConvergenceError, InputError, InterruptedRunError, MeshQualityError, OutputError
+from fenwear.errors import (
+    CaseError,
+    ConvergenceError,
+    FenwearError,
+    InputError,
+    InterruptedRunError,
+    MeshQualityError,
+    OutputError,
+)
 from fenwear.law import decided
 from fenwear.lookout import Lookout
 from fenwear.parallel import on_root
@@ -381,7 +389,7 @@ class _Run:
         summary = summarise(self.system, self.last, {**self.extremes, **self.numbers}, how)
         on_root(self.comm, lambda: write_summary(self.directory, summary))
         if uncertain and self.case.output.uncertainty:
-            summary["uncertainty"] = self._uncertainty(self.last)
+            summary |= self._uncertainty(self.last)
             on_root(self.comm, lambda: write_summary(self.directory, summary))
         if report:
             from fenwear.report.page import try_report  # plotting libraries, which few runs of many need
@@ -390,12 +398,19 @@ class _Run:
         return summary
 
     def _uncertainty(self, last: Block) -> dict[str, Any]:
-        """Return how uncertain the numbers of the end are, and tell it; collective."""
+        """Return the table of how uncertain the numbers of the end are, and tell it; collective.
+
+        The results are safe by now: what fails here is a warning.
+        """
         from fenwear.accuracy import shown, uncertainty
 
-        found = uncertainty(self.case, last)
+        try:
+            found = uncertainty(self.case, last)
+        except (FenwearError, ArithmeticError, RuntimeError, ValueError) as error:
+            self.log(f"warning: the numerical uncertainty of the run could not be told: {error}")
+            return {}
         self.log(shown.text(last.system, found))
-        return shown.table(last.system, found)
+        return {"uncertainty": shown.table(last.system, found)}
 
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""

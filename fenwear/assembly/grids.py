@@ -1,7 +1,8 @@
 """Contact grids of their own: the same regular grid on both bodies, along the stroke longer on the strip.
 
 Both stand in the tangent plane where the surfaces are closest; how deep each surface lies below it is read from the
-mesh, whose elements of order 2 follow a curved surface to the fourth power of their size.
+mesh, whose elements of order 2 follow a curved surface to the fourth power of their size. A topography lies on top of
+that, its highest peak at the plane.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from fenwear.assembly.strokes import Sliding
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.topography import heights_on
 from fenwear.case import Case, Grid
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.overlap import ChartedSurface, reading_at
@@ -49,6 +51,10 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
         depth = outward * (level - reading @ body.surface.trace[:, axis])
         if body.surface.profile is not None:
             depth = depth + reading @ (body.surface.extension @ body.surface.profile)
+        topography = (case.punch if body is punch else case.strip).topography
+        if topography is not None:
+            heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
+            depth = depth + heights.max() - heights
         surface = surface_on(body.body.name, grid, outward, depth)
         body.lay_grid(surface, reading)
 

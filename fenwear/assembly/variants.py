@@ -134,11 +134,13 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
 def set_up_by(case: Case) -> tuple[object, ...]:
     """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
     bodies = (
-        (body.regions, body.supports, body.pivot, body.profile, body.operator) for body in (case.punch, case.strip)
+        (body.regions, body.supports, body.pivot, body.profile, body.topography, body.operator)
+        for body in (case.punch, case.strip)
     )
     initial = case.heat.initial if case.heat is not None and case.warming else None
     meshed = (case.geometry, case.folder, tuple(case.diffusion.items()))
-    return (*meshed, case.model, case.setup, case.materials, case.heat is None, initial, *bodies)
+    grid = None if case.grid is None else (case.grid, case.motion)  # it reaches as far as the punch does
+    return (*meshed, grid, case.model, case.setup, case.materials, case.heat is None, initial, *bodies)
 
 
 def same_conduction(one: Case, other: Case) -> bool:

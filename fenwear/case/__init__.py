@@ -13,6 +13,7 @@ from fenwear.case.reading import builtin_cases, changed_case, load_case, make_ca
 from fenwear.case.schema import Case
 from fenwear.case.setup import Setup, Way
 from fenwear.case.thermal import Heat, Track
+from fenwear.case.topography import Topography
 
 __all__ = [
     "CONDENSED",
@@ -40,6 +41,7 @@ __all__ = [
     "Stick",
     "Support",
     "Tabulated",
+    "Topography",
     "Track",
     "Way",
     "Wear",

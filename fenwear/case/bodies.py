@@ -23,6 +23,7 @@ from fenwear.case.quantities import (
     Temperature,
     Unit,
 )
+from fenwear.case.topography import Topography
 from fenwear.case.units import convert, shown
 
 CONDENSED = "condensed"  # operator of a body whose mesh is eliminated down to its contact surface
@@ -294,6 +295,9 @@ class Body(Part):
         description="how its contact surface answers to forces: condensed: as its mesh does; half-space: as one of its "
         "material, or half-plane, without supports and other boundaries, fast for many nodes; fine: as a half-space "
         "and what its mesh does otherwise, on a grid finer than the mesh; or one made in Python",
+    )
+    topography: Topography | None = Field(
+        default=None, description="roughness or waves on top of its shape, measured or made; needs the table grid"
     )
     profile: Profile | None = Field(
         default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"

@@ -98,8 +98,9 @@ def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     for name, table in data.items():
         if name in ("program", "motion"):
             found[name] = _beside(table, folder)
-        elif name in BODIES and isinstance(table, dict) and "profile" in table:
-            found[name] = {**table, "profile": _beside(table["profile"], folder)}
+        elif name in BODIES and isinstance(table, dict):
+            kept = {key: _beside(table[key], folder) for key in ("profile", "topography") if key in table}
+            found[name] = {**table, **kept}
     return found
 
 

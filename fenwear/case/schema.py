@@ -123,7 +123,11 @@ class Case(Part):
             "with heat: temperatures expand the bodies' meshes": self.heat is not None,
             "with contact.solver = 'full', on the bodies' meshes": self.contact.solver == "full",
         }
-        grid = [f"grid: expected none {why}" for why, so in against.items() if so and self.grid is not None]
+        bare = [name for name in ("punch", "strip") if getattr(self, name).topography is not None and self.grid is None]
+        lacking = [
+            f"grid: missing, but required with {name}.topography: the nodes that have its heights" for name in bare
+        ]
+        grid = lacking + [f"grid: expected none {why}" for why, so in against.items() if so and self.grid is not None]
         return grid + [
             f"{name}.operator: expected '{CONDENSED}' {why}" for name in others for why, so in against.items() if so
         ]
@@ -429,6 +433,9 @@ class Case(Part):
         data = self.model_dump(mode="json", exclude_none=True)
         if self._folder is not None and (self._folder / self.geometry.file).is_file():
             data["geometry"]["file"] = str((self._folder / self.geometry.file).resolve())  # wherever it is read next
+        for body, heights in (("punch", self.punch.topography), ("strip", self.strip.topography)):
+            if self._folder is not None and heights is not None and heights.file is not None:
+                data[body]["topography"]["file"] = str((self._folder / heights.file).resolve())
         for body, law in self.wear.by_body.items():
             if law is not None:
                 data["wear"][body] = law.resolved(data["wear"][body])

@@ -70,7 +70,8 @@ def choose_law(system: Tribosystem) -> Choice:
     """
     share = system.team.lead(lambda: elastic_share(system))
     if share is None:
-        return Choice("gross-sliding", "contact.law: 'gross-sliding' is taken: the strip slides one way")
+        why = "the cycle is a table" if system.motion.steps else "the strip slides one way"
+        return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {why}")
     told = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"
     if share <= TAKEN_UP:
         return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {told}", share)

@@ -164,7 +164,9 @@ class Placed:
 
     @property
     def direction_words(self) -> dict[int, str]:
-        """The words for the two directions d of the sliding, 1 first."""
+        """The words for the two directions d of the sliding, 1 first; a table has one, through all of its steps."""
+        if self.motion.steps:
+            return {1: "cyclically", -1: "back"}
         return self.sliding.field.words(self.pair.punch.dim)
 
     @property

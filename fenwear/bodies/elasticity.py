@@ -327,7 +327,7 @@ class ElasticBody:
         mesh = self.body.mesh
         total = np.zeros(self.dim * self.space.dofmap.index_map.size_local)
         for number, load in enumerate(loads):
-            tag = self.body.curve(load.on, f"{self.body.name}.loads.{number}.on")
+            tag = self.body.curve(load.on, f"{load.key(self.body.name, number)}.on")
             ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.body.facet_tags)
             facets = compiled(measure(mesh, self.law.kind) * ds(tag))
             area = self.thickness * mesh.comm.allreduce(fem.assemble_scalar(facets))

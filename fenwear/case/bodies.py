@@ -164,10 +164,16 @@ class Load(Part):
                 raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
         return self
 
+    _of_table: bool = False  # of a motion that is a table
+
     @property
     def steady(self) -> bool:
         """Whether it is the same over the whole cycle."""
         return self.over_cycle is None
+
+    def key(self, body: str, number: int) -> str:
+        """Return its key in a case, as a load of this number of a body."""
+        return "motion.load" if self._of_table else f"{body}.loads.{number}"
 
     def moment_problems(self, key: str, model: str) -> list[str]:
         """Return what of it does not go with a plane, an axisymmetric or a solid model."""
@@ -247,9 +253,11 @@ class CourseLoad:
     def _load(self, parts: Sequence[Any]) -> Load:
         force, moment = (None if p is None else tuple(self.factor * float(c) for c in p) for p in parts)
         through = None if force is None else self.through
-        return Load.model_construct(
+        load = Load.model_construct(
             on=self.on, force=force, traction=None, through=through, moment=moment, over_cycle=None
         )
+        load._of_table = True
+        return load
 
 
 class Prescribed(Part):

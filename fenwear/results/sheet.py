@@ -25,6 +25,7 @@ from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
+from fenwear.results import table_cycle
 from fenwear.results.scar import ScarGeometry, scar_geometry
 from fenwear.results.zone import without_noise
 
@@ -252,6 +253,9 @@ LINES = {
     "debris_volume_mm3": Line("debris between the surfaces", "mm³"),
     "ejected_volume_mm3": Line("... ejected from the start", "mm³"),
     "largest_debris_thickness_mm": Line("... thickness, largest", "µm", 1e3),
+    "mean_way_of_cycle_mm": Line("way slid in a cycle, mean", "mm"),
+    "largest_way_of_cycle_mm": Line("... largest", "mm"),
+    "largest_pressure_of_cycle_MPa": Line("largest pressure in the last cycle", "MPa"),
     "worn_area_mm2": Line("worn area", "mm²"),
     "worn_volume_mm3": Line("worn volume", "mm³"),
     "worn_mass_mg": Line("worn mass", "mg"),
@@ -259,6 +263,10 @@ LINES = {
     "wear_rate_mm3_per_N_m": Line("specific wear rate, last", "mm³/(N m)"),
     "mean_law_wear_rate_mm3_per_N_m": Line("... of the law, mean", "mm³/(N m)"),
     "law_wear_rate_mm3_per_N_m": Line("... of the law, last", "mm³/(N m)"),
+    "worn_volume_per_million_cycles_mm3": Line("worn volume per million cycles, last", "mm³"),
+    "depth_per_million_cycles_mm": Line("largest depth per million cycles, last", "µm", 1e3),
+    "mean_cross_shear": Line("cross-shear ratio, mean over the work of friction", ""),
+    "largest_cross_shear": Line("... largest", ""),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
     **{f"at_{axis}_mm": Line(f"at {words}", "mm") for axis, words in PLACES.items()},
     **{
@@ -313,12 +321,13 @@ def sheet(last: Block) -> dict[str, Any]:
             "friction_over_load": float(row["friction_work"]) / carried,
             "friction_work_mJ": float(row["friction_work"]),
             "largest_energy_mJ_per_mm2": float(row["dissipated_energy"].max()),
+            **table_cycle.sliding_numbers(last),
         }
     }
     for body, end in BODIES.items():
         own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
         if own:
-            found[body] = own | _diameters(own)
+            found[body] = own | _diameters(own) | table_cycle.body_numbers(last, body)
     return found
 
 

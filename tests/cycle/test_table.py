@@ -45,6 +45,13 @@ def test_a_sine_is_the_reciprocating_motion(assembled: Callable[..., Tribosystem
         np.testing.assert_allclose(other.end.totals.sums, one.end.totals.sums, rtol=1e-12)
 
 
+def test_a_group_that_is_none(assembled: Callable[..., Tribosystem]) -> None:
+    rows = "rows=[[0, 0, -1], [1, 1, -1], [2, 0, -1]], load={on='punch_top'}"
+    motion = f"motion={{kind='cycle', columns=['time (s)', 'shift_x (mm)', 'force_z (N)'], {rows}}}"
+    with pytest.raises(CaseError, match=r"motion\.load\.on: no physical curve 'punch_top'"):
+        assembled("example1", *SMALL[:3], motion)
+
+
 def test_a_step_that_opens_the_contact(assembled: Callable[..., Tribosystem]) -> None:
     turned = table([[0, 0], [1, 1], [2, 0]], "angle_y (deg)")
     with pytest.raises(CaseError, match=r"motion.rows: from row 1 to row 2 .* open the contact"):

@@ -21,6 +21,7 @@ from fenwear.report.style import (
     from_zero,
     legend_beside,
     name_panel,
+    one_way,
     panels,
     panels_of_maps,
     shades,
@@ -106,7 +107,8 @@ def map_figure(
         title = f"{look.of_one if look.axis == 'cycles' else ''} {look.name(history, n)} {look.of_unit}".strip()
         if quantity.variable == "pressure":
             _contact_edge(ax, surface, found)
-            title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
+            if one_way(history):
+                title += f" {surface.arrow(int(history.direction.sel(half_cycle=n)))}"
         size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
         name_panel(ax, f"{title}\n≤ {size} {quantity.unit}")
     name = f"{quantity.title[0].lower()}{quantity.title[1:]}"

@@ -99,6 +99,11 @@ def direction_words(data: xarray.Dataset) -> dict[int, str]:
     return {1: first, -1: second}
 
 
+def one_way(data: xarray.Dataset) -> bool:
+    """Return whether the strip moves one way at a time, not in all directions of a cycle that is a table."""
+    return "cyclically" not in direction_words(data).values()
+
+
 def strip_moves(data: xarray.Dataset) -> str:
     """Return what the strip does, of a history or of fields: it moves, or it turns."""
     return "strip turns" if "clockwise" in direction_words(data).values() else "strip moves"

@@ -119,7 +119,10 @@ def set_up(case: Case, system: Tribosystem) -> Tribosystem:
     """
     try:
         return renewed(replace(system, made_from=case))
-    except CaseError:
+    except CaseError as error:
         if case.geometry.order == 1:
             raise
-        return renewed(replace(system, made_from=changed(case, geometry={"order": 1})))
+        try:
+            return renewed(replace(system, made_from=changed(case, geometry={"order": 1})))
+        except CaseError:
+            raise error from None

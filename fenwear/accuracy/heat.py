@@ -11,6 +11,7 @@ import numpy as np
 
 from fenwear.accuracy.values import Contribution, Values
 from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, with_reduced_heat
 from fenwear.cycle import Block
 from fenwear.errors import ConvergenceError
 
@@ -28,6 +29,19 @@ def of_heat(last: Block, values: Values) -> dict[str, Contribution]:
         return {}
     known = {"heat steps": fineness.change, "heat basis": fineness.difference}
     return {source: _of(last, values, share) for source, share in known.items() if share is not None}
+
+
+def of_steady_heat(system: Tribosystem, values: Values) -> dict[str, Contribution]:
+    """Return the same of a steady state: relative, of pressures too, which the thermal gap makes at most as much of."""
+    exchange = with_reduced_heat(system).exchange
+    if exchange is None or exchange.fineness is None or system.heat is None:
+        return {}
+    start = {"temperature": system.heat.initial}
+    return {
+        source: {quantity: share * abs(v.number - start.get(quantity.name, 0.0)) for quantity, v in values.items()}
+        for source, share in (("heat steps", exchange.fineness.change), ("heat basis", exchange.fineness.difference))
+        if share is not None
+    }
 
 
 def _of(last: Block, values: Values, share: float) -> Contribution:

@@ -17,7 +17,7 @@ WORDS = {"depth": "worn depth", "volume": "worn volume", "pressure": "largest pr
 def table(system: Tribosystem, found: Uncertainty) -> dict[str, Any]:
     """Return an uncertainty as summary.json has it: under the names of the numbers, in all and by its sources."""
     return {
-        **_named(system, found.total),
+        **(_named(system, found.total) if found.is_whole else {}),
         "contributions": {source: _named(system, own) for source, own in found.contributions.items()},
         **({"untold": found.untold} if found.untold else {}),
         "remedies": remedies(system, found),
@@ -80,14 +80,14 @@ def _remedy(system: Tribosystem, source: str) -> str:
 def text(system: Tribosystem, found: Uncertainty) -> str:
     """Return in a few lines how uncertain the numbers are, what of, and what would help."""
     told, helps, total = [], remedies(system, found), found.total
-    for name, words in WORDS.items():
+    for name, words in WORDS.items() if found.is_whole else ():
         shares = {q: total[q] / max(abs(v.number), 1e-300) for q, v in found.values.items() if q.name == name}
         if not shares:
             continue
         worst = max(shares, key=lambda quantity: shares[quantity])
         by = f", most by the {found.largest(worst)}" if name in helps else ""
         told.append(f"{words} {100 * shares[worst]:.2g} %{by}")
-    lines = [f"numerical uncertainty: {'; '.join(told)}"]
+    lines = [f"numerical uncertainty: {'; '.join(told) or 'not known'}"]
     lines += [f"not told of the {source}: {why}" for source, why in found.untold.items()]
-    lines += [f"to lower it: {key}" for key in sorted(set(helps.values()))]
+    lines += [f"to lower it: {key}" for key in sorted(set(helps.values())) if found.is_whole]
     return "\n".join(lines)

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fenwear.accuracy.again import Again, coarser, in_few_steps, set_up
-from fenwear.accuracy.heat import of_heat
-from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of
+from fenwear.accuracy.heat import of_heat, of_steady_heat
+from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of, values_of_steady
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
-from fenwear.cycle import Block
+from fenwear.cycle import Block, Steady, steady
 from fenwear.cycle.driver import Watch, unwatched
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
@@ -22,6 +22,7 @@ SAFETY = 1.25  # of an estimate by the assumed order, as of grid convergence ind
 ORDER, OF_PRESSURE = 1.5, 1.0  # of what is integrated, and of pressures and what lies at an edge
 LARGER = 8.0  # by which the tolerance of jumps is raised: as they are of second order, their error by 4
 ROUNDING = 1e-12
+NOTHING_BELOW = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,11 @@ class Uncertainty:
     contributions: dict[str, Contribution]
     untold: dict[str, str] = field(default_factory=dict)
     seconds: float = 0.0
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether there is what contributes most: without the mesh's part a sum would say nothing."""
+        return "mesh" in self.contributions
 
     @property
     def total(self) -> Contribution:
@@ -69,7 +75,7 @@ def uncertainty(case: Case, last: Block, watch: Watch = unwatched) -> Uncertaint
     untold: dict[str, str] = {}
     lower = coarser(case)
     if lower is None:
-        untold["mesh"] = "there are no elements of a lower degree than 1 to compare with: set geometry.degree = 2"
+        untold["mesh"] = NOTHING_BELOW
     try:
         base = in_few_steps(lower or case, until * last.system.motion.positions)
         again = Again(set_up(base, last.system), until, watch)
@@ -185,3 +191,27 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
         }
         found = replace(found, contributions={**found.contributions, "mesh": mesh})
     return replace(found, seconds=time.perf_counter() - begin)
+
+
+def uncertainty_of_steady(state: Steady) -> Uncertainty:
+    """Return the numerical uncertainty of a cyclic steady state's largest pressures and temperature; collective.
+
+    Args:
+        state: The state; nothing in it comes of steps of wear.
+    """
+    begin = time.perf_counter()
+    system, values = state.system, values_of_steady(state)
+    case = system.case
+    lower, found, untold = coarser(case), dict[str, Contribution](), dict[str, str]()
+    if lower is None:
+        untold["mesh"] = NOTHING_BELOW
+    else:
+        try:
+            before = values_of_steady(steady(set_up(lower, system)))
+            found["mesh"] = of_mesh(values, before, case.geometry.degree)
+        except (CaseError, ConvergenceError) as error:
+            untold["mesh"] = str(error)
+    found |= of_steady_heat(system, values)
+    left = state.complementarity_error + ROUNDING
+    found["solver"] = {quantity: left * abs(value.number) for quantity, value in values.items()}
+    return Uncertainty(values, found, untold, time.perf_counter() - begin)

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.cycle import Block
+from fenwear.cycle import Block, Steady
 from fenwear.results.surfaces import surface_cells
 
 BODIES = ("punch", "strip")
@@ -85,6 +85,19 @@ def values_of(last: Block) -> Values:
         sides: list[Array] = [last.heat.temperature_punch[-1], last.heat.temperature_strip[-1]]
         warmer = max(sides, key=lambda side: float(side.max()))
         found[Quantity("temperature")] = _largest(warmer, system.pair.punch)
+    return found
+
+
+def values_of_steady(state: Steady) -> Values:
+    """Return the numbers of a cyclic steady state: the largest pressure of each half-cycle, and the temperature."""
+    surface, strokes = state.system.pair.punch, len(state.directions)
+    found = {
+        Quantity("pressure", str((k + 1) % strokes)): _largest(pressure, surface)
+        for k, pressure in enumerate(list(state.pressure))
+    }
+    if state.heat is not None:
+        sides = [*state.heat.punch, *state.heat.strip]
+        found[Quantity("temperature")] = _largest(max(sides, key=lambda side: float(side.max())), surface)
     return found
 
 

@@ -36,6 +36,9 @@ def steady_command(
     step: StepOption = None,
     fresh: FreshOption = False,
     as_json: JsonOption = False,
+    accuracy: Annotated[
+        bool, typer.Option("--accuracy", help="Estimate how uncertain its largest pressures and temperature are.")
+    ] = False,
 ) -> None:
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import with_case, with_reduced_heat
@@ -73,6 +76,7 @@ def steady_command(
         log(f"warning: {warning}")
     if not as_json:
         _print_steady(case, found, state, of_step[1] if of_step else "")
+    uncertain = _uncertain(state) if accuracy else {}
     way = time.perf_counter()
     rate = growth_rate(found, state.phase_pressure, state.conductances)
     cycles = cycles_to_reach(found, state, 0.01) if rate < 0 else None
@@ -100,11 +104,21 @@ def steady_command(
             "wear_per_cycle": state.wear_per_cycle.tolist(),
             **state.velocity,
             "cycles_to_1_percent": cycles,
+            **uncertain,
             "seconds": state.seconds,
             "all_seconds": {**seconds, "in_all": time.perf_counter() - begin},
             "warnings": warnings,
         }
     )
+
+
+def _uncertain(state: Steady) -> dict[str, Any]:
+    """Return how uncertain a state's numbers are, and say it."""
+    from fenwear.accuracy import shown, uncertainty_of_steady
+
+    found = uncertainty_of_steady(state)
+    log(shown.text(state.system, found))
+    return {"uncertainty": shown.table(state.system, found)}
 
 
 def _print_final(name: str, system: Tribosystem, *, as_json: bool) -> None:

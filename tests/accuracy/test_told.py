@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import Block, Tribosystem, evolve
-from fenwear.accuracy import Quantity, Value, shown, uncertainty, values_of
+from fenwear import Block, Tribosystem, evolve, steady
+from fenwear.accuracy import Quantity, Value, shown, uncertainty, uncertainty_of_steady, values_of
 from fenwear.accuracy.told import of_mesh
+from fenwear.accuracy.values import values_of_steady
 
 Assembled = Callable[..., Tribosystem]
 FEW = "geometry.parameters.elements_along_contact=8"
@@ -82,7 +83,11 @@ def test_linear_elements_have_nothing_below(assembled: Assembled) -> None:
     found = uncertainty(system.case, end_of(system))
     assert "geometry.degree" in found.untold["mesh"]
     assert "wear steps" in found.contributions
-    assert "geometry.degree" in shown.text(system, found)
+    text, table = shown.text(system, found), shown.table(system, found)
+    assert "not known" in text
+    assert "geometry.degree = 2" in text
+    assert "punch" not in table  # a sum without the mesh's part would say nothing
+    assert table["contributions"]["wear steps"]["punch"]["largest_depth_mm"] > 0
 
 
 def test_equal_largest_values_of_other_fields_are_apart() -> None:
@@ -94,6 +99,19 @@ def test_equal_largest_values_of_other_fields_are_apart() -> None:
     assert fine.apart(coarse) == 0.0  # they differ only where there is nothing
     assert fine.apart(other) == pytest.approx(0.1)
     assert of_mesh({DEPTH: fine}, {DEPTH: other}, 2)[DEPTH] == pytest.approx(1.25 * 0.1 / (2**1.5 - 1))
+
+
+def test_steady_state_within_what_is_told(assembled: Assembled) -> None:
+    """Of rings p = F / (2 pi (r2 - r1) r); a finer mesh changes a tilting punch's by less than is told."""
+    found = uncertainty_of_steady(steady(assembled("ring-on-ring", *RINGS, "geometry.degree=2")))
+    exact = 2000 / (2 * np.pi * 10 * 20)
+    assert abs(found.values[PRESSURE].number - exact) <= found.total[PRESSURE] < 0.1 * exact
+    one, other = (
+        steady(assembled("example1", "geometry.degree=3", FEW.replace("8", elements))) for elements in ("8", "32")
+    )
+    found, finer = uncertainty_of_steady(one), values_of_steady(other)
+    for quantity in (PRESSURE, Quantity("pressure", "1")):
+        assert abs(found.values[quantity].number - finer[quantity].number) < found.total[quantity]
 
 
 def test_run_tells_it(fenwear: Callable[..., Any], tmp_path: Any) -> None:

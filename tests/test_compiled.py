@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import dolfinx.jit
+import ffcx.codegeneration.jit
 import pytest
+import ufl
+from dolfinx import fem, mesh
 from mpi4py import MPI
 
+from fenwear.bodies.assembly import compiled
 from fenwear.compiled import ensure_folder
 
 
@@ -28,3 +33,21 @@ def test_folder(place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     else:
         assert told is None
         assert (tmp_path / (place or ".cache") / "fenics").is_dir()
+
+
+def test_another_compilation_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where another process compiles the same form, and takes longer than the ten seconds that dolfinx waits."""
+    monkeypatch.setitem(dolfinx.jit.DOLFINX_DEFAULT_JIT_OPTIONS, "cache_dir", (tmp_path, ""))
+    form = fem.Constant(mesh.create_unit_interval(MPI.COMM_SELF, 2), 3.0) * ufl.dx
+    compiled(form)
+    (ready,) = tmp_path.rglob("*.cached")
+    hidden, waited = ready.rename(tmp_path / "hidden"), []
+
+    def sleep(seconds: float) -> None:
+        waited.append(seconds)
+        if sum(waited) == 60:
+            hidden.rename(ready)
+
+    monkeypatch.setattr(ffcx.codegeneration.jit.time, "sleep", sleep)
+    assert fem.assemble_scalar(compiled(form)) == pytest.approx(3)
+    assert sum(waited) == 60

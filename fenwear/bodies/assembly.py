@@ -20,6 +20,8 @@ from fenwear.arrays import Array, Mask
 from fenwear.parallel import lasting
 from fenwear.stack import compiling
 
+PATIENCE = 120  # s: on a busy machine a form takes longer to compile than the ten that dolfinx waits
+
 
 def compiled(form: Any) -> fem.Form:
     """Return a form of UFL, compiled; collective.
@@ -27,15 +29,22 @@ def compiled(form: Any) -> fem.Form:
     Kept forms lie in many small folders: Python lists the one that it loads from at every look-up, which took longer
     than to assemble where there were a thousand.
     """
-    options = jit.get_options()
+    options = _options()
     with compiling():
-        return fem.form(form, jit_options={"cache_dir": options["cache_dir"] / form.signature()[:2]})
+        return fem.form(form, jit_options={**options, "cache_dir": options["cache_dir"] / form.signature()[:2]})
+
+
+def _options() -> dict[str, Any]:
+    """Return how forms are compiled: with more patience for another process that compiles the same one."""
+    options = jit.get_options()
+    return {"cache_dir": options["cache_dir"], "timeout": max(PATIENCE, options["timeout"])}
 
 
 def interpolate(expression: Any, function: fem.Function) -> None:
     """Give a function the values of an expression of UFL at its space's points; collective."""
     with compiling():
-        compiled_at = fem.Expression(expression, compat.interpolation_points(function.function_space))
+        points = compat.interpolation_points(function.function_space)
+        compiled_at = fem.Expression(expression, points, jit_options=_options())
     function.interpolate(compiled_at)
 
 

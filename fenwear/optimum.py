@@ -109,7 +109,7 @@ def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) 
         InputError(
             "punch.loads",
             f"{beginning}{what}; expected a load that presses on it between the contact's edges, friction included"
-            + (", or supports against tilting" if tips else ""),
+            + (", or supports against tilting (or no_turning_about)" if tips else ""),
         )
     )
 

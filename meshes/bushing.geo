@@ -24,8 +24,11 @@ DefineConstant[
 If(diffusion_area < 0)
   Error("diffusion_area must not be negative");
 EndIf
-If(radius <= 0 || clearance <= 0 || wall <= 0 || shaft_wall <= 0 || shaft_wall >= radius)
-  Error("radius, clearance, wall and shaft_wall must be positive, shaft_wall smaller than radius");
+If(radius <= 0 || wall <= 0 || shaft_wall <= 0 || shaft_wall >= radius)
+  Error("radius, wall and shaft_wall must be positive, shaft_wall smaller than radius");
+EndIf
+If(clearance < 0)
+  Error("clearance must not be negative: the shaft would be larger than its bore");
 EndIf
 whole = (contact_angle >= 180) ? 1 : 0;
 If(contact_angle <= 0 || contact_angle > 180 || overlap_angle <= 0 || margin_angle <= 0)

@@ -23,7 +23,10 @@ DefineConstant[
   shaft_layers = 3
 ];
 
-If(radius <= 0 || clearance < 0 || clearance >= 0.2 * radius || wall <= 0 || shaft_wall <= 0 || shaft_wall >= radius)
+If(clearance < 0)
+  Error("clearance must not be negative: the shaft would be larger than its bore");
+EndIf
+If(radius <= 0 || clearance >= 0.2 * radius || wall <= 0 || shaft_wall <= 0 || shaft_wall >= radius)
   Error("radius, wall and shaft_wall must be positive, shaft_wall and clearance small against radius");
 EndIf
 If(length <= 0 || overhang < 0 || Fabs(misalignment) > 2)

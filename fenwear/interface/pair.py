@@ -21,7 +21,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.frame import common_normal, unit
 from fenwear.interface.overlap import ChartedSurface, Patch
-from fenwear.interface.patches import folds, patches
+from fenwear.interface.patches import folds, patches, radius_of
 from fenwear.interface.placement import HERE, ZERO, Placement
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
@@ -232,7 +232,18 @@ def check_distance(pair: ContactPair) -> None:
     closest = float(pair.initial_gap.min())
     if abs(closest) > 0.01 * pair.punch.extent():
         way = "above" if closest > 0 else "inside"
-        _not_facing(f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest")
+        reason = f"punch_contact lies {abs(closest):g} mm {way} strip_contact where they are closest"
+        _not_facing(reason + (_larger_than_its_bore(pair.punch, pair.strip) if closest < 0 else ""))
+
+
+def _larger_than_its_bore(punch: ContactSurface, strip: ContactSurface) -> str:
+    """Say so of a shaft or ball that is larger than the bore or cup opposite; "" of all others."""
+    radii = {surface.body: radius_of(surface) for surface in (punch, strip)}
+    bore, inner = (next((b for b, r in radii.items() if r is not None and sign * r > 0), "") for sign in (-1, 1))
+    sizes = {body: abs(radius) for body, radius in radii.items() if radius is not None}
+    if not bore or not inner or sizes[inner] <= sizes[bore]:
+        return ""
+    return f": {inner}_contact, of radius {sizes[inner]:.4g} mm, is larger than {bore}_contact around it, {sizes[bore]:.4g} mm"
 
 
 def _around(part: Patch, punch: ContactSurface) -> Patch:
@@ -248,6 +259,8 @@ def _check_covered(parts: Sequence[Patch], placement: Placement) -> None:
     bare = next((part for part in parts if not part.common.covered.all()), None)
     if bare is None:
         return
+    if not len(bare.second.facets):
+        _not_facing("they touch nowhere: no part of strip_contact looks at a part of punch_contact")
     first, second = (used.s[np.unique(used.facets)] for used in (bare.first, bare.second))
     spans = [
         " and ".join(f"{low:g} to {high:g}" for low, high in zip(c.min(axis=0), c.max(axis=0), strict=True))

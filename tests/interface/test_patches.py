@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
 from fenwear.bodies.contact_surface import ContactSurface, vertex_surface
-from fenwear.interface import pair
+from fenwear.interface import check_distance, pair
 from fenwear.interface.patches import folds, patches
 from fenwear.interface.placement import Placement
 
@@ -116,6 +117,16 @@ def test_ball_in_a_cup() -> None:
         np.testing.assert_allclose(between.initial_gap, 0.02, atol=10 * errors[-1])
         assert between.wear_projection.data.min() >= 0
     assert errors[1] < 0.35 * errors[0] < 0.02
+
+
+def test_a_ball_larger_than_its_cup() -> None:
+    """And surfaces that touch nowhere: refused by name."""
+    cup, ball = sphere("punch", 10.0, 500, 0.0, 1), sphere("strip", 10.5, 1000, 2.0, 2)
+    with pytest.raises(CaseError, match=r"strip_contact, of radius 10.5 mm, is larger than punch_contact around it"):
+        check_distance(pair(cup, ball))
+    away = replace(ball, trace=ball.trace + np.array([60.0, 0.0, 0.0]))
+    with pytest.raises(CaseError, match=r"they touch nowhere: no part of strip_contact looks at a part of punch_co"):
+        pair(cup, away)
 
 
 def faces(name: str, heights: tuple[float, float], count: int, inwards: float) -> ContactSurface:

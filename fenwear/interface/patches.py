@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.errors import CaseError, InputError
 from fenwear.interface.frame import facet_normals, unit
 from fenwear.interface.overlap import RING, ChartedSurface, Patch
 from fenwear.interface.placement import HERE, Placement
@@ -26,6 +27,10 @@ SEEN = 0.2  # the same of facets of the second surface that a patch of several s
 AROUND = 0.35  # cosine between the axis and the ways to facets of the second surface that a patch sees from the middle
 ROUND = 0.05  # of the radius: how far, in the mean, normals of round surfaces may pass the middle
 SLIVER = 0.5  # the same of any one facet
+NOWHERE = (
+    "the contact surfaces do not face each other: they touch nowhere: no part of strip_contact looks at a part of "
+    "punch_contact"
+)
 STRAIGHT = 1e-3  # of the largest second moment of the normals: what they have along the axis of a cylinder
 
 
@@ -173,7 +178,11 @@ def _middle(surface: ContactSurface, normal: Array) -> _Middle | None:
 
 
 def _from_middle(own: Side, other: Side) -> list[Patch] | None:
-    """Return the parts of round surfaces as seen from their middle; None of a graph, or where there is no middle."""
+    """Return the parts of round surfaces as seen from their middle; None of a graph, or where there is no middle.
+
+    Raises:
+        CaseError: a part of the first has nothing of the second opposite.
+    """
     middle = None if _is_graph(own.normal) else _middle(own.surface, own.normal)
     if middle is None:
         return None
@@ -186,6 +195,8 @@ def _from_middle(own: Side, other: Side) -> list[Patch] | None:
     for axis, side, part in _sides(ways):
         for out in np.unique(outwards[part]):
             seen = (opposite[:, axis] * side >= AROUND) & (facing == -out)
+            if not seen.any():
+                raise CaseError(InputError("geometry", NOWHERE))
             views = []
             for one, facets in ((own, part & (outwards == out)), (other, seen)):
                 s, used = np.zeros((len(one.trace), one.surface.dim - 1)), np.unique(one.surface.facets[facets])

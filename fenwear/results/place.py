@@ -141,7 +141,8 @@ def _apart(block: Block) -> Array:
     The translation, and in a solid the tilt, that fits what gaps have opened by best, over the whole surface.
     """
     system, pair = block.system, block.system.pair
-    undeformed = np.array([system.gap(0, Worn(*worn)) for worn in zip(block.wear, block.wear_strip, strict=True)])
+    depths = zip(block.wear, block.wear_strip, strict=True)
+    undeformed = np.array([system.gap(0, Worn(np.asarray(one), np.asarray(other))) for one, other in depths])
     fields = pair.normal[:, [0, -1]]
     if pair.punch.dim == 3:
         y = pair.punch.x[:, 1]

@@ -87,7 +87,7 @@ def _around(axis: Array, pair: ContactPair) -> tuple[Array, Array]:
     x, normal = in_space(pair.punch.x), in_space(pair.normal)
     outside = np.einsum("ic,ic->", x - pair.weights @ x / pair.weights.sum(), normal) > 0  # e_n goes into the punch
     first *= (1.0 if outside else -1.0) / np.linalg.norm(first)
-    return first, np.cross(axis, first)
+    return first, np.asarray(np.cross(axis, first), dtype=np.float64)
 
 
 def _first_axis(normal: Array) -> Array:

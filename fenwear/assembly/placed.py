@@ -218,11 +218,16 @@ class Placed:
         """What lies between the surfaces.
 
         Raises:
-            CaseError: a value of it is not positive somewhere, or the modulus of rough surfaces is missing.
+            CaseError: a value of it is not positive somewhere, the modulus of rough surfaces is missing, or the
+                hardness does not carry the load.
         """
         case = self.made_from
         modulus = None if case is None else common_modulus(case, *self.bodies.regions)
-        return layers_of(self.friction.contact, self.pair, modulus)
+        found, mean = layers_of(self.friction.contact, self.pair, modulus), self.rigid.mean_pressure
+        if found.hardness <= mean:
+            message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
+            raise CaseError(InputError("contact.hardness", message))
+        return found
 
     def passing(self, wear: PhasesWear, phases: Sequence[int] | None = None) -> Passing:
         """Return what phases of the motion, by default all, wear and do to what lies between.

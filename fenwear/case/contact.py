@@ -9,7 +9,7 @@ from pydantic import Field, WrapValidator, model_validator
 
 from fenwear.case.laws import Dependence, constant_or_dependence
 from fenwear.case.layers import Layers, ThirdBody
-from fenwear.case.quantities import Number, Part
+from fenwear.case.quantities import Number, Part, Stress
 
 CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
 
@@ -39,6 +39,10 @@ class Contact(Part):
 
     third_body: ThirdBody | None = Field(
         default=None, description="debris that stays between the surfaces; without this table none does"
+    )
+    hardness: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None,
+        description="H: no pressure is beyond it; what would be flows, to a plastic depth that stays, apart from wear",
     )
     layer: Annotated[Layers, Field(discriminator="kind")] | None = Field(
         default=None, description="what gives way between the bodies beside their own elasticity, such as roughness"

@@ -259,9 +259,11 @@ class Case(Part):
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
-        lies = [name for name in ("third_body", "layer") if getattr(self.contact, name) is not None]
+        lies = [name for name in ("third_body", "layer", "hardness") if getattr(self.contact, name) is not None]
         if self.contact.solver == "full" and lies:
             problems.append(f"contact.solver: expected 'condensed' with contact.{lies[0]}")
+        if self.sticks and self.contact.hardness is not None:
+            problems.append("contact.hardness: expected contact.law = 'gross-sliding': with stick nothing flows yet")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
         several = not isinstance(motion, OneWay | Rotation | Cycle) and (motion.positions or 1) > 1

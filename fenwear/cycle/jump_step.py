@@ -98,6 +98,7 @@ class Stepper:
         self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
         self.coupled = Coupled(system, self.take)
         self._heated: Array = np.zeros(0)  # by the last cycle
+        self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
         self._conductances: Array | None = None  # in it
         self._done = 0.0  # half-cycles at the end of the stage
         self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
@@ -195,7 +196,7 @@ class Stepper:
         share = GAMMA * cycles
         begin = self._moment(state)
         self._press(state.half_cycle, since + share)
-        first = self._stage(begin, joined(state.contacts), share)
+        first = self._stage(begin, joined(state.contacts), share, cycles - share)
         between = begin.after(first, cycles - share)
         self._press(state.half_cycle, since + cycles)
         return self._end(state, between, self._stage(between, first.contact, share), share)
@@ -236,8 +237,13 @@ class Stepper:
         if self.loading is not as_given and isinstance(self.contact, CondensedContact):
             self.contact.press(self.loading(self._done))
 
-    def _stage(self, before: _Moment, start: ContactState | None, cycles: float) -> _Stage:
-        """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0."""
+    def _stage(
+        self, before: _Moment, start: ContactState | None, cycles: float, followed: float | None = None
+    ) -> _Stage:
+        """Return the cycle whose middle is y = y_0 + `cycles` f, from the depths and temperatures of y_0.
+
+        What flows is no rate: all of it is there after as many cycles as follow the stage, by default those of its own.
+        """
         gap = np.array([self.system.gap(phase, before.worn) for phase in range(len(self.ratios))])
         if start is None:  # the first of all: what conducts is seen from the contact without heat
             start = self._solve(gap, None, (before.worn, cycles))
@@ -256,7 +262,8 @@ class Stepper:
         if begin is not None:
             heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        worn = self.system.passing(self.wear).worn(contact.pressure, before.worn.between, cycles)
+        flowed = None if self._flowed is None else self._flowed / (cycles if followed is None else followed)
+        worn = self.system.passing(self.wear).worn(contact.pressure, before.worn.between, cycles, flowed)
         return _Stage(contact, heated, worn, adds, solved.conductances)
 
     def _solve(
@@ -265,8 +272,15 @@ class Stepper:
         """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
         worn, cycles = begin
-        step = self.system.passing(self.wear).step(worn.between, cycles)
-        return self.contact.solve(gap, start, step, coupling)
+        step, near = self.system.passing(self.wear).step(worn.between, cycles), start
+
+        def solve(flowed: Array) -> ContactState:
+            nonlocal near
+            near = self.contact.solve(gap + flowed, near, step, coupling)
+            return near
+
+        found, self._flowed = self.system.layers.flowing(solve, lambda found: found.pressure)
+        return found
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""

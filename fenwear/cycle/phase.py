@@ -58,6 +58,7 @@ class PhaseStep:
         self._friction_ratio = system.phase_friction(phase, self._mu)
         wear = system.wear.phases([conditions], [phase])
         self._passing = system.passing(wear, [phase])
+        self._flowed: Array | None = None  # beyond the hardness, in the last solve
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
     def solve(
@@ -141,10 +142,19 @@ class PhaseStep:
     def _solve(
         self, temperature: HeatState | None, gap: Array, start: ContactState | None, passing: Passing, worn: Worn
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
-        wearing = passing.step(worn.between, implicit=self.implicit)
-        if self._thermal is None or temperature is None:
-            return self._contact.solve(gap, start, wearing), None, None
-        return self._thermal.solve(temperature, gap, start, wearing)
+        wearing, near = passing.step(worn.between, implicit=self.implicit), start
+
+        def solve(flowed: Array) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+            nonlocal near
+            if self._thermal is None or temperature is None:
+                near = self._contact.solve(gap + flowed, near, wearing)
+                return near, None, None
+            found = self._thermal.solve(temperature, gap + flowed, near, wearing)
+            near = found[0]
+            return found
+
+        found, self._flowed = self.system.layers.flowing(solve, lambda found: found[0].pressure)
+        return found
 
     def _end(
         self,
@@ -158,7 +168,7 @@ class PhaseStep:
         previous = None if before is None else before.pressure[0]
         meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, passing.wear)
         adds, lost = self.system.team.lead(
-            lambda: (meter(contact.pressure[0]), passing.worn(contact.pressure, worn.between))
+            lambda: (meter(contact.pressure[0]), passing.worn(contact.pressure, worn.between, flowed=self._flowed))
         )
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, lost)

@@ -303,6 +303,12 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
 
 def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -> Steady:
     system, contact = problem.system, solved.contact
+    hardness, peak = system.layers.hardness, float(contact.pressure.max())
+    if peak > hardness:
+        raise ConvergenceError(
+            f"no cyclic steady state without plastic flow exists: its largest pressure of {peak:.4g} MPa is beyond "
+            f"contact.hardness = {hardness:.4g} MPa, so that the surface flows in every cycle. Follow it by `run`"
+        )
     weights, motion = system.pair.weights, system.motion
     omega = problem.x[problem.omega] * problem.gap_scale
     touched = problem.x[problem.omega] < OPEN

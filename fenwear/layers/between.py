@@ -1,15 +1,19 @@
 """What lies between two surfaces, as one: what it adds to the gap of the nodes, and the rows of its state.
 
-    gap = bodies + winkler p + factor delta(p) - t
+    gap = bodies + winkler p + delta(p) - t + D,    p <= hardness
 
-with the linear closure, that of a law (`closure`) and the thickness of debris (`debris`). What is linear in the
-pressure belongs to the compliance of the bodies (`fenwear.interface.Interface`), so that every study has it.
+with the linear closure, that of a law (`closure`), the thickness of debris (`debris`) and the plastic depth D, which
+grows where the pressure is at the hardness. In a solve the surface gives way by SOFT (p / hardness - 1) beyond it; what
+it has given way by is put into the gap, and solved again: the excess falls to a part of itself each time, to nothing
+(augmented Lagrangians; M. R. Hestenes, J. Optim. Theory Appl. 4, 1969, 303). What is linear in the pressure belongs to
+the compliance of the bodies (`fenwear.interface.Interface`), so that every study has it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,7 +27,7 @@ from fenwear.case.layers import (
     RoughLayer,
     place_values,
 )
-from fenwear.errors import CaseError, InputError
+from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
@@ -31,6 +35,10 @@ from fenwear.layers.debris import Debris
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
 DEBRIS = ("debris_thickness", "debris_ejected")
+PLASTIC = "plastic_depth"
+SOFT = 0.03  # mm
+MOST_FLOWS, FLOWED, FLAT = 500, 1e-8, 1e-9  # iterations; change over what has flown, least depth (mm), that end them
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -42,22 +50,24 @@ class Layers:
         closure: The law by which it gives way; None where it does not, or in proportion to the pressure.
         winkler: Closure over pressure of a linear layer (n,), mm/MPa; None without.
         debris: Of the third body; None without.
+        hardness: Largest pressure, MPa.
     """
 
     nodes: int
     closure: Closure | None = None
     winkler: Array | None = None
     debris: Debris | None = None
+    hardness: float = np.inf
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the rows of the state, mm each: thickness of the debris, and depth that is ejected."""
-        return () if self.debris is None else DEBRIS
+        """Names of the rows of the state, mm each: thickness of the debris, depth that is ejected, plastic depth."""
+        return (*(() if self.debris is None else DEBRIS), *((PLASTIC,) if self.hardness < np.inf else ()))
 
     @property
     def nothing(self) -> bool:
         """Whether it changes nothing of contact and wear beside the compliance of the bodies."""
-        return self.closure is None and self.debris is None
+        return self.closure is None and not self.rows
 
     def given(self, pressure: Array) -> Array:
         """Return by how much pressures (..., n) close what lies between, mm."""
@@ -73,13 +83,58 @@ class Layers:
 
     def opening(self, state: Array) -> Array | float:
         """Return the gap that a state opens (n,), mm."""
-        return -state[0] if self.debris is not None and len(state) else 0.0
+        if not len(state):
+            return 0.0
+        found = np.zeros(self.nodes) if self.debris is None else -state[0]
+        return found + state[-1] if self.hardness < np.inf else found
+
+    def closing(self, pressure: Array) -> Array:
+        """Return by how much pressures (m, n) close what gives way in a step by laws that are not linear, mm."""
+        found = np.zeros_like(pressure) if self.closure is None else self.closure.closure(pressure)
+        return found if self.hardness == np.inf else found + self.flow(pressure)
+
+    def slope(self, pressure: Array) -> Array | None:
+        """Return the derivative of `closing` (m, n), mm/MPa; None where nothing gives way so."""
+        found = None if self.closure is None else self.closure.slope(pressure)
+        if self.hardness == np.inf:
+            return found
+        soft = np.where(pressure > self.hardness, SOFT / self.hardness, 0.0)
+        return soft if found is None else found + soft
+
+    def flow(self, pressure: Array) -> Array:
+        """Return by how much more the surfaces have to flow at pressures (m, n), mm."""
+        return SOFT * np.maximum(pressure / self.hardness - 1, 0.0)
+
+    def flowing(self, solve: Callable[[Array], T], pressure_of: Callable[[T], Array]) -> tuple[T, Array | None]:
+        """Return what solves a contact with no pressure beyond the hardness, and what has flown (n,), mm.
+
+        Args:
+            solve: Contact for a depth (n,), mm, that has flown.
+            pressure_of: Pressures (m, n) of what it returns.
+
+        Raises:
+            ConvergenceError: phases go on to flow in turn.
+        """
+        flowed = np.zeros(self.nodes)
+        found = solve(flowed)
+        if self.hardness == np.inf:
+            return found, None
+        for _ in range(MOST_FLOWS):
+            more = self.flow(pressure_of(found)).max(axis=0)
+            if more.max() <= FLOWED * max(float(flowed.max()), FLAT):
+                return found, flowed
+            flowed = flowed + more
+            found = solve(flowed)
+        raise ConvergenceError(
+            f"what flows beyond contact.hardness did not come to rest in {MOST_FLOWS} iterations: it may be next to "
+            "the mean pressure, so that nothing holds the punch"
+        )
 
     def settled(self, state: Array) -> Array:
         """Return a state after a step that may have overshot: no thickness below zero, nothing lost."""
         if self.debris is None or not len(state) or state[0].min(initial=0.0) >= 0:
             return state
-        return np.array([np.maximum(state[0], 0.0), state[1] + np.minimum(state[0], 0.0)])
+        return np.array([np.maximum(state[0], 0.0), state[1] + np.minimum(state[0], 0.0), *state[2:]])
 
 
 def layers_of(contact: Contact, pair: ContactPair, modulus: float | None = None) -> Layers:
@@ -109,7 +164,7 @@ def layers_of(contact: Contact, pair: ContactPair, modulus: float | None = None)
     if third is not None:
         life = place_values(third.life, place, n, "mm", "contact.third_body.life")
         debris = Debris(third.share, life, third.initial)
-    return Layers(n, closure, winkler, debris)
+    return Layers(n, closure, winkler, debris, np.inf if contact.hardness is None else contact.hardness)
 
 
 def _rough(law: RoughLayer, modulus: float | None) -> Closure:

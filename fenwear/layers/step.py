@@ -32,18 +32,24 @@ class Passing:
         """Return what phases do that slide by these distances (m, n), mm."""
         return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid))
 
-    def worn(self, pressure: Array, before: Array, cycles: float | None = None) -> Worn:
+    def worn(self, pressure: Array, before: Array, cycles: float | None = None, flowed: Array | None = None) -> Worn:
         """Return what the phases wear, and how the state of what lies between changes.
 
         Args:
             pressure: (m, n), MPa.
             before: State at the start of the step (rows, n).
             cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
+            flowed: What is added to the plastic depth (n,), mm; by default nothing.
         """
         worn = self.wear.worn(pressure)
-        if self.debris is None:
+        if not len(before):
             return worn
-        return Worn(worn.punch, worn.strip, np.array(self.debris_changes(pressure, before, cycles)))
+        changes = np.zeros_like(before)
+        if self.debris is not None:
+            changes[:2] = self.debris_changes(pressure, before, cycles)
+        if flowed is not None:
+            changes[-1] = flowed
+        return Worn(worn.punch, worn.strip, changes)
 
     def debris_changes(self, pressure: Array, before: Array, cycles: float | None) -> tuple[Array, Array]:
         """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
@@ -67,7 +73,7 @@ class Passing:
             before, cycles: As of `worn`.
             implicit: Whether the wear of the step, and what becomes of it, opens its own gaps.
         """
-        if not implicit and self.layers.closure is None:
+        if not implicit and self.layers.closure is None and self.layers.hardness == np.inf:
             return None
         return LayerStep(self, before, cycles, implicit)
 
@@ -106,8 +112,7 @@ class LayerStep:
             found = found + self._wear.opening(pressure)
             if passing.debris is not None:
                 found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
-        closure = passing.layers.closure
-        return found if closure is None else found + closure.closure(pressure)
+        return found + passing.layers.closing(pressure)
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
@@ -140,8 +145,7 @@ class LayerStep:
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
-        closure = self.passing.layers.closure
-        return None if closure is None else closure.slope(pressure)
+        return self.passing.layers.slope(pressure)
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""

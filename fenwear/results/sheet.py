@@ -250,6 +250,8 @@ LINES = {
     "stick_width_within_mm": Line("half the interval of that width", "mm"),
     "stick_area_mm2": Line("area that sticks all through it", "mm²"),
     "stick_area_within_mm2": Line("half the interval of that area", "mm²"),
+    "plastic_volume_mm3": Line("plastic volume, apart from wear", "mm³"),
+    "largest_plastic_depth_mm": Line("... depth, largest", "µm", 1e3),
     "debris_volume_mm3": Line("debris between the surfaces", "mm³"),
     "ejected_volume_mm3": Line("... ejected from the start", "mm³"),
     "largest_debris_thickness_mm": Line("... thickness, largest", "µm", 1e3),

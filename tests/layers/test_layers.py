@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from combinations import SMALL, STICK
 
-from fenwear import Case, CaseError, Tribosystem, assemble, load_case, steady
+from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, load_case, steady
 from fenwear.cycle import Block, evolve
+from fenwear.sliding.wear import Worn
 
 DEBRIS = "contact.third_body={share=0.6, life='0.3 mm'}"
 LAYERS = {
@@ -92,6 +93,43 @@ def test_energy_of_a_layer_is_metered() -> None:
     at, _ = rig.cycle(rig.beginning())
     _, parts = rig.cycle(at)
     assert max(one.balance_error(rig.weights) for one in parts) < 1e-12
+
+
+HARD = 500.0  # MPa; without it the largest pressure is 844 MPa
+
+
+def test_no_pressure_is_beyond_the_hardness() -> None:
+    """What flows stays: with the plastic depth in the gap the bodies have these pressures without any hardness, too.
+
+    It is metered apart from wear, never less than before, and nothing where no pressure comes near.
+    """
+    system = assemble(case_of("gross-sliding", "run.half_cycles=6", f"contact.hardness={HARD}"))
+    bare = assemble(case_of("gross-sliding", "run.half_cycles=6"))
+    block = end(system, "explicit")
+    assert block.pressure.max() == pytest.approx(HARD, rel=1e-8)
+    depths = block.between[:, 0]
+    assert (np.diff(depths, axis=0) >= 0).all()
+    assert depths[-1].max() > 1e-4
+    for row, phase in ((4, 0), (5, 1)):
+        gap = bare.gap(phase, Worn(block.wear[row - 1], block.wear_strip[row - 1])) + depths[row]
+        alone = bare.phase_contact((phase,)).solve(gap).pressure[0]
+        assert np.abs(alone - block.pressure[row]).max() < 1e-6 * HARD
+    volumes = [float(one.totals.of("volume_punch")[-1]) for one in (block, end(bare, "explicit"))]
+    assert volumes[0] == pytest.approx(volumes[1], rel=1e-9)
+    jumped = end(system, "jump").end.worn.between[0]
+    assert np.abs(jumped - depths[-1]).max() < 1e-2 * depths[-1].max()  # all phases flow at once, not in turn
+    hard = end(assemble(case_of("gross-sliding", "run.half_cycles=6", "contact.hardness=900")), "explicit")
+    assert not hard.between.any()
+
+
+def test_a_hardness_that_carries_nothing_is_refused() -> None:
+    """Below the mean pressure, and in an end whose pressures are beyond it."""
+    with pytest.raises(CaseError, match=r"contact\.hardness: expected more than the mean pressure of"):
+        assemble(case_of("gross-sliding", "contact.hardness=100"))
+    with pytest.raises(CaseError, match=r"contact\.hardness: expected contact\.law = 'gross-sliding'"):
+        case_of("coulomb", "contact.hardness=900")
+    with pytest.raises(ConvergenceError, match="without plastic flow"):
+        steady(assemble(case_of("gross-sliding", "contact.hardness=450")))
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ NAMES = [
     "08_measurement_to_life",
     "09_solids",
     "10_partial_slip",
+    "11_bearings_and_brakes",
 ]
 
 

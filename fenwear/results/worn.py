@@ -100,4 +100,5 @@ def _vtk(surface: ContactSurface, depth: Array) -> str:
 
 
 def _rows(values: Array | NDArray[np.int64]) -> str:
-    return "\n".join(" ".join(f"{value:.10g}" for value in row) for row in values.tolist())
+    rows: list[list[float]] = values.tolist()
+    return "\n".join(" ".join(f"{value:.10g}" for value in row) for row in rows)

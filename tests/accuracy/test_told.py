@@ -34,6 +34,7 @@ def test_rings_end_within_what_is_told(assembled: Assembled) -> None:
     assert error < told < 0.01 * exact
 
 
+@pytest.mark.mpi
 def test_true_error_of_a_flat_punch_is_told(assembled: Assembled) -> None:
     """Against four times as many elements, of depth and pressure, at the edges where they are largest."""
     settings = ("run.half_cycles=40", "geometry.degree=3")

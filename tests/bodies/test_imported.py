@@ -40,9 +40,11 @@ def abaqus(unit: float = 1.0, **renamed: str) -> str:
     sets: list[str] = []
     nodes: list[str] = ["*NODE"]
     for body, (x, cells) in bodies.items():
-        nodes += [f"{first + k + 1}, {unit * a:.12g}, {unit * b:.12g}" for k, (a, b) in enumerate(x)]
+        nodes += [f"{first + k + 1}, {unit * a:.12g}, {unit * b:.12g}" for k, (a, b) in enumerate(x.tolist())]
         name = f"{body.upper()}_BODY"
-        elements = [f"{cell + k + 1}, " + ", ".join(str(first + n + 1) for n in row) for k, row in enumerate(cells)]
+        elements = [
+            f"{cell + k + 1}, " + ", ".join(str(first + n + 1) for n in row) for k, row in enumerate(cells.tolist())
+        ]
         sets += [f"*ELEMENT, TYPE=CPE4, ELSET={renamed.get(name, name)}", *elements]
         for group, (of, axis, value) in SETS.items():
             if of == body:

@@ -142,7 +142,7 @@ def _cut_off(ax: Axes, fields: xarray.Dataset, case: Mapping[str, Any]) -> None:
         ax.annotate("", (edge, (bottom + float(fields.strip_z.values.max())) / 2), (-18 * sign, 0),
                     textcoords="offset points", arrowprops={"arrowstyle": "-|>", "color": GREY}, zorder=6)  # fmt: skip
     if ax.get_xlim()[1] - ax.get_xlim()[0] <= 2.2 * half:
-        ax.set_ylim(bottom - (0.4 if narrow else 0.2) * high)
+        ax.set_ylim(bottom - (0.6 if narrow else 0.2) * high)
 
 
 def _all_beyond(lines: list[Array], middle: float, half: float, sign: int) -> bool:

@@ -25,6 +25,7 @@ HIGH_WIDE, HIGH_NARROW = 0.75, 0.5  # of the height of a panel that its axes hav
 UNIT = re.compile(r"\((?:[^()]|\([^()]*\))*\)")  # stays in one line
 LETTER = 0.55  # width over height
 SHORTEST = 14  # letters of a line of a label
+ABOVE = 0.5  # inches: the names above the panels of a narrow figure
 HIGHEST = 9.0  # inches: a page
 ROW = 50  # letters that a row of names takes where the figure is narrow
 BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
@@ -120,7 +121,8 @@ def panels(
     settings = {"axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": "medium", "font.size": size}
     with rc_context({**settings, "pdf.fonttype": 42, "svg.fonttype": "none"}):
         scale = min(1.0, 0.35 + 0.65 * look.width / WIDTH)
-        figure = Figure(figsize=(look.width, scale * height * count), layout="constrained")
+        above = ABOVE if look.width < NARROW else 0.0
+        figure = Figure(figsize=(look.width, scale * height * count + above), layout="constrained")
         axes = list(figure.subplots(count, 1, sharex=share_x, sharey=share_y, squeeze=False)[:, 0])
         if count > 1:
             for ax, letter in zip(axes, "abcdefgh", strict=False):

@@ -292,7 +292,8 @@ class Body(Part):
     temperatures: tuple[Prescribed, ...] = Field(default=(), description="where temperature is held")
     pivot: Point | None = Field(
         default=None,
-        description="the point O of lambda_F and lambda_M; by default the first support's centre, or the origin",
+        description="the point O of lambda_F and lambda_M; by default the first support's centre, of each part that "
+        "points hold its own, or the origin",
     )
     no_turning_about: tuple[Axis, ...] = Field(
         default=(),

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from fenwear.case.motions import Cycle
 from fenwear.case.quantities import AngularFrequency, Force, Length, Number, Part, Speed, Temperature, Time
 
 
@@ -68,6 +69,10 @@ class ProgramStep(Part):
     )
     period: _ramp(Annotated[Time, Field(gt=0)]) = Field(  # type: ignore[valid-type]
         default=None, description="or: of a whole cycle"
+    )
+    motion: Cycle | None = Field(
+        default=None,
+        description="of a cycle that is a table: another one from here on, with kind = 'cycle' and all that it has",
     )
     ambient: _ramp(Temperature) = Field(  # type: ignore[valid-type]
         default=None, description="heat.ambient"

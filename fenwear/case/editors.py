@@ -17,7 +17,7 @@ def json_schema() -> dict[str, Any]:
     schema = _explained(_for_parts(Case.model_json_schema(mode="validation")))
     unset = {"type": "array", "items": {"type": "string"}, "description": READ_FIRST["unset"].meaning}
     schema["properties"] = {"base": _text("base"), "unset": unset, **schema["properties"]}
-    for table, path in (("Program", "program.file"), ("Profile", "BODY.profile.file")):
+    for table, path in (("Program", "program.file"), ("Profile", "BODY.profile.file"), ("Cycle", "motion.file")):
         schema["$defs"][table]["properties"]["file"] = _text(path)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
 

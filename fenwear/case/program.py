@@ -149,6 +149,11 @@ class _Acting:
     loads: tuple[float, float] | None = None
     factors: tuple[float, float] = (1.0, 1.0)
     given: dict[str, tuple[float, float]] = field(default_factory=dict)
+    motion: Cycle | None = None  # another table than that of the case
+
+    def of(self, case: Case) -> Case:
+        """Return the case with the table that acts."""
+        return case if self.motion is None else case.stage({"motion": self.motion})
 
 
 def _acting(steps: Sequence[ProgramStep]) -> Iterator[_Acting]:
@@ -160,6 +165,7 @@ def _acting(steps: Sequence[ProgramStep]) -> Iterator[_Acting]:
             _ends(step.load, now.loads if step.load_factor is None else None),
             _ends(step.load_factor, now.factors) or (1.0, 1.0),
             {key: ends for key, ends in ramps.items() if ends is not None},
+            step.motion or now.motion,
         )
         yield now
 
@@ -189,7 +195,7 @@ def held_at(case: Case, step: int | None = None) -> Held | None:
                 f"nothing slides at the end of step {number + 1}, so that it has no state of its own: choose another"
             )
             raise CaseError(InputError(f"program.steps.{number}.{key}", reason))
-    at_end = _at(case, acting.given, 1.0).model_copy(update={"program": None})
+    at_end = _at(acting.of(case), acting.given, 1.0).model_copy(update={"program": None})
     return Held(number, count, at_end, acting.loads and acting.loads[1], acting.factors[1])
 
 
@@ -208,12 +214,12 @@ def stages_of(case: Case) -> tuple[Stage, ...]:
     stages: list[Stage] = []
     half_cycle, time, slid = 0, 0.0, 0.0
     for number, (step, acting) in enumerate(zip(program.steps, _acting(program.steps), strict=True)):
-        given, loads, factors = acting.given, acting.loads, acting.factors
-        strokes, cycles = _cycles(case, step, given, number)
+        given, loads, factors, own = acting.given, acting.loads, acting.factors, acting.of(case)
+        strokes, cycles = _cycles(own, step, given, number)
         count = min(cycles, program.levels) if any(a != b for a, b in given.values()) else 1
         edges = [round(cycles * k / count) for k in range(count + 1)]
         for low, high in itertools.pairwise(edges):
-            at = _at(case, given, (low + high) / 2 / cycles)
+            at = _at(own, given, (low + high) / 2 / cycles)
             part = (low / cycles, high / cycles)
             period, distance, _ = cycle_of(at)
             stages.append(

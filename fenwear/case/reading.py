@@ -98,6 +98,13 @@ def _anchored(data: dict[str, Any], folder: Path | None) -> dict[str, Any]:
     for name, table in data.items():
         if name in ("program", "motion"):
             found[name] = _beside(table, folder)
+            if isinstance(table, dict) and isinstance(table.get("steps"), list):
+                found[name] = dict(found[name])
+                found[name]["steps"] = [
+                    {**step, "motion": _beside(step["motion"], folder)} if isinstance(step, dict) and "motion" in step
+                    else step
+                    for step in table["steps"]
+                ]  # fmt: skip
         elif name in BODIES and isinstance(table, dict):
             kept = {key: _beside(table[key], folder) for key in ("profile", "topography") if key in table}
             found[name] = {**table, **kept}

@@ -318,10 +318,13 @@ class Case(Part):
             at = f"program.steps.{number}"
             for key in ("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
                 known = key in type(motion).model_fields and not (key == "amplitude" and self.turns)
+                known = known and not isinstance(motion, Cycle)
                 if getattr(step, key) is not None and not known:
                     problems.append(f"{at}.{key}: does not change with motion.kind = '{motion.kind}'")
             if step.distance is not None and isinstance(motion, Cycle):
                 problems.append(f"{at}.distance: expected cycles or time: nodes slide different ways in a cycle")
+            if step.motion is not None:
+                problems += self._other_cycle_problems(step.motion, at)
             if step.ambient is not None and self.heat is None:
                 problems.append(f"{at}.ambient: expected a case with the table heat")
         told = self.program.radius is not None
@@ -336,6 +339,17 @@ class Case(Part):
             problems.append("contact.solver: expected 'condensed' with a program")
         if self.run.periodic_within is not None:
             problems.append("run.periodic_within: a program ends with its last step; expected none")
+        return problems
+
+    def _other_cycle_problems(self, motion: Cycle, at: str) -> list[str]:
+        """Return what of another table in a step of a program does not go."""
+        if not isinstance(self.motion, Cycle):
+            return [f"{at}.motion: does not change with motion.kind = '{self.motion.kind}': expected 'cycle'"]
+        told = motion.model_problems(self.model.kind, self.model.axes)
+        problems = [f"{at}.{problem}" for problem in told]
+        laws = [self.contact.friction, *(law.given_coefficient for law in self.wear.laws)]
+        if any(isinstance(law, Dependence) and law.depends_on("s") for law in laws):
+            problems.append(f"{at}.motion: expected no coefficient that depends on s: cycles slide different ways")
         return problems
 
     def _track_problems(self) -> list[str]:

@@ -15,7 +15,7 @@ from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.cycle.block import Block
 from fenwear.cycle.driver import Loading, as_given
 from fenwear.cycle.follow import follow
-from fenwear.cycle.state import RunState
+from fenwear.cycle.state import RunState, with_phases
 from fenwear.errors import CaseError, InputError
 
 
@@ -71,7 +71,8 @@ def follow_program(
         ) -> Iterator[Block]:
             return integrate(own, state, leave, span)
 
-        for block in follow(at_stage(base, stage), run, state, adapt):
+        own = at_stage(base, stage)
+        for block in follow(own, run, with_phases(state, len(own.motion.phases)), adapt):
             yield block
             state = block.end
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,6 +39,13 @@ class RunState:
     jump_length: int = 1
     periodic_phases: int = 0
     memory: Any = None
+
+
+def with_phases(state: RunState | None, count: int) -> RunState | None:
+    """Return the state for a motion of so many phases: the contacts of another number of them are of no use."""
+    if state is None or len(state.contacts) == count:
+        return state
+    return replace(state, contacts=(None,) * count, periodic_phases=0)
 
 
 def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:

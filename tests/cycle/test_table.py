@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import CaseError, Tribosystem, jump, load_case, march
+from fenwear import CaseError, Tribosystem, evolve, jump, load_case, march, steady
 
 POSITIONS = 3
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "geometry.parameters.overlap=3",
@@ -45,6 +45,24 @@ def test_a_sine_is_the_reciprocating_motion(assembled: Callable[..., Tribosystem
         np.testing.assert_allclose(other.end.totals.sums, one.end.totals.sums, rtol=1e-12)
 
 
+def test_steady_state_of_changing_loads_and_ways(assembled: Callable[..., Tribosystem]) -> None:
+    """The direct solution is where jumps end; a cycle wears all that touches by one rigid motion."""
+    rows = [[0, 2, 0, -2], [1, 0, 1, -4], [2, -1, 0, -8], [3, 0, -2, -4], [4, 2, 0, -2]]
+    columns = ["time (s)", "shift_x (mm)", "shift_y (mm)", "force_z (kN)"]
+    motion = f"motion={{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_load'}}}}"
+    system = assembled("example1", *SMALL[:3], "punch.loads=[]", "wear.punch={coefficient=1e-8}", motion)
+    state = steady(system)
+    *_, last = jump(system, 400_000, tolerance=1e-3)
+    ended = np.concatenate([contact.pressure for contact in last.end.contacts if contact])
+    np.testing.assert_allclose(ended, state.phase_pressure, atol=0.01 * state.phase_pressure.max())
+    worn = (1e-8 * system.path * state.phase_pressure).sum(axis=0)
+    np.testing.assert_allclose(worn, state.wear_per_cycle, rtol=1e-9)
+    touching = state.phase_pressure.max(axis=0) > 0
+    x = system.pair.x[touching]
+    fit = np.polynomial.Polynomial.fit(x, worn[touching], 1)
+    np.testing.assert_allclose(worn[touching], fit(x), atol=1e-9 * worn.max())
+
+
 def test_a_group_that_is_none(assembled: Callable[..., Tribosystem]) -> None:
     rows = "rows=[[0, 0, -1], [1, 1, -1], [2, 0, -1]], load={on='punch_top'}"
     motion = f"motion={{kind='cycle', columns=['time (s)', 'shift_x (mm)', 'force_z (N)'], {rows}}}"
@@ -56,3 +74,30 @@ def test_a_step_that_opens_the_contact(assembled: Callable[..., Tribosystem]) ->
     turned = table([[0, 0], [1, 1], [2, 0]], "angle_y (deg)")
     with pytest.raises(CaseError, match=r"motion.rows: from row 1 to row 2 .* open the contact"):
         assembled("example1", *SMALL[:3], turned)
+
+
+def test_blocks_of_cycles(assembled: Callable[..., Tribosystem]) -> None:
+    """So many of one table, so many of another with more steps: each wears what it wears alone."""
+    walk, run = [[0, 0, -4], [1, 2, -4], [2, 0, -4]], [[0, 0, -8], [0.5, 1, -8], [1, 3, -8], [2, 0, -8]]
+    columns = ["time (s)", "shift_x (mm)", "force_z (kN)"]
+    first, second = (
+        f"{{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_load'}}}}" for rows in (walk, run)
+    )
+    steps = f"[{{cycles=20}}, {{cycles=30, motion={second}}}, {{cycles=10, load_factor=0.5}}]"
+    settings = (*SMALL[:3], "punch.loads=[]", "wear.punch={coefficient=1e-9}", f"motion={first}", "run.half_cycles=60")
+    system = assembled("example1", *settings, f"program={{steps={steps}}}")
+    law = 1e-9 / 10  # k over the thickness
+    areas = np.cumsum([20 * law * 4e3 * 4, 30 * law * 8e3 * 6, 10 * law * 4e3 * 6])
+    for integration in ("implicit", "jump"):
+        ends = {block.end.half_cycle: block.end for block in evolve(system, integration=integration)}
+        for half_cycle, area in zip((20, 50, 60), areas, strict=True):
+            assert ends[half_cycle].worn.punch @ system.pair.weights == pytest.approx(area, rel=1e-9)
+    for wrong, told in (
+        (
+            f"program={{steps=[{{cycles=2, motion={first.replace('shift_x (mm)', 'angle_x (rad)')}}}]}}",
+            "no column angle_x",
+        ),
+        ("program={steps=[{cycles=2, period=3}]}", "does not change with motion.kind = 'cycle'"),
+    ):
+        with pytest.raises(CaseError, match=told):
+            load_case("example1", [*settings, wrong])

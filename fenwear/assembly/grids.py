@@ -19,10 +19,11 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on
-from fenwear.case import Case, Grid
+from fenwear.case import CONDENSED, Case, Grid
 from fenwear.errors import CaseError, InputError
-from fenwear.interface.overlap import ChartedSurface, reading_at
+from fenwear.interface.overlap import ChartedSurface, Patch, reading_at
 from fenwear.interface.patches import facet_side
+from fenwear.interface.transfer import dual_transfer
 
 MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
 
@@ -56,7 +57,7 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
             heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
             depth = depth + heights.max() - heights
         surface = surface_on(body.body.name, grid, outward, depth)
-        body.lay_grid(surface, reading)
+        body.lay_grid(surface, _mortar(body, grid) if body.operator == CONDENSED else reading)
 
 
 def surface_on(name: str, grid: RegularGrid, outward: float, depth: Array) -> ContactSurface:
@@ -88,7 +89,8 @@ def _grid(wanted: Grid, surface: ContactSurface, axis: int, level: float) -> Reg
     for key, value in (("size", wanted.size), ("middle", wanted.middle)):
         if value is not None and len(value) != len(low):
             raise CaseError(InputError(f"grid.{key}", f"expected {len(low)} length(s), got {len(value)}"))
-    sides = high - low if wanted.size is None else np.array(wanted.size)
+    whole = (high - low) * (wanted.nodes - 1) / (wanted.nodes + 1)  # the strip's goes on by whole spacings
+    sides = whole if wanted.size is None else np.array(wanted.size)
     middle = (low + high) / 2 if wanted.middle is None else np.array(wanted.middle)
     spacing = sides.max() / (wanted.nodes - 1)
     counts = np.maximum(np.floor(sides / spacing + MARGIN * wanted.nodes), 1).astype(np.int64) + 1
@@ -110,16 +112,29 @@ def _reached(grid: RegularGrid, sliding: Sliding) -> RegularGrid:
     return replace(grid, corner=tuple(corner), counts=tuple(int(k) for k in grid.counts + more.sum(axis=0)))
 
 
+def _mortar(body: ElasticBody, grid: RegularGrid) -> csr_array:
+    """Return the same by integrals, as forces of a condensed body need it: even ones are even on the mesh, too."""
+    every = np.arange(len(grid.flat))
+    cell = "interval" if grid.flat.shape[1] == 1 else "quadrilateral"
+    first = ChartedSurface(grid.flat, grid.facets, cell, 1, every)
+    return dual_transfer([Patch.of(first, _charted(body, grid))])
+
+
+def _charted(body: ElasticBody, grid: RegularGrid) -> ChartedSurface:
+    """Return the contact surface of a body's mesh in the plane of a grid."""
+    surface = body.surface
+    s = np.delete(surface.trace, grid.normal, axis=1)
+    return ChartedSurface(s, surface.facets, surface.cell, surface.degree, surface.nodes)
+
+
 def _reading(body: ElasticBody, grid: RegularGrid) -> csr_array:
     """Return what takes values at the trace nodes of a body's mesh to its grid (n, N).
 
     Raises:
         CaseError: the grid reaches beyond the surface.
     """
-    surface = body.surface
-    s = np.delete(surface.trace, grid.normal, axis=1)
-    charted = ChartedSurface(s, surface.facets, surface.cell, surface.degree, surface.nodes)
-    found = reading_at(charted, grid.flat)
+    charted = _charted(body, grid)
+    s, found = charted.s, reading_at(charted, grid.flat)
     if found is None:
         spans: Sequence[str] = [
             " by ".join(f"{low:.4g} to {high:.4g}" for low, high in zip(one.min(axis=0), one.max(axis=0), strict=True))

@@ -70,7 +70,9 @@ class Grid(Part):
         default=65, description="along the longer side of the grid"
     )
     size: Annotated[tuple[Annotated[Length, Field(gt=0)], ...], Field(min_length=1, max_length=2)] | None = Field(
-        default=None, description="its sides, [x] in the plane and [x, y] in solids; by default those of the contact"
+        default=None,
+        description="its sides, [x] in the plane and [x, y] in solids; by default those of the "
+        "contact, less a spacing at each end",
     )
     middle: Annotated[tuple[Length, ...], Field(min_length=1, max_length=2)] | None = Field(
         default=None, description="where its middle is; by default that of the contact surface"

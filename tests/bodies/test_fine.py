@@ -214,6 +214,21 @@ def test_ball_on_flat_is_the_contact_of_hertz() -> None:
     assert errors[1] < 0.003
 
 
+@pytest.mark.slow
+def test_each_body_for_itself() -> None:
+    """One body fine, the other condensed on the same grid: on meshes as fine as the grid pressures are near."""
+    found = []
+    for punch, strip in (("fine", "fine"), ("condensed", "fine")):
+        each = (f"punch.operator='{punch}'", f"strip.operator='{strip}'", "geometry.parameters.across=8")
+        wide = ("grid.nodes=13", "geometry.parameters.stroke_elements=4", "grid.size=['0.3 mm', '0.3 mm']")
+        system = assemble(load_case("ball-on-flat", [*BALL, *each, *wide]))
+        contact = system.phase_contact([0]).solve(system.gap(0, system.unworn()))
+        assert contact.pressure[0] @ system.pair.weights == pytest.approx(20, rel=1e-9)
+        found.append(contact.pressure[0])
+    for other in found[1:]:
+        assert np.abs(other - found[0]).max() < 0.15 * found[0].max()
+
+
 class ExactLayer(HalfSpace):
     """The layer by its kernel, of normal forces alone."""
 

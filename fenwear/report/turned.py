@@ -80,16 +80,14 @@ def turned_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[s
     for k, trace in enumerate(traces):
         trace.visible = k == 0
     figure = go.Figure(data=traces, layout=_layout(shown, half_cycles))
-    found: dict[str, Any] = figure.to_plotly_json()
+    found: dict[str, Any] = json.loads(figure.to_json())
     # What changes from half-cycle to half-cycle alone, so that the chosen quantity stays.
     steps = [
-        {"x": [m.x for m in f.data], "y": [m.y for m in f.data], "z": [m.z for m in f.data],
-         "intensity": [m.intensity for m in f.data]}
-        for f in frames
-    ]  # fmt: skip
+        {name: [list(mesh[name]) for mesh in frame.data] for name in ("x", "y", "z", "intensity")} for frame in frames
+    ]
     for step, change in zip(found["layout"]["sliders"][0]["steps"], steps, strict=True):
         step["args"] = [change]
-    return dict(_plain(found))
+    return found
 
 
 def _layout(shown: Sequence[Quantity], half_cycles: Sequence[int]) -> dict[str, Any]:
@@ -162,17 +160,6 @@ def _solid_or_rings(history: xarray.Dataset, body: str) -> tuple[Array, Any, int
 def _short(values: Array) -> list[float]:
     """Return values with as many digits as can be seen."""
     return [float(f"{v:.5g}") for v in values]
-
-
-def _plain(value: Any) -> Any:
-    """Return plotly's own types and arrays as lists and dictionaries."""
-    if hasattr(value, "to_plotly_json"):
-        return _plain(value.to_plotly_json())
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 _PAGE = """<div id="turned" style="height: {height}px"></div>

@@ -83,7 +83,7 @@ def _around(axis: Array, pair: ContactPair) -> tuple[Array, Array]:
     As of plane ones where it looks at the other body most, the punch being above: a bore's top, a shaft's bottom.
     """
     up = np.array([0.0, 0.0, 1.0]) if abs(axis[2]) < AXIAL else np.array([1.0, 0.0, 0.0])
-    first = up - (up @ axis) * axis
+    first: Array = up - (up @ axis) * axis
     x, normal = in_space(pair.punch.x), in_space(pair.normal)
     outside = np.einsum("ic,ic->", x - pair.weights @ x / pair.weights.sum(), normal) > 0  # e_n goes into the punch
     first *= (1.0 if outside else -1.0) / np.linalg.norm(first)

@@ -30,6 +30,7 @@ from fenwear.assembly import (
     with_exchange,
     with_reduced_heat,
 )
+from fenwear.assembly.cycle_shear import asks_for_cycle
 from fenwear.assembly.laws import GROSS
 from fenwear.assembly.tribosystem import answers_for, condense_bodies
 from fenwear.assembly.variants import same_conduction
@@ -58,6 +59,7 @@ class HalfCycles:
         phases = range(len(system.motion.phases))
         self.steps = [PhaseStep(system, phase, implicit=implicit) for phase in phases]
         self.smaller = SmallerSteps(system, implicit=implicit)
+        self._of_cycle = asks_for_cycle(system)  # whether a coefficient depends on what a whole cycle does
 
     def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next half-cycle, and its record."""
@@ -82,7 +84,7 @@ class HalfCycles:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""
         worn, temperature = state.worn, state.temperature
         ends: list[PhaseEnd] = []
-        cycle = known_pressures(state.contacts)
+        cycle = known_pressures(state.contacts) if self._of_cycle else None
         for number, phase in enumerate(phases):
             if number:
                 self.watch()

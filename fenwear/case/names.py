@@ -109,19 +109,21 @@ class Names:
         try:
             yield
         except FenwearError as error:
-            if self.given:
-                self._tell(error)
+            self.tell(error)
             raise
+
+    def tell(self, error: FenwearError) -> None:
+        """Let an error have the bodies' names."""
+        if not self.given:
+            return
+        if isinstance(error, CaseError):
+            error.problems = [InputError(self.told(p.key), self.told(p.message)) for p in error.problems]
+        error.args = tuple(self.told(value) if isinstance(value, str) else value for value in error.args)
 
     def _name(self, match: re.Match[str]) -> str:
         role = match["group"] or match["word"]
         name = self.by_roles[role.lower()]
         return name if role.islower() else f"{name[:1].upper()}{name[1:]}"
-
-    def _tell(self, error: FenwearError) -> None:
-        if isinstance(error, CaseError):
-            error.problems = [InputError(self.told(p.key), self.told(p.message)) for p in error.problems]
-        error.args = tuple(self.told(value) if isinstance(value, str) else value for value in error.args)
 
 
 BY_ROLE = Names()

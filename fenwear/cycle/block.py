@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import reduce
+from functools import cached_property, reduce
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -259,6 +259,10 @@ class Recorder:
     _remedies: Counter[str] = field(default_factory=Counter)
     _optima: dict[tuple[int, bytes], Array] = field(default_factory=dict)
 
+    @cached_property
+    def _slides_one_way(self) -> bool:
+        return not (self.system.sticks or self.system.motion.steps)
+
     def add(self, one: HalfCycle) -> None:
         """Record one half-cycle."""
         taken = self.system.remedies.take()
@@ -371,7 +375,7 @@ class Recorder:
         So where a threshold or cap leaves none, nodes stick, or directions change. Solved anew only when the zone
         changes.
         """
-        if self.system.sticks or self.system.motion.steps:
+        if not self._slides_one_way:
             return np.full(len(pressure), np.nan)
         zone = pressure > 0
         key = (direction, zone.tobytes())

@@ -154,9 +154,9 @@ class _Stretches:
         while True:
             until = next(end for end in self._ends if end > state.half_cycle)
             try:
-                with self.system.names.told_in_errors():
-                    after, recorded = self.step(state, until)
+                after, recorded = self.step(state, until)
             except (ConvergenceError, InterruptedRunError) as error:
+                self.system.names.tell(error)
                 failure: Exception = error
                 if isinstance(error, ConvergenceError):
                     failure = type(error)(f"half-cycle {state.half_cycle + 1}: {error}")

@@ -95,6 +95,10 @@ class WearCompliance(Protocol):
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n): its derivative, of phase k to pressures j, is L_k R_j, mm/MPa."""
 
+    @property
+    def curved(self) -> bool:
+        """Whether something gives way by a law that is not linear."""
+
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
 
@@ -347,6 +351,7 @@ class CondensedContact:
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._wearing = wearing
+        self.inequality.curved = wearing is not None and wearing.curved
         x, f, iterations = self._solve(start)
         x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale

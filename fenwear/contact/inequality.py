@@ -30,6 +30,7 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
 SETS = 30  # that are gone through before SNES starts
+CHORDS, FALLS = 12, 0.2  # steps where the derivative changes; fall of the residual by which its factor still serves
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 
 
@@ -115,6 +116,7 @@ class Inequality:
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: _Kept | None = None
         self._operator: Operator | None = None
+        self.curved = False  # whether the derivative changes with the solution
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
         self.singular = False  # whether the last set that SNES took had no factor
 
@@ -198,17 +200,25 @@ class Inequality:
         """Return the solution where it has the same free unknowns as the start, else None."""
         key, x = self._free(start), start.copy()
         try:
-            # Whatever is kept: what a solution is found with does not depend on what was solved before.
-            kept = self._factor(self._jacobian(x), key)
-            for iteration in range(STEPS + 1):
+            # Whatever is kept: what a solution is found with does not depend on what was solved before. But where the
+            # derivative changes with the solution a factor serves as long as it takes residuals down.
+            last, steps = self._kept, CHORDS if self.curved else STEPS
+            known = last is not None and self.curved and last.key == key
+            kept = last if last is not None and known else self._factor(self._jacobian(x), key)
+            before = np.inf
+            for iteration in range(steps + 1):
                 f = self._function(x)
                 rest = f[kept.free]
+                size = float(np.linalg.norm(rest))
                 if rest @ rest < (self._tolerance if iteration > 1 else TOLERANCE) ** 2:
                     break
-                if iteration == STEPS or (iteration and self._free(x) != key):
+                if iteration == steps or (iteration and self._free(x) != key):
                     return None
-                if iteration:
+                if size > FALLS * before if self.curved else iteration:
+                    before = np.inf if self.curved else size
                     kept = self._factor(self._jacobian(x), key)
+                else:
+                    before = size
                 x[kept.free] -= kept.solve(rest)
         except np.linalg.LinAlgError:
             return None

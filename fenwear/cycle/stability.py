@@ -331,6 +331,9 @@ def phase_tangent(
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_rows @ state_p
     by_state = by_mu @ traction_s + gap_rows @ state_s
+    slope = system.layers.slope(pressure[None])
+    if slope is not None:
+        opened = opened + np.diag(slope[0])
     if implicit:
         opened, by_state = opened + laws.worn_p, by_state + laws.worn_s
     matrix: Array = np.zeros((k + r, k + r))

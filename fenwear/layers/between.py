@@ -74,6 +74,11 @@ class Layers:
         found = np.zeros_like(pressure) if self.winkler is None else self.winkler * pressure
         return found if self.closure is None else found + self.closure.closure(pressure)
 
+    @property
+    def curved(self) -> bool:
+        """Whether something gives way by a law that is not linear."""
+        return self.closure is not None or self.hardness < np.inf
+
     def beginning(self) -> Array:
         """Return the state at the start (rows, n)."""
         state = np.zeros((len(self.rows), self.nodes))

@@ -73,7 +73,7 @@ class Passing:
             before, cycles: As of `worn`.
             implicit: Whether the wear of the step, and what becomes of it, opens its own gaps.
         """
-        if not implicit and self.layers.closure is None and self.layers.hardness == np.inf:
+        if not implicit and not self.layers.curved:
             return None
         return LayerStep(self, before, cycles, implicit)
 
@@ -142,6 +142,11 @@ class LayerStep:
             return found if layer is None else found + layer * change
 
         return opened, slopes - covered + (0.0 if layer is None else layer)
+
+    @property
+    def curved(self) -> bool:
+        """Whether something gives way by a law that is not linear."""
+        return self.passing.layers.curved
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""

@@ -32,6 +32,8 @@ def differentiable(system: Tribosystem) -> bool:
     if system.sticks:
         return False
     heat = system.heat
+    if system.layers.closure is not None:
+        return False
     laws = [law for law in system.sliding.wear if law is not None]
     if not all(PressureLaw.of(law).power for law in laws):
         return False

@@ -228,6 +228,11 @@ class StepWear:
         left, right = self.wear.border(pressure)
         return left, self.repeats * right
 
+    @property
+    def curved(self) -> bool:
+        """Whether something gives way by a law that is not linear: nothing does."""
+        return False
+
     def layer(self, _pressure: Array) -> Array | None:
         """Return what opens each phase's own gaps alone: nothing does."""
         return None

@@ -151,6 +151,15 @@ class Wearing:
         """Not asked for of many nodes."""
         raise NotImplementedError
 
+    @property
+    def curved(self) -> bool:
+        """Nothing gives way beside it."""
+        return False
+
+    def layer(self, _pressure: Array) -> Array | None:
+        """Nothing gives way beside it."""
+        return None
+
 
 def love(x: Array, y: Array, half: float) -> Array:
     """Return the displacement at (x, y) by unit pressure on a square of half-width `half`, E* = 1 / pi."""

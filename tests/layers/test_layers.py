@@ -7,7 +7,7 @@ import pytest
 from combinations import SMALL, STICK
 
 from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, load_case, steady
-from fenwear.cycle import Block, evolve
+from fenwear.cycle import Block, evolve, growth_rate
 from fenwear.sliding.wear import Worn
 
 DEBRIS = "contact.third_body={share=0.6, life='0.3 mm'}"
@@ -93,6 +93,17 @@ def test_energy_of_a_layer_is_metered() -> None:
     at, _ = rig.cycle(rig.beginning())
     _, parts = rig.cycle(at)
     assert max(one.balance_error(rig.weights) for one in parts) < 1e-12
+
+
+def test_growth_rates_see_what_gives_way() -> None:
+    """A law that is linear by another name, p / stiffness, lets disturbances die out as the linear layer does."""
+    laws = ("{kind='linear', stiffness='1e6 MPa/mm'}", "{kind='power', reference=1e-4, pressure=100, exponent=1}")
+    rates = []
+    for law in laws:
+        system = assemble(case_of("gross-sliding", f"contact.layer={law}"))
+        rates.append(growth_rate(system, steady(system).phase_pressure))
+    assert rates[0] < 0
+    assert rates[1] == pytest.approx(rates[0], rel=1e-9)
 
 
 HARD = 500.0  # MPa; without it the largest pressure is 844 MPa

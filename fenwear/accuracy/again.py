@@ -17,6 +17,7 @@ from fenwear.errors import CaseError
 LONGEST = 400  # phases that are marched again one by one; longer runs go by jumps
 FEWEST = 9  # nodes of a grid that is coarsened
 TOLERANCE = 1e-3  # of these jumps
+FEWEST = 5  # nodes of a contact grid
 
 
 @dataclass(frozen=True)

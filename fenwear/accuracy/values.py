@@ -92,8 +92,8 @@ def values_of_steady(state: Steady) -> Values:
     """Return the numbers of a cyclic steady state: the largest pressure of each half-cycle, and the temperature."""
     surface, strokes = state.system.pair.punch, len(state.directions)
     found = {
-        Quantity("pressure", str((k + 1) % strokes)): _largest(pressure, surface)
-        for k, pressure in enumerate(list(state.pressure))
+        Quantity("pressure", str((k + 1) % strokes)): _largest(np.asarray(pressure), surface)
+        for k, pressure in enumerate(state.pressure)
     }
     if state.heat is not None:
         sides = [*state.heat.punch, *state.heat.strip]

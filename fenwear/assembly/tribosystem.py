@@ -64,10 +64,15 @@ class Condensed:
 
     def join(self, rigid: RigidEquilibrium, layer: Array | None = None) -> Interface:
         """Return both joined at the place of a pair, with a linear layer; collective where ranks share the rows."""
-        pair, strip, moves = rigid.pair, self.strip, self.strip_moves
-        if moves and pair.punch.grid is not None and isinstance(strip, Relocatable):
-            strip, moves = strip.at(pair.placement.points_back(pair.punch.x)), False
+        strip, moves = self.facing(rigid)
         return join(rigid, self.punch, strip, strip_moves=moves, rows=self.rows, layer=layer)
+
+    def facing(self, rigid: RigidEquilibrium) -> tuple[SurfaceOperator, bool]:
+        """Return how the strip answers at the place of a pair, and whether it moves as a whole: not on a grid."""
+        pair, strip = rigid.pair, self.strip
+        if self.strip_moves and pair.punch.grid is not None and isinstance(strip, Relocatable):
+            return strip.at(pair.placement.points_back(pair.punch.x)), False
+        return strip, self.strip_moves
 
     def under_loads(self, bodies: Bodies) -> Condensed:
         """Return the same under the loads of these bodies; collective."""
@@ -294,7 +299,7 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
             own = under[id(bodies)]
             alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
             layer = placed.layers.winkler
-            found.append(interface.under(rigid, own.punch, own.strip) if alike else own.join(rigid, layer))
+            found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
     parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
     return Tribosystem(**parts, condensed=condensed, interface=interface, interfaces=tuple(found), exchange=exchange)
 

@@ -307,3 +307,12 @@ def test_a_mesh_alone_is_no_grid() -> None:
     """Without a grid there are no nodes of its own."""
     with pytest.raises(CaseError, match="grid: missing"):
         assemble(load_case("ball-on-flat", ["punch.operator='fine'", "strip.operator='half-space'"]))
+
+
+def test_loads_that_vary() -> None:
+    """Loads of each phase act in equilibrium, at every place of a strip that passes under the punch."""
+    over = "punch.loads=[{on='punch_top', force=['0 N', '0 N', '-20 N'], over_cycle=[[0, 1], [0.5, 2], [1, 1]]}]"
+    case = load_case("ball-on-flat", [*BALL, "motion.positions=3", "grid.nodes=17", over])
+    block = next(iter(march(assemble(case), 1)))
+    assert block.equilibrium_error.max() < 1e-9
+    assert 25 < (block.pressure[-1] @ block.system.pair.weights) < 40

@@ -57,7 +57,7 @@ def test_find_keys() -> None:
     assert {"materials", "materials.NAME.young"} <= {key.path for key in find_keys("materials")}
     assert {key.kind for key in find_keys("motion.kind")} >= {"reciprocating", "one-way", "table"}
     for wrong in ("motion.amplitud", "run.amplitude"):
-        with pytest.raises(CaseError, match=r"did you mean motion\.amplitude"):
+        with pytest.raises(CaseError, match=r"did you mean .*motion\.amplitude"):
             find_keys(wrong)
 
 

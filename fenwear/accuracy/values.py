@@ -97,7 +97,7 @@ def values_of_steady(state: Steady) -> Values:
     }
     if state.heat is not None:
         sides = [*state.heat.punch, *state.heat.strip]
-        found[Quantity("temperature")] = _largest(max(sides, key=lambda side: float(side.max())), surface)
+        found[Quantity("temperature")] = _largest(np.asarray(max(sides, key=lambda side: float(side.max()))), surface)
     return found
 
 

@@ -227,9 +227,8 @@ def _check(source: Path, parts: Mapping[str, _Part], dim: int, sets: Mapping[str
     owners: dict[tuple[int, ...], str] = {}
     for name, part in parts.items():
         for cells in part.cells.values() if part.dim in (dim, dim - 1) else ():
-            rows: list[list[int]] = np.sort(cells, axis=1).tolist()
-            for row in rows:
-                other = owners.setdefault(tuple(row), name)
+            for row in np.sort(cells, axis=1):
+                other = owners.setdefault(tuple(int(node) for node in row), name)
                 if other != name:
                     problems.append(InputError(source.name, f"an element is both of {other} and of {name}"))
                     break

@@ -262,7 +262,9 @@ class Stepper:
         if begin is not None:
             heated = self.coupled.through(begin, contact.pressure, solved.conductances)[-1] - begin
         adds = reduce(Totals.__add__, self._adds(contact.pressure))
-        flowed = None if self._flowed is None else self._flowed / (cycles if followed is None else followed)
+        flowed: Array | None = None
+        if self._flowed is not None:
+            flowed = np.asarray(self._flowed / (cycles if followed is None else followed), dtype=np.float64)
         worn = self.system.passing(self.wear).worn(contact.pressure, before.worn.between, cycles, flowed)
         return _Stage(contact, heated, worn, adds, solved.conductances)
 

@@ -35,7 +35,7 @@ def body_numbers(last: Block, body: str) -> dict[str, float]:
         return {}
     end, surface = last.end, system.pair.punch if body == "punch" else system.pair.strip
     states = [
-        system.conditions(k, own, worn=end.worn, half_cycles=end.half_cycle, cycle=pressure)
+        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=pressure)
         for k, own in enumerate(pressure)
     ]
     depth: Array = getattr(system.wear.phases(states).worn(pressure), body)

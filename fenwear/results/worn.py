@@ -100,5 +100,4 @@ def _vtk(surface: ContactSurface, depth: Array) -> str:
 
 
 def _rows(values: Array | NDArray[np.int64]) -> str:
-    rows: list[list[float]] = values.tolist()
-    return "\n".join(" ".join(f"{value:.10g}" for value in row) for row in rows)
+    return "\n".join(" ".join(f"{value:.10g}" for value in row) for row in values)

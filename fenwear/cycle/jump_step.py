@@ -49,7 +49,7 @@ from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import NOTHING, Worn
 
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
@@ -163,7 +163,7 @@ class Stepper:
             for one, share in ((state, 0.0), (half, 0.5), (halves, 1.0))
         )
         simpson = (begin + middle.times(4.0) + end).times(cycles / 6)
-        worn = halves.worn - state.worn
+        worn = replace(halves.worn - state.worn, between=NOTHING)
         wrong, all_worn = (area(self.system, one) for one in (simpson - worn, worn))
         return wrong / max(all_worn, 1e-300)
 

@@ -29,6 +29,7 @@ from fenwear.interface.placement import ZERO
 from fenwear.parallel import Rows
 
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
+MATRIX = 1000  # nodes up to which a matrix in memory is faster than products, asked for again and again
 SOME = 64  # nodes whose rows tell the scale of gaps where no numbers are in memory
 
 
@@ -146,9 +147,14 @@ class Interface:
             kept = self.dense()
             found = kept[np.arange(len(kept)), :, np.arange(own.start, own.stop)]
             return found if self.rows is None else self.rows.gathered(found)
-        if not self.strip_moves and self.pair.placement.turn == ZERO:
-            both = zip((self.axes, self._axes_on_strip), (self.punch, self.strip), strict=True)
-            found = np.asarray(sum(_along(axes, body.diagonal()) for axes, body in both))
+        gridded = self.pair.punch.grid is not None
+        if (not self.strip_moves or gridded) and self.pair.placement.turn == ZERO:
+            below = self.strip.diagonal()
+            if self.strip_moves:  # what nodes of the strip's grid have, between them a little more than there is
+                read = self.pair.transfer @ below.reshape(len(below), -1)
+                below = np.asarray(read).reshape(-1, *below.shape[1:])
+            both = zip((self.axes, self._axes_on_strip), (self.punch.diagonal(), below), strict=True)
+            found = np.asarray(sum(_along(axes, own) for axes, own in both))
             found[:, 0] += self._closing
             return found
         each = (np.array([node]) for node in range(own.stop))
@@ -310,6 +316,7 @@ class FrameCompliance:
     def __init__(self, interface: Interface) -> None:
         self.interface = interface
         self._n = len(interface.pair.weights)
+        self._numbers = interface.cost is None or self._n <= MATRIX
         self._force = interface.axes.transpose(0, 2, 1) * interface.pair.weights[:, None, None]
 
     def _block(self, rows: Nodes, nodes: Nodes) -> Array:
@@ -324,13 +331,13 @@ class FrameCompliance:
 
     @cached_property
     def _diagonal(self) -> Array:
-        if self.interface.cost is None:
+        if self._numbers:
             return self._columns.diagonal().copy()
         return np.einsum("iac,ica->ai", self.interface.diagonal(), self._force).ravel()
 
     def apply(self, traction: Array) -> Array:
         """Return the displacements (d n,) of tractions (d n,)."""
-        if self.interface.cost is None:
+        if self._numbers:
             loaded = np.flatnonzero(traction)
             return traction[loaded] @ self._columns[loaded]
         force = np.einsum("jcb,bj->jc", self._force, traction.reshape(-1, self._n))
@@ -338,7 +345,7 @@ class FrameCompliance:
 
     def entries(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
         """Return the numbers of some rows and columns."""
-        if self.interface.cost is None:
+        if self._numbers:
             return self._columns[columns, rows[:, None]]
         (to, at), (of, by) = (np.divmod(one, self._n) for one in (rows, columns))
         (seen, i), (pushed, j) = (np.unique(one, return_inverse=True) for one in (at, by))

@@ -12,6 +12,7 @@ import pytest
 import xarray
 
 from fenwear import CaseError, ConvergenceError, Tribosystem, load_case, march, run
+from fenwear.cycle.program import Span
 from fenwear.report.course import mean_pressure, nominal_width
 from fenwear.results.history import HistoryWriter, free_directory, make_directory
 from fenwear.results.reading import load_history
@@ -167,13 +168,13 @@ def test_failed_half_cycle_leaves_the_results_before_it(tmp_path: Path, monkeypa
     """A solver that fails after two blocks: history, summary and figures of what was computed, and the error."""
     case = load_case("example1", [*SMALL, "run.half_cycles=1000"])
 
-    def failing(system: Tribosystem, half_cycles: int, **options: object):  # type: ignore[no-untyped-def]
-        for number, block in enumerate(march(system, half_cycles)):
+    def failing(system: Tribosystem, how: str, span: Span, *_: object, **course: object):  # type: ignore[no-untyped-def]
+        for number, block in enumerate(march(system, span.until)):
             if number == 2:
                 raise ConvergenceError("DIVERGED_ON_PURPOSE")
             yield block
 
-    monkeypatch.setattr(run, "march", failing)
+    monkeypatch.setattr(run, "integrate", failing)
     with pytest.raises(ConvergenceError, match="DIVERGED_ON_PURPOSE") as failed:
         run_case(case, "test", tmp_path / "run", lambda message: None)
     assert f"half-cycle 400 are in {tmp_path / 'run'}" in str(failed.value)

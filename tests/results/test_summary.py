@@ -69,6 +69,6 @@ def test_of_a_stop(tmp_path: Path, integration: str) -> None:
     assert "mean speed (rad/s)" in [ax.get_ylabel() for ax in program_figure(history).axes]
     if integration == "implicit":
         shown = page(tmp_path / "parts")
-        assert "largest temperature of the contact surfaces over the run" in shown
-        assert "largest temperature of the contact surfaces at the end" in shown
+        assert "largest temperature over the run" in shown
+        assert "largest temperature at the end" in shown
         assert f"{peak:,.5g}" in shown

@@ -212,7 +212,7 @@ class Supports:
             points = _support_points(body, support, f"{body.name}.supports.{number}")
             distance = np.linalg.norm(nodes[:, None] - points[None], axis=2)
             parts = np.where(distance < tolerance, self._part[:, None], -1).max(axis=0, initial=-1)
-            parts = comm.allreduce(parts, MPI.MAX)
+            parts = np.max(comm.allgather(parts), axis=0)
             for k in range(self._count):
                 if found[k] is None and (parts == k).any():
                     found[k] = points[parts == k].mean(axis=0)

@@ -12,7 +12,13 @@ import sys
 from pathlib import Path
 
 FENWEAR = [sys.executable, "-m", "fenwear"]
-HEAT = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "heat.steps=2", "output.report=false")
+HEAT = (
+    "geometry.degree=2",
+    "geometry.parameters.elements_along_contact=8",
+    "heat.steps=2",
+    "output.report=false",
+    "output.uncertainty=false",
+)
 STICK = ("geometry.parameters.elements_along_contact=20", "stick.steps=10", "run.half_cycles=8")
 
 

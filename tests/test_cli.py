@@ -106,7 +106,9 @@ def test_runs_from_anywhere(fenwear: Run, tmp_path: Path) -> None:
     (tmp_path / "cases").mkdir()
     (tmp_path / "cases" / "mine.toml").write_text('base = "example1"\n[run]\nhalf_cycles = 2\n')
     for _ in range(2):
-        done = fenwear("run", "cases/mine.toml", *options("output.report=false"), cwd=tmp_path)
+        done = fenwear(
+            "run", "cases/mine.toml", *options("output.report=false", "output.uncertainty=false"), cwd=tmp_path
+        )
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "results" / "mine" / "history.nc").is_file()
     assert (tmp_path / "results" / "mine-2" / "history.nc").is_file()
@@ -204,7 +206,9 @@ def test_no_convergence(fenwear: Run, tmp_path: Path, command: str) -> None:
     prefixes = {"run": ("fenwear_contact", "fenwear_contact_search"), "steady": ("fenwear_steady",)}[command]
     output = ["-o", tmp_path / "run"] if command == "run" else []
     limits = [word for prefix in prefixes for word in (f"-{prefix}_snes_max_it", "1")]
-    done = fenwear(command, "example1", *output, *options("output.report=false"), "--", *limits)
+    done = fenwear(
+        command, "example1", *output, *options("output.report=false", "output.uncertainty=false"), "--", *limits
+    )
     refused(done, 3, "DIVERGED_MAX_IT")
 
 
@@ -214,7 +218,13 @@ def test_two_ranks_give_the_same_scalars(fenwear: Run, tmp_path: Path) -> None:
     for ranks in (1, 2):
         out = tmp_path / str(ranks)
         done = fenwear(
-            "run", "example1", "-o", out, "--json", *options("run.half_cycles=40", "output.report=false"), ranks=ranks
+            "run",
+            "example1",
+            "-o",
+            out,
+            "--json",
+            *options("run.half_cycles=40", "output.report=false", "output.uncertainty=false"),
+            ranks=ranks,
         )
         assert done.returncode == 0, done.stderr
         summaries.append(json.loads(done.stdout))

@@ -14,7 +14,12 @@ import xarray
 from fenwear.results.reading import load_history
 
 Run = Callable[..., Any]
-SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+SMALL = (
+    "output.report=false",
+    "output.uncertainty=false",
+    "geometry.degree=2",
+    "geometry.parameters.elements_along_contact=8",
+)
 CASES = {
     "explicit": ("example1", "run.half_cycles=60"),
     "implicit": ("example2", "run.half_cycles=20", "run.integration=implicit"),
@@ -33,6 +38,7 @@ EVERYWHERE = {
         "ball-on-flat",
         "run.half_cycles=4",
         "output.report=false",
+        "output.uncertainty=false",
         "geometry.parameters.across=6",
         "geometry.parameters.core=0",
         "setup.reproducible=true",

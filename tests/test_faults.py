@@ -21,7 +21,12 @@ import xarray
 from fenwear.results.reading import load_history
 
 Run = Callable[..., Any]
-SMALL = ("output.report=false", "geometry.degree=2", "geometry.parameters.elements_along_contact=8")
+SMALL = (
+    "output.report=false",
+    "output.uncertainty=false",
+    "geometry.degree=2",
+    "geometry.parameters.elements_along_contact=8",
+)
 pytestmark = pytest.mark.process
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
 ENDLESS = ("run.half_cycles=10_000_000", "output.checkpoint=0.5", "output.every=10")

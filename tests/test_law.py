@@ -91,7 +91,7 @@ def test_what_follows_one_law_says_so() -> None:
 def test_a_run_tells_its_law(tmp_path: Path) -> None:
     """The case in its folder has the one that was taken, the summary besides why; it goes on with the same one."""
     told: list[str] = []
-    settings = [*SMALL, "run.half_cycles=2", "stick.steps=4", "output.report=false"]
+    settings = [*SMALL, "run.half_cycles=2", "stick.steps=4", "output.report=false", "output.uncertainty=false"]
     settings[0] = "contact={law='auto', friction=0.9}"
     case = load_case("fretting-partial-slip", settings)
     out = tmp_path / "out"
@@ -106,7 +106,12 @@ def test_a_run_tells_its_law(tmp_path: Path) -> None:
 def test_a_slide_tells_its_law_and_goes_on(tmp_path: Path) -> None:
     """The estimate is in the log, the summary, and the run goes on from its checkpoint by the case or its folder's."""
     told: list[str] = []
-    settings = ["geometry.parameters.elements_along_contact=8", "run.half_cycles=2", "output.report=false"]
+    settings = [
+        "geometry.parameters.elements_along_contact=8",
+        "run.half_cycles=2",
+        "output.report=false",
+        "output.uncertainty=false",
+    ]
     out = tmp_path / "out"
     run_case(load_case("example1", settings), "auto", out, told.append, progress="none")
     assert any("'gross-sliding' is taken: the bodies take up about 1" in text for text in told)

@@ -143,7 +143,7 @@ def run(folder: Path, name: str | Path, *settings: str) -> tuple[dict[str, Any],
 def test_clipped_contact_is_told(tmp_path: Path) -> None:
     """A scar that outgrows its surface: in the log when it happens, in summary and report, with the width it needs."""
     settings = (*CYLINDER, "wear.punch.coefficient=2e-6", "wear.strip.coefficient=1e-9", "run.jump_tolerance=0.2",
-                "output.report=false")  # fmt: skip
+                "output.report=false", "output.uncertainty=false")  # fmt: skip
     narrow, said = run(tmp_path, "fretting", *settings, "run.half_cycles=4000", "geometry.parameters.contact_width=0.4")
     (warning,) = [text for text in narrow["warnings"] if "clipped" in text]
     assert "x = -0.2 and 0.2 mm" in warning
@@ -161,7 +161,7 @@ def test_clipped_contact_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["example1", "example2"])
 def test_a_corner_is_no_clip(tmp_path: Path, name: str) -> None:
     """Contact that ends at the corners of the punch."""
-    summary, _ = run(tmp_path, name, *FLAT, "run.half_cycles=2", "output.report=false")
+    summary, _ = run(tmp_path, name, *FLAT, "run.half_cycles=2", "output.report=false", "output.uncertainty=false")
     assert summary["warnings"] == []
 
 
@@ -202,7 +202,9 @@ def test_pressed_beyond_the_hardness() -> None:
 
 def test_a_run_beyond_the_hardness(tmp_path: Path) -> None:
     """In the summary of a run; 16.7 MPa on 10."""
-    tables = tomllib.loads(load_case("example2", [*FLAT, "run.half_cycles=2", "output.report=false"]).to_toml())
+    tables = tomllib.loads(
+        load_case("example2", [*FLAT, "run.half_cycles=2", "output.report=false", "output.uncertainty=false"]).to_toml()
+    )
     tables["wear"]["punch"] = {"archard": 1e-9, "hardness": "10 MPa"}
     summary, _ = run_case(make_case(tables), "run", tmp_path / "run", lambda message: None)
     (warning,) = summary["warnings"]
@@ -218,7 +220,7 @@ def test_molten() -> None:
 def test_a_mesh_is_not_moved_after_the_last_half_cycle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All half-cycles done is a success, though the next one would have no elements left."""
     monkeypatch.setattr("fenwear.bodies.shape.LEAST", 1.1)  # no motion leaves so much
-    settings = (*FLAT, "geometry.follow_wear=1e-9", "output.report=false")
+    settings = (*FLAT, "geometry.follow_wear=1e-9", "output.report=false", "output.uncertainty=false")
     summary, _ = run(tmp_path, "example2", *settings, "run.half_cycles=1")
     assert summary["stop"] == "all half-cycles done"
     with pytest.raises(MeshQualityError, match="used up the elements"):
@@ -227,7 +229,7 @@ def test_a_mesh_is_not_moved_after_the_last_half_cycle(tmp_path: Path, monkeypat
 
 def test_jumps_end_with_whole_cycles(tmp_path: Path) -> None:
     """An odd number of half-cycles was said to have ended as periodic."""
-    settings = (*FLAT, "run.half_cycles=5", "run.integration=jump", "output.report=false")
+    settings = (*FLAT, "run.half_cycles=5", "run.integration=jump", "output.report=false", "output.uncertainty=false")
     summary, _ = run(tmp_path, "example2", *settings)
     assert (summary["stop"], summary["half_cycles"]) == ("all half-cycles done", 4)
 
@@ -457,7 +459,7 @@ def test_few_nodes_in_a_run_and_a_steady_state(assembled: Assembled, tmp_path: P
     """Told once by a run, and in its summary; of an own mesh the size of elements; the ends of a flat are its own."""
     coarse = ("geometry.parameters.elements_along_contact=8", "motion.positions=2")
     summary, said = run(tmp_path, "fretting", *coarse, "run.half_cycles=2", "run.integration=implicit",
-                        "output.report=false")  # fmt: skip
+                        "output.report=false", "output.uncertainty=false")  # fmt: skip
     (told,) = [text for text in summary["warnings"] if "across the contact at the start" in text]
     assert said.count(f"warning: {told}") == 1
     system = assembled("fretting", *coarse)

@@ -39,7 +39,7 @@ def named(folder: Path) -> Path:
     own = re.sub(r'"(punch|strip)_', lambda m: f'"{PAD.by_roles[m[1]]}_', geometry)
     (folder / "own.geo").write_text(own, "utf-8")
     names = [f"{role}.name={name}" for role, name in PAD.by_roles.items()]
-    case = load_case("example1-heat", ["output.report=false", *SMALL, *names])
+    case = load_case("example1-heat", ["output.report=false", "output.uncertainty=false", *SMALL, *names])
     text = case.to_toml().replace("punch_on_strip.geo", "own.geo")
     (folder / "own.toml").write_text(text, "utf-8")
     return folder / "own.toml"
@@ -61,7 +61,7 @@ def test_the_case_says_its_groups_by_name(tmp_path: Path) -> None:
 
 def test_names_change_no_number_and_all_that_is_told(tmp_path: Path) -> None:
     said: list[str] = []
-    short = load_case("example1-heat", ["output.report=false", *SMALL])
+    short = load_case("example1-heat", ["output.report=false", "output.uncertainty=false", *SMALL])
     one, first = run_case(short, output=tmp_path / "short", log=said.append, progress="none")
     told: list[str] = []
     two, second = run_case(load_case(named(tmp_path)), output=tmp_path / "own", log=told.append, progress="none")

@@ -27,7 +27,7 @@ CASES = {
 def test_as_on_the_command_line(name: str, tmp_path: Path) -> None:
     """Evolved in Python, a case gives the history of its run: every variable, its units and its words."""
     source, *settings = CASES[name]
-    case = load_case(source, [*settings, "output.report=false", "output.fields_at=[]"])
+    case = load_case(source, [*settings, "output.report=false", "output.uncertainty=false", "output.fields_at=[]"])
     told: list[str] = []
     run_case(case, name, tmp_path / name, told.append, progress="none")
     written = read_history(tmp_path / name)

@@ -21,6 +21,7 @@ SMALL = (
     "geometry.parameters.elements_along_contact=4",
     "run.half_cycles=4",
     "output.report=false",
+    "output.uncertainty=false",
 )
 CELSIUS = tuple(
     f"{key}='20 degC'"

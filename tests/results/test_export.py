@@ -19,7 +19,7 @@ from fenwear.results.export import export
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
-BARE = ("output.fields_at=[]", "output.report=false")
+BARE = ("output.fields_at=[]", "output.report=false", "output.uncertainty=false")
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=8", *BARE)
 RUNS = {
     "example1-heat": (*SMALL, "run.half_cycles=6"),

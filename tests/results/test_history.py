@@ -19,11 +19,11 @@ from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "wear.punch.coefficient=4e-7")
-NO_REPORT = "output.report=false"
+QUIET = ("output.report=false", "output.uncertainty=false")
 
 
 def save(folder: Path, *settings: str, name: str = "example1") -> tuple[xarray.Dataset, dict[str, object]]:
-    case = load_case(name, [*SMALL, NO_REPORT, *settings])
+    case = load_case(name, [*SMALL, *QUIET, *settings])
     summary, directory = run_case(case, "test", folder, lambda message: None)
     assert directory == folder
     return load_history(folder), summary
@@ -121,7 +121,7 @@ def test_weights_follow_the_meshes(tmp_path: Path) -> None:
     settings = (
         *("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=1.6"),
         *("geometry.follow_wear=0.1", "wear.punch.coefficient=2e-5", "wear.strip.coefficient=3e-5"),
-        *("contact.friction=0", "run.half_cycles=300", "run.jump_tolerance=0.2", "motion.positions=3", NO_REPORT),
+        *("contact.friction=0", "run.half_cycles=300", "run.jump_tolerance=0.2", "motion.positions=3", *QUIET),
     )
     _, folder = run_case(load_case("fretting", settings), "test", tmp_path / "run", lambda message: None)
     history = load_history(folder)

@@ -19,6 +19,7 @@ SMALL = (
     "geometry.degree=2",
     "geometry.parameters.elements_along_contact=6",
     "output.report=false",
+    "output.uncertainty=false",
     "run.half_cycles=4",
 )
 

@@ -22,7 +22,12 @@ def test_all_times_in_one_file(tmp_path: Path, name: str) -> None:
     """Steps, points, cells and fields of both bodies; after a restart from an earlier state none stands twice."""
     vtk = pytest.importorskip("vtkmodules.vtkIOHDF")
     pyvista = pytest.importorskip("pyvista")
-    settings = ("geometry.degree=2", "geometry.parameters.elements_along_contact=4", "output.report=false")
+    settings = (
+        "geometry.degree=2",
+        "geometry.parameters.elements_along_contact=4",
+        "output.report=false",
+        "output.uncertainty=false",
+    )
     at = "output.fields_at=[2, 4, 6]"
     run_case(load_case(name, [*settings, at, "run.half_cycles=4"]), "run", tmp_path / "run", lambda _: None)
     run_case(
@@ -62,7 +67,12 @@ def test_all_times_in_one_file(tmp_path: Path, name: str) -> None:
 
 def test_stress_of_the_contact(tmp_path: Path) -> None:
     """Under the punch sigma_zz is the pressure with its sign turned and sigma_xz the friction; sigma_yy is zero."""
-    settings = ("geometry.degree=4", "geometry.parameters.elements_along_contact=16", "output.report=false")
+    settings = (
+        "geometry.degree=4",
+        "geometry.parameters.elements_along_contact=16",
+        "output.report=false",
+        "output.uncertainty=false",
+    )
     run_case(load_case("example1", [*settings, "run.half_cycles=3"]), "run", tmp_path / "run", lambda _: None)
     with xarray.open_dataset(tmp_path / "run" / "fields" / "half_cycle_000003.nc", engine="h5netcdf") as opened:
         data = opened.load()

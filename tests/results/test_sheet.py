@@ -210,7 +210,15 @@ def test_density_of_what_is_worn(assembled: Assemble) -> None:
 
 def run(folder: Path, *settings: str, name: str = "example1", resume: bool = False) -> tuple[xarray.Dataset, Any]:
     case = load_case(
-        name, [*SMALL, f"wear.punch.coefficient={K}", "output.report=false", "output.fields_at=[]", *settings]
+        name,
+        [
+            *SMALL,
+            f"wear.punch.coefficient={K}",
+            "output.report=false",
+            "output.uncertainty=false",
+            "output.fields_at=[]",
+            *settings,
+        ],
     )
     summary, _ = run_case(case, "test", folder, lambda message: None, resume=resume)
     return load_history(folder), summary

@@ -18,7 +18,7 @@ from fenwear.results.reading import load_history
 from fenwear.results.scar import EDGE
 from fenwear.run import run_case
 
-NO_PICTURES = ("output.report=false", "output.fields_at=[]")
+NO_PICTURES = ("output.report=false", "output.uncertainty=false", "output.fields_at=[]")
 COARSE = (*NO_PICTURES, "geometry.degree=1", "geometry.order=1")
 SETTINGS = {
     "pin-on-disc": (*COARSE, "geometry.parameters.around=2", "wear.punch.coefficient=2e-7"),

@@ -27,7 +27,11 @@ STEPS = [
 
 def braked(ring: str, count: int | None = None, **run: Any) -> Case:
     """Return a ring that is braked to rest and cools, warmest while it still turns."""
-    tables = tomllib.loads(load_case(ring, ["heat.steps=2", "output.report=false", "output.fields_at=[]"]).to_toml())
+    tables = tomllib.loads(
+        load_case(
+            ring, ["heat.steps=2", "output.report=false", "output.uncertainty=false", "output.fields_at=[]"]
+        ).to_toml()
+    )
     tables["motion"] = {"kind": "rotation", "axis": tables["motion"]["axis"], "angular_speed": 20, "duration": 0.05}
     tables["program"] = {"steps": STEPS, "levels": 2}
     tables["heat"] |= {"initial": "20 degC", "ambient": "20 degC"}

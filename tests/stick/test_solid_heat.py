@@ -88,7 +88,7 @@ def test_expansion_moves_the_surfaces_in_every_direction() -> None:
 
 
 def run(folder: Path, count: int, *, resume: bool = False) -> xarray.Dataset:
-    settings = [*WARM, "wear.punch.coefficient='1e-6 1/MPa'", "output.report=false",
+    settings = [*WARM, "wear.punch.coefficient='1e-6 1/MPa'", "output.report=false", "output.uncertainty=false",
                 "run.integration='explicit'", f"run.half_cycles={count}"]  # fmt: skip
     summary, _ = run_case(load_case("fretting-sphere", settings), "warm", folder, lambda _: None, resume=resume,
                           progress="none")  # fmt: skip

@@ -45,6 +45,7 @@ def test_a_sine_is_the_reciprocating_motion(assembled: Callable[..., Tribosystem
         np.testing.assert_allclose(other.end.totals.sums, one.end.totals.sums, rtol=1e-12)
 
 
+@pytest.mark.mpi
 def test_steady_state_of_changing_loads_and_ways(assembled: Callable[..., Tribosystem]) -> None:
     """The direct solution is where jumps end; a cycle wears all that touches by one rigid motion."""
     rows = [[0, 2, 0, -2], [1, 0, 1, -4], [2, -1, 0, -8], [3, 0, -2, -4], [4, 2, 0, -2]]

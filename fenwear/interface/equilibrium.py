@@ -97,7 +97,7 @@ class RigidEquilibrium:
 def _seen(patterns: csr_array, motion: Array) -> Array:
     """Return what patterns (n, N) see of motions (N, d, modes), as (n, d, modes)."""
     seen = patterns @ motion.reshape(len(motion), -1)
-    return np.asarray(seen).reshape(-1, *motion.shape[1:])
+    return np.asarray(seen).reshape(patterns.shape[0], *motion.shape[1:])
 
 
 def rigid_equilibrium(pair: ContactPair, punch: ElasticBody, strip: ElasticBody) -> RigidEquilibrium:

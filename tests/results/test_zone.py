@@ -89,8 +89,8 @@ def test_largest_pressure_of_a_run(tmp_path: Path) -> None:
         assert any(line.startswith(label) for line in lines[lines.index("rightward leftward") :]), label
     shown = page(folder)
     for label in (
-        "where the pressure is largest, x",
-        "mean pressure of the nodes beside it",
+        "at x",
+        "mean of the nodes beside it",
         "nodes across the contact",
     ):
         assert label in shown

@@ -64,6 +64,10 @@ class Layers:
         """Names of the rows of the state, mm each: thickness of the debris, depth that is ejected, plastic depth."""
         return (*(() if self.debris is None else DEBRIS), *((PLASTIC,) if self.hardness < np.inf else ()))
 
+    def row(self, name: str) -> int:
+        """Return the number of a row of the state, by its name in `rows`."""
+        return self.rows.index(name)
+
     @property
     def nothing(self) -> bool:
         """Whether it changes nothing of contact and wear beside the compliance of the bodies."""
@@ -83,15 +87,15 @@ class Layers:
         """Return the state at the start (rows, n)."""
         state = np.zeros((len(self.rows), self.nodes))
         if self.debris is not None:
-            state[0] = self.debris.initial
+            state[self.row(DEBRIS[0])] = self.debris.initial
         return state
 
     def opening(self, state: Array) -> Array | float:
         """Return the gap that a state opens (n,), mm."""
         if not len(state):
             return 0.0
-        found = np.zeros(self.nodes) if self.debris is None else -state[0]
-        return found + state[-1] if self.hardness < np.inf else found
+        found = np.zeros(self.nodes) if self.debris is None else -state[self.row(DEBRIS[0])]
+        return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
 
     def closing(self, pressure: Array) -> Array:
         """Return by how much pressures (m, n) close what gives way in a step by laws that are not linear, mm."""
@@ -137,9 +141,15 @@ class Layers:
 
     def settled(self, state: Array) -> Array:
         """Return a state after a step that may have overshot: no thickness below zero, nothing lost."""
-        if self.debris is None or not len(state) or state[0].min(initial=0.0) >= 0:
+        if self.debris is None or not len(state):
             return state
-        return np.array([np.maximum(state[0], 0.0), state[1] + np.minimum(state[0], 0.0), *state[2:]])
+        thickness, ejected = map(self.row, DEBRIS)
+        if state[thickness].min(initial=0.0) >= 0:
+            return state
+        settled = state.copy()
+        settled[thickness] = np.maximum(state[thickness], 0.0)
+        settled[ejected] += np.minimum(state[thickness], 0.0)
+        return settled
 
 
 def layers_of(contact: Contact, pair: ContactPair, modulus: float | None = None) -> Layers:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.layers.between import Layers
+from fenwear.layers.between import DEBRIS, PLASTIC, Layers
 from fenwear.layers.debris import DebrisCycle
 from fenwear.sliding.wear import PhasesWear, StepWear, Worn
 
@@ -46,19 +46,20 @@ class Passing:
             return worn
         changes = np.zeros_like(before)
         if self.debris is not None:
-            changes[:2] = self.debris_changes(pressure, before, cycles)
+            rows = [self.layers.row(name) for name in DEBRIS]
+            changes[rows] = self.debris_changes(pressure, before, cycles)
         if flowed is not None:
-            changes[-1] = flowed
+            changes[self.layers.row(PLASTIC)] = flowed
         return Worn(worn.punch, worn.strip, changes)
 
     def debris_changes(self, pressure: Array, before: Array, cycles: float | None) -> tuple[Array, Array]:
         """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
         if self.debris is None:
             return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
-        taken = self.wear.taken(pressure)
+        taken, thickness = self.wear.taken(pressure), before[self.layers.row(DEBRIS[0])]
         if cycles is None:
-            return self.debris.change(before[0], taken)
-        return self.debris.rate(before[0], taken, cycles)
+            return self.debris.change(thickness, taken)
+        return self.debris.rate(thickness, taken, cycles)
 
     def resting(self, pressure: Array) -> Array | None:
         """Return the thickness of the debris that such cycles leave in the end (n,), mm; None without."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
+from fenwear.layers.between import DEBRIS
 from fenwear.sliding.wear import NOTHING, Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
@@ -400,11 +401,16 @@ class Rig:
 
     def _change_between(self, records: Records, between: Array, *, rate: bool) -> Array:
         """Return what steps do to what lies between (rows, n); arguments as of `worn_in`."""
-        debris = self.interface.layers.debris
-        if debris is None or not len(between):
+        layers = self.interface.layers
+        if not len(between):
             return NOTHING
-        over, taken = debris.over(records.slid), records.punch_depth + records.strip_depth
-        return np.array(over.rate(between[0], taken, 0.0) if rate else over.change(between[0], taken))
+        changes = np.zeros_like(between)
+        if layers.debris is not None:
+            over, taken = layers.debris.over(records.slid), records.punch_depth + records.strip_depth
+            rows = [layers.row(name) for name in DEBRIS]
+            thickness = between[rows[0]]
+            changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
+        return changes
 
     def _record(self, at: RigState, after: RigState, step: TimeStep) -> Records:
         before, state, position = at.contact, after.contact, self.interface.position(step.offset)

@@ -199,8 +199,9 @@ def _derivative(rig: Rig, now: FrettingCycle) -> Array:
     Square, of the depths (n + n_s) and the state of what lies between (rows n).
     """
     records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
-    depths, debris = n + len(now.worn.strip), rig.interface.layers.debris
-    total = depths + now.worn.between.size
+    depths, layers = n + len(now.worn.strip), rig.interface.layers
+    debris, total = layers.debris, depths + now.worn.between.size
+    stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     A = np.zeros((total, total))
     slid, groups = records.slid, dict[tuple[float, bytes], list[int]]()
     fed = None if debris is None else debris.over(slid).fed
@@ -224,14 +225,17 @@ def _derivative(rig: Rig, now: FrettingCycle) -> Array:
         left[n:depths] = position.pair.wear_projection[:, closed].toarray() * slopes[1, closed]
         right = [np.eye(n)[closed], position.pair.wear_interpolation[closed].toarray()]
         if debris is not None:
-            left[depths + closed, np.arange(len(closed))] = kept[closed]
-            left[depths + n + closed, np.arange(len(closed))] = (slopes.sum(axis=0) - kept)[closed]
-            right += [-np.eye(n)[closed], np.zeros((len(closed), n))]
+            left[stored + closed, np.arange(len(closed))] = kept[closed]
+            left[ejected + closed, np.arange(len(closed))] = (slopes.sum(axis=0) - kept)[closed]
+        between = np.zeros((len(closed), total - depths))
+        if debris is not None:
+            between[:, stored - depths : stored - depths + n] = -np.eye(n)[closed]
+        right.append(between)
         A -= left @ (answer @ np.concatenate(right, axis=1))
     if debris is not None:
-        lost, at = debris.over(slid).loss, depths + np.arange(n)
-        A[at, at] -= lost
-        A[at + n, at] += lost
+        lost, at = debris.over(slid).loss, np.arange(n)
+        A[stored + at, stored + at] -= lost
+        A[ejected + at, stored + at] += lost
     return A
 
 

@@ -17,6 +17,7 @@ SMALL = (
     "run.half_cycles=4",
     "output.report=false",
     "output.uncertainty=false",
+    "output.fields_at=[]",
 )
 STICK = ("stick.steps=4", "stick.step_tolerance=1")
 STEEL = (
@@ -87,12 +88,15 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
     "in rings": (
         "ring-on-ring",
         ("geometry.parameters.across=4", "geometry.degree=2", "run.half_cycles=4", "run.integration='explicit'",
-         "geometry.follow_wear='never'", "output.report=false", "output.uncertainty=false"),
+         "geometry.follow_wear='never'", "output.report=false", "output.uncertainty=false",
+         "output.fields_at=[]"),
     ),
     "in solids": (
         "fretting-sphere",
         ("geometry.parameters.across=4", "geometry.follow_wear='never'", "run.half_cycles=4", "output.report=false",
+         "output.fields_at=[]",
          "output.uncertainty=false",
+    "output.fields_at=[]",
          "run.integration='explicit'", "wear={punch={coefficient='1e-7 1/MPa'}}"),
     ),
 }  # fmt: skip

@@ -11,13 +11,14 @@ import time
 import tomllib
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
 os.environ.setdefault("HWLOC_HIDE_ERRORS", "2")
-os.environ["FENWEAR_KEPT_GIB"] = "0"  # each test computes what it checks
+os.environ["FENWEAR_KEPT_GIB"] = "0"  # what tests have set up together, and what those of set-ups themselves compute
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112  (Open MPI's name; ranks that wait leave their core)
 
 import forked
@@ -42,6 +43,16 @@ _FIRST: deque[Tribosystem] = deque(maxlen=6)
 Edit = Callable[[dict[str, Any]], object]
 PATIENCE = 1800  # s; ends what hangs, and is far from anything that a busy machine does
 TERMINAL = pytest.StashKey[int]()
+SET_UPS = (
+    "bodies",
+    "contact",
+    "heat",
+    "interface",
+    "verify",
+    "test_determinism.py",
+    "test_parallel.py",
+    "test_solid.py",
+)
 
 
 @lru_cache(maxsize=24)  # the largest hold some hundred MB
@@ -61,6 +72,26 @@ def assembled() -> Iterator[Callable[..., Tribosystem]]:
     yield lambda name, *settings: _assembled(name, settings)
     _assembled.cache_clear()
     _FIRST.clear()
+
+
+@pytest.fixture(scope="session")
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder of this session's set-ups, with the forms that were compiled before."""
+    workers_share = tmp_path_factory.getbasetemp()
+    folder = (workers_share.parent if "PYTEST_XDIST_WORKER" in os.environ else workers_share) / "cache"
+    with suppress(FileExistsError):
+        folder.mkdir()
+    with suppress(FileExistsError):
+        (folder / "fenics").symlink_to(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fenics")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def _set_ups(request: pytest.FixtureRequest, cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let tests of what comes after the set-up share set-ups on one rank: who checks set-ups computes them."""
+    if MPI.COMM_WORLD.size == 1 and request.path.relative_to(TESTS).parts[0] not in SET_UPS:
+        monkeypatch.setenv("FENWEAR_KEPT_GIB", "4")
+        monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
 
 
 @pytest.fixture

@@ -59,4 +59,7 @@ Stresses = Annotated[tuple[Stress, ...], Field(min_length=2, max_length=3)]
 class Part(BaseModel):
     """A table of the case file: unknown keys refused, values frozen."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, hide_input_in_errors=True, ser_json_inf_nan="strings")
+    # Validators are built when a whole case is first read: once, and not once more for each table on the way.
+    model_config = ConfigDict(
+        defer_build=True, extra="forbid", frozen=True, hide_input_in_errors=True, ser_json_inf_nan="strings"
+    )

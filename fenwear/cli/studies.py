@@ -12,6 +12,13 @@ import typer
 from fenwear.cli.base import CaseArgument, JsonOption, SetOption, app, load, log, print_json, show
 from fenwear.errors import CaseError, InputError, StackError
 
+QuantitiesOption = Annotated[
+    list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
+]
+KeysOption = Annotated[
+    list[str], typer.Option("--to", metavar="KEY", help="Such as wear.punch.coefficient; may be repeated.")
+]
+
 
 @app.command("verify")
 def verify_command(
@@ -60,12 +67,8 @@ def _verification() -> tuple[Callable[..., Any], Callable[[], dict[str, str]], C
 @app.command("sensitivity")
 def sensitivity_command(
     case: CaseArgument,
-    quantities: Annotated[
-        list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
-    ],
-    keys: Annotated[
-        list[str], typer.Option("--to", metavar="KEY", help="Such as wear.punch.coefficient; may be repeated.")
-    ],
+    quantities: QuantitiesOption,
+    keys: KeysOption,
     spread: Annotated[float, typer.Option(help="Relative change of the keys in the tornado plot; 0 for none.")] = 0.1,
     differences: Annotated[bool, typer.Option("--differences", help="By differences of runs throughout.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="New folder of the results.")] = None,
@@ -89,12 +92,8 @@ def sensitivity_command(
 @app.command("serve")
 def serve_command(
     case: CaseArgument,
-    quantities: Annotated[
-        list[str], typer.Option("--of", metavar="QUANTITY", help='Such as depth, "steady pressure"; may be repeated.')
-    ],
-    keys: Annotated[
-        list[str], typer.Option("--to", metavar="KEY", help="Such as wear.punch.coefficient; may be repeated.")
-    ],
+    quantities: QuantitiesOption,
+    keys: KeysOption,
     port: Annotated[int, typer.Option(help="To listen on; 0 for one that is free.")] = 4242,
     host: Annotated[
         str, typer.Option(help="Address to listen on; by default only this machine reaches it.")

@@ -15,9 +15,8 @@ from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError
 
 LONGEST = 400  # phases that are marched again one by one; longer runs go by jumps
-FEWEST = 9  # nodes of a grid that is coarsened
 TOLERANCE = 1e-3  # of these jumps
-FEWEST = 5  # nodes of a contact grid
+FEWEST = 9  # nodes of a contact grid that is coarsened
 
 
 @dataclass(frozen=True)

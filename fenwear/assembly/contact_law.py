@@ -14,11 +14,13 @@ class ContactLaw(Protocol):
     """What a law of contact answers.
 
     Attributes:
+        name: By which cases have it; systems have it as their `law`.
         sticks: Whether nodes stick or slip by themselves, resolved in time steps; else all slide with the motion.
         memory: The data class of what it remembers from half-cycle to half-cycle besides depths and temperatures, with
             temperatures as `warm`; None for nothing.
     """
 
+    name: str
     sticks: bool
     memory: type | None
 

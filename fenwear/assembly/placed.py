@@ -509,7 +509,7 @@ def place(
 
 
 @told_by_name
-def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, case: Case | None = None) -> Placed:
+def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None) -> Placed:
     """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
 
     Where nodes stick or slip by themselves their law says how friction acts, and where the strip is in a time step.
@@ -518,6 +518,7 @@ def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, case: C
         bodies: Both bodies, under the mean of their loads.
         sliding: Motion, friction and wear; a phase for each half-cycle.
         middle: The surfaces there.
+        law: Of the contact, by its name.
         case: What they were made from.
     """
     loaded = _loaded(bodies, sliding.motion, case)
@@ -528,7 +529,7 @@ def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, case: C
         sliding=sliding,
         heat=None if case is None else case.heat,
         solver="condensed" if case is None else case.contact.solver,
-        law="coulomb",
+        law=law,
         made_from=case,
         loaded=loaded,
         rigids=tuple(own),

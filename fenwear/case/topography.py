@@ -9,7 +9,6 @@ from pydantic import Field, model_validator
 from fenwear.case.quantities import Length, Number, Part
 
 Positive = Annotated[Length, Field(gt=0)]
-MADE = ("rms", "longest")  # what a self-affine surface needs
 
 
 class Topography(Part):

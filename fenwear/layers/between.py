@@ -68,11 +68,6 @@ class Layers:
         """Return the number of a row of the state, by its name in `rows`."""
         return self.rows.index(name)
 
-    @property
-    def nothing(self) -> bool:
-        """Whether it changes nothing of contact and wear beside the compliance of the bodies."""
-        return self.closure is None and not self.rows
-
     def given(self, pressure: Array) -> Array:
         """Return by how much pressures (..., n) close what lies between, mm."""
         found = np.zeros_like(pressure) if self.winkler is None else self.winkler * pressure

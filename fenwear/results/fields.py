@@ -24,6 +24,7 @@ from fenwear.assembly import Tribosystem
 from fenwear.bodies.antiplane import shear_out_of_plane, shear_strain
 from fenwear.bodies.assembly import interpolate, times
 from fenwear.bodies.elasticity import ElasticBody
+from fenwear.bodies.subcells import linear_cells
 from fenwear.compat import facet_nodes
 from fenwear.heat.conduction import HeatBody
 from fenwear.interface.placement import in_model, in_space
@@ -31,7 +32,6 @@ from fenwear.parallel import on_root
 from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import check_room, writing
 from fenwear.results.series import step_of
-from fenwear.results.subcells import linear_cells
 from fenwear.results.vtkhdf import append
 from fenwear.sliding.wear import Worn
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.subcells import linear_cells
 from fenwear.interface import ContactPair
-from fenwear.results.subcells import linear_cells
 from fenwear.sliding.chart import SlidingChart, sliding_chart
 from fenwear.sliding.field import SlidingField
 

@@ -117,18 +117,19 @@ def touches(rig: Rig) -> bool:
 class Coulomb:
     """The law: nodes stick, or slip against their friction."""
 
+    name = "coulomb"
     sticks = True
     memory: type | None = Memory
 
     def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
         """Return the system of a case whose bodies are built; collective."""
-        return system_of(case, bodies, heat=heat, fresh=fresh)
+        return system_of(case, bodies, law=self.name, heat=heat, fresh=fresh)
 
     def renewed(self, system: Tribosystem, bodies: Bodies) -> Tribosystem:
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
         same = bodies.punch is system.bodies.punch
         condensed = (system.condensed.punch, system.condensed.strip) if same else None
-        return system_of(system.case, bodies, condensed=condensed, ends=system.lawful.ends)
+        return system_of(system.case, bodies, law=self.name, condensed=condensed, ends=system.lawful.ends)
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
         """Return the system of another case that shares the bodies that the change leaves; collective."""
@@ -146,7 +147,7 @@ class Coulomb:
         moves = unheated_rig(case, bodies, condensed=condensed).interface.moves
         same = condensed if moves == system.condensed.strip_moves else None
         ends = system.lawful.ends if same_steps(before, case) else None
-        return system_of(case, bodies, condensed=same, ends=ends)
+        return system_of(case, bodies, law=self.name, condensed=same, ends=ends)
 
     def replicated(self, system: Tribosystem) -> bool:
         """Return whether every rank could go on alone."""
@@ -185,6 +186,7 @@ def system_of(
     case: Case,
     bodies: Bodies,
     *,
+    law: str,
     heat: Preparation = "as set",
     fresh: bool = False,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
@@ -193,8 +195,9 @@ def system_of(
     """Return the system of bodies that are built; collective.
 
     Args:
-        case: With contact.law = "coulomb".
+        case: With contact.law = "coulomb", or that of another law that resolves slip.
         bodies: Of it.
+        law: By its name.
         heat: Whether heat is prepared, and the time steps are halved until they are fine enough: "none" for neither.
         fresh: Condense the bodies again, even where they are kept on disk.
         condensed: Both, where they are condensed already.
@@ -207,7 +210,7 @@ def system_of(
     rig = unheated_rig(case, bodies, fresh=fresh, condensed=condensed)
     interface, fineness = meshed(rig.interface), None
     sliding = replace(interface.sliding, motion=make_motion(case.motion.model_copy(update={"positions": 1})))
-    placed = place_at_rest(bodies, sliding, interface.middle.pair, case)
+    placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case)
     system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))
     if ends is not None:
         rig = with_ends(rig, case, ends)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.case import Case, OneWay, Oscillation, Rotation, Stick
+from fenwear.case import Case, OneWay, Oscillation, Rotation
 from fenwear.errors import CaseError, InputError
 from fenwear.sliding.motion import Motion, make_motion
 
@@ -118,11 +118,6 @@ def _bulk_strain(case: Case) -> float:
     material = case.materials[names.pop()]
     stiffer = 1 - material.poisson**2 if case.model.law == "strain" else 1.0
     return stress * stiffer / material.young
-
-
-def describe(settings: Stick) -> str:
-    """Return in a few words what is imposed."""
-    return "tangential force" if settings.force is not None else "displacement"
 
 
 def far_enough(case: Case, surface: ContactSurface) -> bool:

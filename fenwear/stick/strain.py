@@ -8,7 +8,7 @@ from scipy.sparse import coo_array, csr_array
 
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.results.subcells import linear_cells
+from fenwear.bodies.subcells import linear_cells
 from fenwear.stick.interface import Position
 
 

@@ -6,7 +6,7 @@ import basix
 import numpy as np
 import pytest
 
-from fenwear.results.subcells import linear_cells
+from fenwear.bodies.subcells import linear_cells
 
 TETRAHEDRA = {8: [(0, 1, 3, 4), (1, 2, 3, 6), (1, 4, 5, 6), (3, 4, 6, 7), (1, 3, 4, 6)], 4: [(0, 1, 2, 3)]}
 

@@ -8,12 +8,10 @@ from typing import Any, get_args
 
 from fenwear.case.keys import all_keys
 from fenwear.case.laws import Dependence
-from fenwear.case.motions import Motions
 from fenwear.case.schema import Case, part_models
 from fenwear.case.units import shown
 from fenwear.errors import InputError
 
-MOTIONS: dict[str | int, type] = {get_args(m.model_fields["kind"].annotation)[0]: m for m in get_args(Motions)}
 # What was expected, by the kind of an error of pydantic: its own words are those of Python.
 EXPECTED = {
     **dict.fromkeys(("model_type", "model_attributes_type", "dict_type", "mapping_type"), "a table"),
@@ -42,7 +40,7 @@ def problems_of(error: Any, data: Mapping[str, Any]) -> list[InputError]:  # noq
         case "missing":
             return [InputError(key, "missing, but required")]
         case "union_tag_not_found" | "union_tag_invalid":
-            expected = f"expected one of {', '.join(f'{kind!r}' for kind in MOTIONS)}"
+            expected = f"expected one of {', '.join(f'{kind!r}' for kind in _kinds(_tables(error['loc'])))}"
             return [InputError(f"{key}.kind", expected + _nearest(error.get("ctx", {}).get("tag"), expected))]
         case "too_short":
             return [InputError(key, f"expected {_entries('at least', error['ctx']['min_length'], error)}")]
@@ -92,16 +90,7 @@ def _key(location: Sequence[str | int], data: object, *, missing: bool) -> str:
 
 def _suggestion(location: tuple[str | int, ...]) -> str:
     """Return "; did you mean ...?" for a misspelt key, or the keys that are known there."""
-    model: Any = Case
-    for step in location[:-1]:  # names and numbers of entries are no fields: they stay at the same table
-        field = getattr(model, "model_fields", {}).get(step)
-        if step in MOTIONS:
-            model = MOTIONS[step]
-        elif step == "dependence":
-            model = Dependence
-        elif field is not None:
-            model = next(iter(part_models(field.annotation)), None)
-    names = list(getattr(model, "model_fields", {}))
+    names = list(dict.fromkeys(name for table in _tables(location[:-1]) for name in getattr(table, "model_fields", {})))
     close = difflib.get_close_matches(str(location[-1]), names, n=1)
     if close:
         return f"; did you mean {close[0]!r}?"
@@ -109,3 +98,22 @@ def _suggestion(location: tuple[str | int, ...]) -> str:
     if elsewhere:
         return f"; did you mean {' or '.join(dict.fromkeys(elsewhere[:3]))}?"
     return f"; known here are {', '.join(names)}" if names else ""
+
+
+def _tables(location: Sequence[str | int]) -> list[Any]:
+    """Return the tables that may stand at a place: more than one where its `kind` is not told yet."""
+    tables: list[Any] = [Case]
+    for step in location:  # names and numbers of entries are no fields: they stay at the same table
+        fields = [table.model_fields[step] for table in tables if step in getattr(table, "model_fields", {})]
+        if step in (kinds := _kinds(tables)):
+            tables = [kinds[step]]
+        elif step == "dependence":
+            tables = [Dependence]
+        elif fields:
+            tables = part_models(fields[0].annotation)
+    return tables
+
+
+def _kinds(tables: Sequence[Any]) -> dict[str | int, Any]:
+    """Return tables by the word that their key `kind` has."""
+    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in tables if "kind" in one.model_fields}

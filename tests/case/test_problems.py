@@ -41,6 +41,10 @@ def problems(*settings: str, name: str = "example1-heat") -> list[str]:
         ("motion.profile=sinus", "motion.profile: expected 'sinusoidal', 'triangular' or 'trapezoidal', got 'sinus'; "
                                  "did you mean 'sinusoidal'?"),
         ("contact.friction={table = 3}", "contact.friction.table: expected a list, got 3"),
+        ("contact.layer.kind=powr", "contact.layer.kind: expected one of 'linear', 'power', 'exponential', 'rough'; "
+                                    "did you mean 'power'?"),
+        ("contact.layer={kind='power', stiffness=1, reference=1, pressure=1}",
+         "contact.layer.stiffness: unknown key; known here are kind, reference, pressure, exponent"),
         ("contact.friction={tabel = [[0, 1], [1, 1]]}", "contact.friction.tabel: unknown key; did you mean 'table'?"),
         ("materials.number={poisson = 0.3}", "materials.number.young: missing, but required"),
     ],

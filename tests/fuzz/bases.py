@@ -43,6 +43,30 @@ TRACK = """
 motion = {kind = "one-way", direction = "leftward", speed = "200 mm/s", duration = "0.1 s", track = "600 mm"}
 wear.strip = {coefficient = "5e-6 MPa^-1"}
 """
+STICK = (*TINY, "geometry.follow_wear=never", "stick.steps=2", "stick.step_tolerance=1", "run.integration=explicit")
+BETWEEN = """
+contact.third_body = {share = 0.5, life = "0.3 mm"}
+contact.layer = {kind = "exponential", length = "1 um", pressure = "10 MPa"}
+"""
+PROGRAM = """
+program = {steps = [{cycles = 1}, {cycles = 1, load_factor = 0.5}]}
+"""
+RINGS = ("geometry.degree=1", "geometry.parameters.across=2", "run.half_cycles=2", "geometry.follow_wear=never")
+BORE = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.elements_along_contact=8", "run.half_cycles=2")
+SOLID = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=4", "run.half_cycles=2")
+CUP = ("geometry.parameters.across=2", "geometry.parameters.around=2", "geometry.parameters.cup_layers=1",
+       "run.half_cycles=32", "run.integration=explicit")  # fmt: skip
+CYCLE = """
+motion.kind = "cycle"
+motion.columns = ["time (s)", "shift_x (mm)"]
+motion.rows = [[0, 0.001], [0.25, -0.001], [0.5, 0.0], [1, 0.001]]
+"""
+GRID = ("geometry.degree=1", "geometry.order=1", "geometry.parameters.across=4", "geometry.parameters.core=0",
+        "geometry.parameters.core_elements=0", "punch.operator=half-space", "strip.operator=half-space",
+        "grid.nodes=17", "motion.positions=2", "run.half_cycles=2")  # fmt: skip
+ROUGH = """
+punch.topography = {rms = "0.05 um", longest = "0.2 mm", seed = 1}
+"""
 # By name: a built-in case, settings, and tables laid over it.
 BASES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "example1": ("example1", TINY, ""),
@@ -60,6 +84,24 @@ BASES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "track": ("monotonic-lz20", TINY, TRACK),
     "followed": ("example1-heat", (*WITH_HEAT, "geometry.follow_wear=1e-7", "run.integration=implicit"), ""),
     "across": ("example1", (*TINY, "motion.axis=y", "contact.transverse_friction=0.1"), ""),
+    "program": ("example1", (*TINY, "run.half_cycles=4"), PROGRAM),
+    "stick": ("fretting-partial-slip", STICK, ""),
+    "stick between": ("fretting-partial-slip", STICK, BETWEEN),
+    "auto": ("fretting", (*TINY, "contact.law=auto"), ""),
+    "between": ("example1", TINY, BETWEEN),
+    "cap": ("rounded-punch", (*ROUNDED, "contact.hardness='2 GPa'"), ""),
+    "rings": ("ring-on-ring", RINGS, ""),
+    "warm rings": ("ring-on-ring-heat", (*RINGS, "heat.steps=2"), ""),
+    "block on ring": ("block-on-ring", BORE, ""),
+    "bushing": ("bushing", (*BORE[2:], "geometry.parameters.elements_along_contact=16"), ""),
+    "drum": ("drum-brake", ("geometry.parameters.elements_along_lining=6", "run.half_cycles=2"), ""),
+    "solid": ("ball-on-flat", SOLID, ""),
+    "pin": ("pin-on-disc", SOLID, ""),
+    "stick of a sphere": ("fretting-sphere", (*SOLID, "stick.steps=2", "stick.step_tolerance=1"), ""),
+    "cup": ("ball-in-cup", CUP, ""),
+    "table": ("ball-on-flat", SOLID, CYCLE),
+    "grid": ("ball-on-flat", GRID, ""),
+    "rough": ("ball-on-flat", GRID, ROUGH),
 }
 
 # What would leave a trace in the current folder if an expression could do more than compute.
@@ -147,5 +189,5 @@ def base(name: str) -> dict[str, Any]:
     case, settings, text = BASES[name]
     tables = tomllib.loads(load_case(case, settings).to_toml())
     for key, table in tomllib.loads(text).items():
-        tables[key] = {**tables.get(key, {}), **table} if key in ("contact", "wear") else table
+        tables[key] = {**tables.get(key, {}), **table} if key in ("contact", "wear", "punch") else table
     return tomllib.loads(make_case(tables).to_toml())

@@ -20,7 +20,6 @@ import sys
 import tempfile
 import tomllib
 from collections import Counter
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,10 +32,10 @@ import tomli_w
 from bases import base
 from pool import Verdict, verdicts
 
-from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march
+from fenwear import Case, assemble, load_case, make_case
 from fenwear.bodies.mesh import write_msh
 from fenwear.case import plausibility_warnings
-from fenwear.cycle import Block, follow
+from fenwear.cycle import evolve
 from fenwear.errors import FenwearError, MeshQualityError
 
 SECONDS = 60.0  # of processor time
@@ -260,21 +259,7 @@ def compute(case: Case) -> None:
     for text in plausibility_warnings(case):
         if PYTHON.search(own_words(text)):
             raise NoResultError(f"a warning speaks Python: {text}")
-    last = min(case.run.half_cycles, 2)
-    jumps, implicit = case.run.integration == "jump", case.run.integration == "implicit"
-
-    def integrate(system: Tribosystem, start: Any, leave: Any) -> Iterator[Block]:
-        shared: dict[str, Any] = {"start": start, "leave": leave}
-        if jumps:
-            return jump(
-                system,
-                min(case.run.half_cycles, 2 * system.motion.half_cycles),
-                tolerance=case.run.jump_tolerance,
-                **shared,
-            )
-        return march(system, last, implicit=implicit, block=1, **shared)
-
-    for block in follow(assemble(case), integrate):
+    for block in evolve(assemble(case), min(case.run.half_cycles, 2 if case.motion.kind != "cycle" else 32)):
         for values in (block.pressure, block.gap, block.wear, block.wear_strip, block.equilibrium_error):
             if not np.isfinite(values).all():
                 raise NoResultError("not finite")

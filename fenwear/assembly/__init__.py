@@ -13,6 +13,7 @@ takes again what a changed case makes necessary, and keeps the rest.
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
 from fenwear.assembly.contact_law import ContactLaw
+from fenwear.assembly.creep import Creep, CreepStage
 from fenwear.assembly.laws import law_named, register_contact_law
 from fenwear.assembly.needs import Needs, body_needs
 from fenwear.assembly.placed import Clock, Placed, place, place_at_rest
@@ -42,6 +43,8 @@ __all__ = [
     "Clock",
     "Condensed",
     "ContactLaw",
+    "Creep",
+    "CreepStage",
     "Needs",
     "Placed",
     "Preparation",

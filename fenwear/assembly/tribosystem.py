@@ -14,6 +14,7 @@ from scipy.sparse import csr_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.creep import Creep, creep_of
 from fenwear.assembly.needs import Needs, contact_memory, needs
 from fenwear.assembly.placed import Placed
 from fenwear.assembly.ways import chosen, free_on_ranks, settle
@@ -33,6 +34,7 @@ from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium, join
 from fenwear.memory import GIB
 from fenwear.parallel import Rows, all_together, lasting
+from fenwear.sliding.wear import Worn
 
 T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
@@ -89,6 +91,7 @@ class Tribosystem(Placed):
         interfaces: The same in each phase.
         exchange: The bodies' temperatures over the phases; None without heat, or where it was not asked for.
         lawful: What the law of contact has prepared of it, where it needs more.
+        creep: What bodies and layer creep; None where nothing does.
     """
 
     condensed: Condensed
@@ -96,6 +99,7 @@ class Tribosystem(Placed):
     interfaces: tuple[Interface, ...]
     exchange: HeatExchange | None = None
     lawful: Any = None
+    creep: Creep | None = None
 
     @property
     def elastic_length(self) -> float:
@@ -135,6 +139,28 @@ class Tribosystem(Placed):
         """Return the contact of phases of the motion, given by their numbers."""
         ratios = self.friction_ratios()
         return self._contact([SlidingContact(self.interfaces[k], ratios[k]) for k in phases])
+
+    def passed_contact(self, phase: int) -> ContactSolver:
+        """Return the contact of a phase that passes in a march, with what creeps in it."""
+        if self.creep is None:
+            return self.phase_contact((phase,))
+        return self._contact([SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])])
+
+    def gap(self, phase: int, worn: Worn, *, passing: bool = False) -> Array:
+        """Return the gap of the unloaded, worn bodies in a phase (n,), mm.
+
+        Args:
+            phase: Its number.
+            worn: Depths at its start, what lies between and what has crept.
+            passing: Whether what has crept goes on over the phase, in a march; else it is left out.
+        """
+        found = super().gap(phase, worn)
+        return found + self.creep.offset(phase, worn.crept) if passing and self.creep is not None else found
+
+    def unworn(self) -> Worn:
+        """Return the worn depths at the start, none, what lies between then, and that nothing has crept."""
+        found = super().unworn()
+        return found if self.creep is None else replace(found, crept=self.creep.beginning())
 
     def _contact(self, phases: list[SlidingContact]) -> ContactSolver:
         if self.solver == "full":
@@ -265,7 +291,8 @@ def shared_rows(placed: Placed) -> Rows | None:
     """
     comm, taken = placed.comm, contact_memory(placed)
     alone = comm.size == 1 or placed.bodies.punch.setup.reproducible
-    alone = alone or any(body.operator != CONDENSED for body in (placed.bodies.punch, placed.bodies.strip))
+    both = (placed.bodies.punch, placed.bodies.strip)
+    alone = alone or any(body.operator != CONDENSED or body.creep is not None for body in both)
     if alone or placed.heat is not None or placed.solver != "condensed":
         return None
     if taken < SHARED and taken * comm.size < COPIES * SHARED:
@@ -301,7 +328,16 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
             layer = placed.layers.winkler
             found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
     parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
-    return Tribosystem(**parts, condensed=condensed, interface=interface, interfaces=tuple(found), exchange=exchange)
+    interfaces = tuple(found)
+
+    def on_material(phase: int) -> Interface:
+        own, bodies = interfaces[phase], under[id(placed.loaded[phase])]
+        return own if own.strip is bodies.strip else join(own.rigid, bodies.punch, bodies.strip, strip_moves=True)
+
+    creep = creep_of(placed, (condensed.punch, condensed.strip), interfaces, on_material)
+    return Tribosystem(
+        **parts, condensed=condensed, interface=interface, interfaces=interfaces, exchange=exchange, creep=creep
+    )
 
 
 def _under_all(condensed: Condensed, placed: Placed) -> dict[int, Condensed]:

@@ -134,7 +134,7 @@ def in_parts(system: Tribosystem, parts: int) -> Tribosystem:
 def set_up_by(case: Case) -> tuple[object, ...]:
     """Return what the meshes, stiffnesses and thermal expansion of a case are made from: variants share them by it."""
     bodies = (
-        (body.regions, body.supports, body.pivot, body.profile, body.topography, body.operator)
+        (body.regions, body.supports, body.pivot, body.profile, body.topography, body.operator, body.creep)
         for body in (case.punch, case.strip)
     )
     initial = case.heat.initial if case.heat is not None and case.warming else None

@@ -56,6 +56,7 @@ class ElasticBody:
         acting: Sum of the loads' sizes, N: of a moment, whose resultant is none, too.
         swallowed: What of it acts where supports hold that very component (d,), N: it reaches nothing else.
         operator: Name of how its contact surface answers to forces.
+        creep: How its compliance grows under load; None where it does not.
         surface: The contact surface: the trace of the mesh, or a grid of its own (see `lay_grid`).
         reading: Of a grid, what takes values at the trace nodes of the mesh to its nodes (N, N_mesh); else None.
         setup: How it is condensed.
@@ -86,7 +87,7 @@ class ElasticBody:
             CaseError: an unknown group, a support off the body, a body free to slide, a stress that is not linear.
         """
         self.body, self.law, self.thickness, self.setup = body, law, thickness, setup
-        self.operator = description.operator
+        self.operator, self.creep = description.operator, description.creep
         self.solver: Solver = "factor"
         self.holders = 1
         if setup.way == "low-rank" or setup.way == "multigrid":  # noqa: PLR1714  (mypy does not narrow by "in")

@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from fenwear.arrays import Array
+from fenwear.case.creep import Creep
 from fenwear.case.quantities import (
     Axis,
     Forces,
@@ -309,6 +310,10 @@ class Body(Part):
     )
     topography: Topography | None = Field(
         default=None, description="roughness or waves on top of its shape, measured or made; needs the table grid"
+    )
+    creep: Creep | None = Field(
+        default=None,
+        description="growth of its compliance under load, as of polymers, all of it alike; by default none",
     )
     profile: Profile | None = Field(
         default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from fenwear.case.creep import Creep
 from fenwear.case.dependence import VARIABLES
 from fenwear.case.laws import Dependence, constant_or_dependence
 from fenwear.case.quantities import Length, Number, Part, Stress, quantity
@@ -71,6 +72,7 @@ class LinearLayer(_OfPlace):
     stiffness: constant_or_dependence(Annotated[float, *quantity(STIFFNESS), Field(gt=0)]) = Field(  # type: ignore[valid-type]
         description="pressure over closure"
     )
+    creep: Creep | None = Field(default=None, description="growth of its closure under load; by default none")
 
     @classmethod
     def units(cls) -> Mapping[str, str]:

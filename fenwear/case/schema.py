@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 from fenwear.case.bodies import CONDENSED, Body, CourseLoad, Geometry, Grid, Load, Model
 from fenwear.case.contact import Contact
 from fenwear.case.course import Output, Program, Run
+from fenwear.case.creep import creep_problems
 from fenwear.case.cycle_table import PLACES
 from fenwear.case.diffusion import diffusion_of
 from fenwear.case.laws import Dependence, Stick, Wear
@@ -262,6 +263,9 @@ class Case(Part):
         lies = [name for name in ("third_body", "layer", "hardness") if getattr(self.contact, name) is not None]
         if self.contact.solver == "full" and lies:
             problems.append(f"contact.solver: expected 'condensed' with contact.{lies[0]}")
+        passes_on = one_way and self.passes
+        given = self.bodies, self.contact.layer, self.contact.solver
+        problems += creep_problems(*given, passes_on=passes_on)
         if self.sticks and self.contact.hardness is not None:
             problems.append("contact.hardness: expected contact.law = 'gross-sliding': with stick nothing flows yet")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
@@ -384,6 +388,8 @@ class Case(Part):
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation | Cycle),
             "motion.axis: expected 'x'": not self.passes,
+            "creep: expected none": any(body.creep is not None for body in self.bodies.values())
+            or getattr(self.contact.layer, "creep", None) is not None,
             "contact.friction and wear: expected coefficients without cs and pm, which are of gross sliding,": any(
                 isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm"))
                 for one in (self.contact.friction, *(law.given_coefficient for law in self.wear.laws))

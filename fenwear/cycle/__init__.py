@@ -12,7 +12,14 @@ from fenwear.cycle.jump import jump
 from fenwear.cycle.march import march
 from fenwear.cycle.monotonic import Monotonic, monotonic
 from fenwear.cycle.program import Span, at_step, follow_program, held
-from fenwear.cycle.stability import critical_speed, explicit_growth, growth_rate, stability_number, stationary_growth
+from fenwear.cycle.stability import (
+    critical_speed,
+    decay_rates,
+    explicit_growth,
+    growth_rate,
+    stability_number,
+    stationary_growth,
+)
 from fenwear.cycle.steady import Steady, cycles_to_reach, steady
 from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 
@@ -24,6 +31,7 @@ __all__ = [
     "at_step",
     "critical_speed",
     "cycles_to_reach",
+    "decay_rates",
     "evolve",
     "explicit_growth",
     "follow",

@@ -82,6 +82,7 @@ class Block:
         wear: Worn depth of the punch at its end (k, n), mm.
         wear_strip: Of the strip, on its material (k, n_strip), mm.
         between: State of what lies between at its end, by the rows of `fenwear.layers.Layers` (k, rows, n).
+        crept: State of what creeps at its end, as `fenwear.assembly.Creep` has it (k, size).
         rigid: Amplitudes of the rigid modes there (k, modes).
         totals: What all half-cycles up to its end add up to, k of them.
         adds: What it adds itself, k of them.
@@ -121,6 +122,7 @@ class Block:
     load_factor: Array = field(kw_only=True)
     end: RunState = field(kw_only=True)
     between: Array = field(kw_only=True)
+    crept: Array = field(kw_only=True)
     steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
     traction: Array | None = field(default=None, kw_only=True)
 
@@ -328,6 +330,7 @@ class Recorder:
             load_factor=loads,
             end=end,
             between=np.array([row.worn.between for row in rows]),
+            crept=np.array([row.worn.crept for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
             traction=middles[-1].friction_ratio if rows[-1].steps is not None else None,
         )

@@ -12,6 +12,7 @@ from fenwear.cycle.state import RunState, present
 from fenwear.sliding.wear import Worn
 
 ORDER = 2  # of the steps of a jump
+REST = 1e-2  # of all that has crept: where creep comes to its end it is no longer measured by what a jump adds
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,18 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
         force_difference(system, present(one).pressure[0], present(other).pressure[0])
         for one, other in zip(whole.contacts, halves.contacts, strict=True)
     )
-    share = 1 / (2**ORDER - 1)
-    return Estimate(
-        share * wrong / max(worn, 1e-300), share * pressure, share * _heat_difference(system, whole, halves)
-    )
+    share, depth = 1 / (2**ORDER - 1), wrong / max(worn, 1e-300)
+    depth = max(depth, _creep_difference(system, apart, step, halves.worn))
+    return Estimate(share * depth, share * pressure, share * _heat_difference(system, whole, halves))
+
+
+def _creep_difference(system: Tribosystem, apart: Worn, step: Worn, end: Worn) -> float:
+    """Return the difference of what has crept over what the jump creeps; near the end of creep over a part of all."""
+    creep, weights = system.creep, system.pair.weights
+    if creep is None:
+        return 0.0
+    wrong, moved, there = (float(weights @ np.abs(creep.depth(one.crept))) for one in (apart, step, end))
+    return wrong / max(moved, REST * there, 1e-300)
 
 
 def area(system: Tribosystem, worn: Worn) -> float:

@@ -38,7 +38,7 @@ from functools import reduce
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, with_reduced_heat
+from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, Passing
@@ -100,7 +100,7 @@ class Stepper:
         self._heated: Array = np.zeros(0)  # by the last cycle
         self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
         self._conductances: Array | None = None  # in it
-        self._done = 0.0  # half-cycles at the end of the stage
+        self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
 
     def beginning(self) -> RunState:
@@ -235,7 +235,8 @@ class Stepper:
         """Take the time and the loads so many cycles after a half-cycle."""
         self._done = half_cycle + cycles * self.system.motion.half_cycles
         if self.loading is not as_given and isinstance(self.contact, CondensedContact):
-            self.contact.press(self.loading(self._done))
+            self._load = self.loading(self._done)
+            self.contact.press(self._load)
 
     def _stage(
         self, before: _Moment, start: ContactState | None, cycles: float, followed: float | None = None
@@ -266,6 +267,9 @@ class Stepper:
         if self._flowed is not None:
             flowed = np.asarray(self._flowed / (cycles if followed is None else followed), dtype=np.float64)
         worn = self.system.passing(self.wear).worn(contact.pressure, before.worn.between, cycles, flowed)
+        creep = self._creep(before.worn, cycles)
+        if creep is not None:
+            worn = replace(worn, crept=creep.rate(contact.pressure))
         return _Stage(contact, heated, worn, adds, solved.conductances)
 
     def _solve(
@@ -274,7 +278,9 @@ class Stepper:
         """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
         worn, cycles = begin
-        step, near = self.system.passing(self.wear).step(worn.between, cycles), start
+        step, near, creep = self.system.passing(self.wear).step(worn.between, cycles), start, self._creep(worn, cycles)
+        if creep is not None:
+            gap, coupling = gap + creep.gap, creep.coupling if coupling is None else coupling + creep.coupling
 
         def solve(flowed: Array) -> ContactState:
             nonlocal near
@@ -283,6 +289,11 @@ class Stepper:
 
         found, self._flowed = self.system.layers.flowing(solve, lambda found: found.pressure)
         return found
+
+    def _creep(self, worn: Worn, cycles: float) -> CreepStage | None:
+        """Return what creeps in a stage; None where nothing does."""
+        creep = self.system.creep
+        return None if creep is None else creep.stage(worn.crept, cycles, self.ratios, self._load)
 
     def take(self, conditions: Sequence[ContactConditions]) -> None:
         """Take friction and wear at the conditions of the phases."""

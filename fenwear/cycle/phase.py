@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
-from fenwear.cycle.totals import PhaseMeter
+from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import Passing
@@ -51,7 +51,7 @@ class PhaseStep:
         self._constant, self._load = system.constant_coefficients, 1.0
         exchange = system.exchange
         self._initial = None if exchange is None else exchange.initial()
-        self._contact = system.phase_contact((phase,))
+        self._contact = system.passed_contact(phase)
         self._thermal = None if exchange is None else ThermalContact(system, exchange, phase, self._contact)
         conditions = system.conditions(phase)
         self._mu = system.friction.values(conditions)
@@ -91,7 +91,7 @@ class PhaseStep:
             self._load = load
         if self._thermal is not None and temperature is not None:
             temperature = self._thermal.exchange.own(temperature)
-        gap = self.system.gap(self.phase, worn)
+        gap = self.system.gap(self.phase, worn, passing=True)
         start = before or near
         if self._constant:
             return self._end(*self._solve(temperature, gap, start, self._passing, worn), before, self._passing, worn)
@@ -167,8 +167,15 @@ class PhaseStep:
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
         meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, passing.wear)
-        adds, lost = self.system.team.lead(
-            lambda: (meter(contact.pressure[0]), passing.worn(contact.pressure, worn.between, flowed=self._flowed))
-        )
+
+        def left() -> tuple[Totals, Worn]:
+            pressure = contact.pressure[0]
+            lost, creep = passing.worn(contact.pressure, worn.between, flowed=self._flowed), self.system.creep
+            if creep is not None:
+                crept = creep.change(self.phase, worn.crept, pressure, self._friction_ratio, self._load)
+                lost = replace(lost, crept=crept)
+            return meter(pressure), lost
+
+        adds, lost = self.system.team.lead(left)
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)
         return PhaseEnd(record, temperature, heat, lost)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import LinearOperator, eigs
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Tribosystem, heating_friction, steady_exchange, with_reduced_heat
+from fenwear.assembly import Creep, Tribosystem, heating_friction, steady_exchange, with_reduced_heat
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.contact.operators import Solve
 from fenwear.cycle.coupled import cycle_heat, touching
@@ -26,6 +26,7 @@ from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import PhasesWear
 
+ROUNDING = 1e-12  # of a disturbance: what is left of it that is gone
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
 MAX_ITERATIONS = 60  # of friction and the temperatures that it depends on
 CLOSE = 1e-10  # change of these temperatures over their range that ends them
@@ -108,11 +109,36 @@ def growth_rate(
     return system.led_whole(partial(_growth_rate, system, pressure, conductances, implicit=implicit))
 
 
+def decay_rates(system: Tribosystem, pressure: Array, conductances: Array | None = None) -> Array:
+    """Return the rates at which all disturbances of a state grow, 1/s, the largest first; collective.
+
+    Real parts; those that neither grow nor decay, such as rigid motions of the shape, and those that are gone after a
+    cycle are left out. Arguments and errors as of `growth_rate`, which is the first of them.
+    """
+    if system.passing_laws:
+        raise CaseError(
+            InputError(system.passing_laws[0], "changes as long as it slides: no state of it grows or decays")
+        )
+    system = with_reduced_heat(system)
+    sizes = np.abs(system.led_whole(partial(_factors, system, pressure, conductances, implicit=True)))
+    counted = (np.abs(sizes - 1) > NEUTRAL) & (sizes > ROUNDING)
+    return np.sort(np.log(sizes[counted]) / system.motion.period)[::-1]
+
+
 def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool) -> float:
+    values = _factors(system, pressure, conductances, implicit=implicit)
+    counted = np.abs(values - 1.0) > NEUTRAL
+    return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
+
+
+def _factors(
+    system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool
+) -> NDArray[np.complex128]:
+    """Return what a cycle multiplies each disturbance of a state by: the eigenvalues of its map."""
     pressure = touching(pressure)
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
-    dim = 0 if heat is None else heat.dim
+    dim = (0 if heat is None else heat.dim) + (0 if system.creep is None else len(system.creep.beginning()))
     cycle = np.eye(dim + n)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
@@ -123,9 +149,7 @@ def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | Non
         raise ConvergenceError(
             "what disturbances become in a cycle is beyond all numbers: wear, heat or load are too large"
         )
-    values = np.linalg.eigvals(cycle)
-    counted = np.abs(values - 1.0) > NEUTRAL
-    return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
+    return np.asarray(np.linalg.eigvals(cycle), dtype=complex)
 
 
 def explicit_growth(system: Tribosystem) -> float | None:
@@ -301,7 +325,8 @@ def phase_tangent(
 
         dw' + G ds' + S dp + S_tau p dtau + H da = 0,   E dp + E_tau p dtau = 0,
 
-    with dw in place of dw' where the wear is explicit.
+    with dw in place of dw' where the wear is explicit. What creeps stands beside the temperatures, after them: s has
+    its state, S is that of the grown compliances, and G of a state what it opens at the end of the phase.
 
     Args:
         system: The assembled problem.
@@ -312,7 +337,7 @@ def phase_tangent(
         conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
         implicit: Whether the wear is.
     """
-    n, interface = len(pressure), system.interfaces[phase]
+    n, interface, creep = len(pressure), system.interfaces[phase], system.creep
     laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
     dim = laws.mu_s.shape[1]
     friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
@@ -327,6 +352,14 @@ def phase_tangent(
         if conductance is None:
             conductance = heat.exchange.conductance(pressure)
         state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
+    if creep is not None:
+        crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
+        none: Array = np.zeros((n, len(crept.stays)))
+        laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
+        traction_s = np.hstack([traction_s, none])
+        gap_rows = np.hstack([gap_rows, crept.opened])
+        state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
+        state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_rows @ state_p
@@ -351,6 +384,36 @@ def phase_tangent(
     change[:dim] += state_p @ answer
     change[dim:] += laws.worn_p @ answer
     return change
+
+
+class _Creeping(NamedTuple):
+    """What creeps in a phase.
+
+    Attributes:
+        opened: Gap by its state (n, k).
+        stays: What is left of its state (k,).
+        by_state: Its state at the end by that of the heat (k, dim).
+        by_pressure: By the pressures (k, n).
+    """
+
+    opened: Array
+    stays: Array
+    by_state: Array
+    by_pressure: Array
+
+
+def _creeping(creep: Creep, phase: int, ratios: tuple[Array, Array], traction_p: Array, traction_s: Array) -> _Creeping:
+    """Return what creeps in a phase.
+
+    Args:
+        creep: All that does.
+        phase: Its number.
+        ratios: tau (n, d), and that of a friction that is larger by 1.
+        traction_p, traction_s: What changes of pressure and of the state of the heat add to mu, times the pressure.
+    """
+    opened, stays, by_pressure = creep.tangent(phase, ratios[0])
+    by_mu = creep.tangent(phase, ratios[1])[2] - by_pressure
+    return _Creeping(opened, stays, by_mu @ traction_s, by_pressure + by_mu * traction_p)
 
 
 def _heated(

@@ -88,6 +88,7 @@ class Steady:
         wear_per_cycle: Depth worn off both bodies in a cycle (n,), mm.
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
         debris: Thickness of the third body (n,), mm: what a cycle feeds, times its life; None without.
+        crept: Depth that has crept (n,), mm, at the end of a cycle; None where nothing creeps.
         iterations: Newton iterations.
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
@@ -114,6 +115,7 @@ class Steady:
     passes: int = field(default=0, kw_only=True)
     conductances: Array | None = field(default=None, kw_only=True)
     debris: Array | None = field(default=None, kw_only=True)
+    crept: Array | None = field(default=None, kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -237,6 +239,11 @@ def _check_exists(system: Tribosystem) -> None:
             f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "
             "slid, as long as it slides. Follow the wear by `run`"
         )
+    if system.creep is not None and system.creep.endless:
+        raise ConvergenceError(
+            f"no cyclic steady state exists: {system.creep.endless} grows with the logarithm of time, for ever. Follow "
+            "it by `run`, or give it terms alone"
+        )
     if any(law is not None and law.pressure_threshold > 0 for law in system.sliding.wear):
         raise ConvergenceError(
             "no cyclic steady state is solved for with a pressure_threshold: below it any pressure stays. Follow the "
@@ -316,7 +323,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -
     depths: Array = problem.x[len(problem.x) - problem.r :] * problem.wear_scale
     depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
     velocity = depths / problem.lengths
-    middle = slice(motion.positions // 2, None, motion.positions)
+    middle, crept = slice(motion.positions // 2, None, motion.positions), problem.crept(contact.pressure)
     return Steady(
         motion.stroke_directions,
         contact.pressure[middle],
@@ -333,6 +340,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -
         system=system,
         conductances=None if heat is None else solved.conductances,
         debris=system.passing(problem.wear).resting(contact.pressure),
+        crept=None if system.creep is None or crept is None else system.creep.depth(crept),
     )
 
 

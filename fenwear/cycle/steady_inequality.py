@@ -52,6 +52,7 @@ class SteadyInequality:
         self.moment = self.lengths[:, None] * self.p_scale * rigid.pair.weights.sum()
         self.omega = slice(m * n, m * n + n)
         self._slide(system.friction_ratios())
+        self._creep = None if system.creep is None else system.creep.end(system.friction_ratios())
         size = self.equations.size
         self._cold: Array = np.zeros(size)  # what the rows have besides the unknowns, without heat
         for k, own in enumerate(system.interfaces):
@@ -77,7 +78,7 @@ class SteadyInequality:
         modes, pairs = self.system.rigid.rigid_normal / self.lengths, list(zip(interfaces, ratios, strict=True))
         balances = np.array([own.rigid.equilibrium(ratio) for own, ratio in pairs]) * self.p_scale / self.moment
         self.equations: ShapeEquations | SpreadShape
-        linear = self.system.heat is None and self.closure is None
+        linear = self.system.heat is None and self.closure is None and self.system.creep is None
         if linear and (self.n >= LARGE or interfaces[0].rows is not None):
             self.equations = SpreadShape(SpreadPhases(interfaces, ratios, scale), modes, balances)
         else:
@@ -95,7 +96,9 @@ class SteadyInequality:
         self.wear = self.system.wear.phases(conditions)
         self._known = None
         if not self.system.friction.constant:
-            self._slide(self.system.friction_ratios(conditions))
+            ratios = self.system.friction_ratios(conditions)
+            self._slide(ratios)
+            self._creep = None if self.system.creep is None else self.system.creep.end(ratios)
 
     def _residual(self, x: Array) -> Array:
         m, n = self.m, self.n
@@ -133,6 +136,9 @@ class SteadyInequality:
         """
         m, n = self.m, self.n
         self.offset = self._cold
+        if self._creep is not None:
+            thermal = self._creep.gap if thermal is None else thermal + self._creep.gap
+            coupling = self._creep.coupling if coupling is None else coupling + self._creep.coupling
         if thermal is not None:
             self.offset = self._cold.copy()
             self.offset[: m * n] += thermal.ravel() / self.gap_scale
@@ -161,6 +167,10 @@ class SteadyInequality:
         except ConvergenceError as error:  # raised where all ranks know how far it came
             failure = error
         return x, self.inequality.residual, self.inequality.iterations, self.peak_without_cap, failure
+
+    def crept(self, pressure: Array) -> Array | None:
+        """Return the state of what creeps in the end (size,), at pressures (m, n); None where nothing does."""
+        return None if self._creep is None else self._creep.end(pressure)
 
     def _newton(self, x: Array) -> Array:
         """Return the solution from a start; where wear is capped by those of ever harder caps, from none at all.

@@ -110,15 +110,27 @@ class Interface:
 
     def _by_bodies(self, forces: Array) -> Array:
         """Return what the bodies alone answer to forces."""
-        on_punch = _along(self.axes, self.punch.apply(forces))
+        return self.opened(*self.displaced(forces))
+
+    def displaced(self, forces: Array) -> tuple[Array, Array]:
+        """Return what forces on the punch (n, d, ...) and their reactions do to each body at its operator's patterns.
+
+        Displacements of punch and strip (q, a, ...), mm, along the directions of their operators.
+        """
         n, d, *rest = forces.shape
         back = self.pair.placement.back(np.moveaxis(forces, 1, -1).reshape(-1, d)).reshape(n, *rest, d)
         back = np.moveaxis(back, -1, 1)
-        if not self.strip_moves:
-            return on_punch + _along(self._axes_on_strip, self.strip.apply(back))
-        read = self.pair.transfer
-        seen = self.strip.apply((read.T @ back.reshape(n, -1)).reshape(-1, *back.shape[1:]))
-        return on_punch + _along(self._axes_on_strip, (read @ seen.reshape(len(seen), -1)).reshape(n, *seen.shape[1:]))
+        if self.strip_moves:
+            back = (self.pair.transfer.T @ back.reshape(n, -1)).reshape(-1, *back.shape[1:])
+        return self.punch.apply(forces), -self.strip.apply(back)
+
+    def opened(self, on_punch: Array, on_strip: Array) -> Array:
+        """Return the relative displacements (n, a, ...) where the bodies' patterns are displaced as by `displaced`."""
+        seen = on_strip
+        if self.strip_moves:
+            seen = self.pair.transfer @ on_strip.reshape(len(on_strip), -1)
+            seen = seen.reshape(-1, *on_strip.shape[1:])
+        return _along(self.axes, on_punch) - _along(self._axes_on_strip, seen)
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return displacements at some nodes from unit forces along the axes of space at others (rows, a, columns, d).

@@ -25,7 +25,7 @@ from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.results import table_cycle
+from fenwear.results import creep, table_cycle
 from fenwear.results.scar import ScarGeometry, scar_geometry
 from fenwear.results.zone import without_noise
 
@@ -269,6 +269,10 @@ LINES = {
     "depth_per_million_cycles_mm": Line("largest depth per million cycles, last", "µm", 1e3),
     "mean_cross_shear": Line("cross-shear ratio, mean over the work of friction", ""),
     "largest_cross_shear": Line("... largest", ""),
+    "creep_volume_mm3": Line("crept volume, apart from wear", "mm³"),
+    "largest_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
+    "layer_creep_volume_mm3": Line("crept volume of the layer", "mm³"),
+    "largest_layer_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
     **{f"at_{axis}_mm": Line(f"at {words}", "mm") for axis, words in PLACES.items()},
     **{
@@ -329,7 +333,9 @@ def sheet(last: Block) -> dict[str, Any]:
     for body, end in BODIES.items():
         own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
         if own:
-            found[body] = own | _diameters(own) | table_cycle.body_numbers(last, body)
+            own |= _diameters(own) | table_cycle.body_numbers(last, body)
+        if own := own | creep.body_numbers(last, body):
+            found[body] = own
     return found
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fenwear.assembly import Placed, Tribosystem
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
-from fenwear.results import between, place, sheet, steps
+from fenwear.results import between, creep, place, sheet, steps
 from fenwear.results.contacts import CONTACTS, contact_sheets
 from fenwear.results.degrees import degrees_of
 from fenwear.results.scar import conforming
@@ -38,6 +38,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **place.numbers(last),
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
         **between.numbers(last),
+        **creep.numbers(last),
         **steps.numbers(last),
         **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
         **({CONTACTS: contacts} if (contacts := contact_sheets(last)) else {}),

@@ -22,35 +22,39 @@ from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
 
 NOTHING: Array = np.zeros((0, 0))  # between the surfaces
+STIFF: Array = np.zeros(0)  # what bodies have crept that do not creep
 
 
 @dataclass(frozen=True)
 class Worn:
-    """Worn depths, and the state of what lies between the surfaces.
+    """Worn depths, and the states of what lies between the surfaces and of what creeps.
 
     Attributes:
         punch: At the punch's contact nodes (n,), mm.
         strip: At the strip's contact nodes (n_strip,), on its material, mm.
         between: By the rows of `fenwear.layers.Layers` (rows, n); without rows where nothing lies between that changes.
+        crept: Of what creeps (size,), as `fenwear.assembly.creep.Creep` has it; empty where nothing does.
     """
 
     punch: Array
     strip: Array
     between: Array = field(default_factory=lambda: NOTHING)
+    crept: Array = field(default_factory=lambda: STIFF)
 
     def __add__(self, other: Worn) -> Worn:
-        return Worn(self.punch + other.punch, self.strip + other.strip, _added(self.between, other.between))
+        between, crept = _added(self.between, other.between), _added(self.crept, other.crept)
+        return Worn(self.punch + other.punch, self.strip + other.strip, between, crept)
 
     def __sub__(self, other: Worn) -> Worn:
         return self + other.times(-1.0)
 
     def times(self, factor: float) -> Worn:
         """Return all of it times a factor."""
-        return Worn(factor * self.punch, factor * self.strip, factor * self.between)
+        return Worn(factor * self.punch, factor * self.strip, factor * self.between, factor * self.crept)
 
 
 def _added(one: Array, other: Array) -> Array:
-    """Return the sum of the states of what lies between; where one has none it adds nothing."""
+    """Return the sum of states of what lies between or creeps; where one has none it adds nothing."""
     if not len(other):
         return one
     return one + other if len(one) else other

@@ -1,0 +1,297 @@
+"""Creep of the bodies and of what lies between: what the surfaces have crept opens the gap, and grows with pressure.
+
+A body that creeps has a displacement y of its contact surface for each term of its compliance (`bodies.creep`), at the
+patterns of its operator: of a strip that moves as a whole on its material. A layer has one of its nodes. With v_k the
+elastic displacement in phase k of the motion, after that phase
+
+    gap_k = g + (1 + sum of c (1 - e)) v_k + sum of c e y:
+
+contact with compliances that are `grown` by numbers, and a gap that the state opens. Many cycles in one implicit step,
+or cycles that repeat in the end, open each phase by the v_i of all phases: a coupling of the pressures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.assembly.creeping import BODIES, LAYER, CreepingBody, CreepingLayer, Member, both
+from fenwear.assembly.placed import Placed
+from fenwear.bodies.creep import Retardation, RetardedCycle
+from fenwear.bodies.operators import SurfaceOperator
+from fenwear.bodies.scaled import scaled
+from fenwear.interface import Interface
+
+KEPT = 4  # couplings of the last steps
+
+
+@dataclass(frozen=True)
+class Creep:
+    """All that creeps, and its state: of each member in turn its y (terms, size), as one vector.
+
+    Attributes:
+        members: The bodies and the layer that creep.
+        durations: Of the phases of the motion (m,), s.
+        interfaces: What the surfaces answer at once in each phase.
+        moved: Displacement of punch and strip by moved supports alone (q, d), mm.
+        middle: A phase in the middle of a half-cycle.
+    """
+
+    members: tuple[Member, ...]
+    durations: Array
+    interfaces: tuple[Interface, ...]
+    moved: tuple[Array, Array]
+    middle: int = 0
+
+    @cached_property
+    def cycles(self) -> list[RetardedCycle]:
+        """What a cycle does to each member."""
+        return [member.retardation.over(self.durations) for member in self.members]
+
+    @cached_property
+    def _cuts(self) -> list[int]:
+        sizes = [len(member.retardation.times) * member.size for member in self.members]
+        return [int(cut) for cut in np.cumsum(sizes)]
+
+    @property
+    def endless(self) -> str:
+        """The key of what creeps without an end; "" where nothing does."""
+        return next((member.key for member in self.members if member.retardation.endless), "")
+
+    def beginning(self) -> Array:
+        """Return the state at the start: nothing has crept."""
+        return np.zeros(self._cuts[-1])
+
+    def parted(self, crept: Array) -> list[Array]:
+        """Return the y of each member (terms, size) of a state."""
+        parts = np.split(crept, self._cuts[:-1])
+        return [part.reshape(-1, member.size) for part, member in zip(parts, self.members, strict=True)]
+
+    def depth(self, crept: Array) -> Array:
+        """Return the gap that has crept open (n,), mm, in the middle of a half-cycle."""
+        return np.asarray(sum(self.depths(crept).values()))
+
+    def depths(self, crept: Array) -> dict[str, Array]:
+        """Return how far punch, strip and layer have crept (n,), or of states (size, k) each, (n, k), mm, by name."""
+        found = {}
+        for member, part in zip(self.members, np.split(crept, self._cuts[:-1]), strict=True):
+            y = part.reshape(-1, member.size, *crept.shape[1:])
+            found[member.name] = member.opened(self.middle, np.tensordot(member.retardation.compliances, y, 1))
+        return found
+
+    def _each(self, crept: Array) -> list[tuple[Member, Array]]:
+        return list(zip(self.members, self.parted(crept), strict=True))
+
+    @property
+    def _nodes(self) -> int:
+        return len(self.interfaces[0].pair.weights)
+
+    # ------------------------------------------------------------------ one phase after the other
+
+    @cached_property
+    def grown(self) -> tuple[Interface, ...]:
+        """What the surfaces answer in each phase of a march, creep within it and all."""
+        factors = {member.name: cycle.factors for member, cycle in zip(self.members, self.cycles, strict=True)}
+        known: dict[tuple[float, ...], Interface] = {}
+        found = []
+        for phase, own in enumerate(self.interfaces):
+            times = [float(factors[name][phase]) if name in factors else 1.0 for name in (*BODIES, LAYER)]
+            alike = (id(own), *times)
+            if alike not in known:
+                known[alike] = self._scaled(own, times)
+            found.append(known[alike])
+        return tuple(found)
+
+    def _scaled(self, own: Interface, times: Sequence[float]) -> Interface:
+        bodies = zip(both(own), times[:2], self.moved, strict=True)
+        punch, strip = (scaled(body, factor, moved) for body, factor, moved in bodies)
+        layer = None if own.layer is None else times[2] * own.layer
+        return replace(own, punch=punch, strip=strip, layer=layer, like=None)
+
+    def offset(self, phase: int, crept: Array) -> Array:
+        """Return the gap (n,) that a state opens at the end of the phase that it is the beginning of, mm."""
+        return sum(
+            (
+                member.opened(phase, cycle.left[phase] @ y)
+                for (member, y), cycle in zip(self._each(crept), self.cycles, strict=True)
+            ),
+            np.zeros(self._nodes),
+        )
+
+    def change(self, phase: int, crept: Array, pressure: Array, ratio: Array, load: float) -> Array:
+        """Return what a phase adds to the state.
+
+        Args:
+            phase: Its number.
+            crept: State at its start.
+            pressure: (n,), MPa.
+            ratio: tau (n, d).
+            load: Factor of all loads.
+        """
+        found = [
+            cycle.taken[phase][:, None] * (member.displacement(phase, pressure, ratio, load) - y)
+            for (member, y), cycle in zip(self._each(crept), self.cycles, strict=True)
+        ]
+        return np.concatenate([one.ravel() for one in found])
+
+    def tangent(self, phase: int, ratio: Array) -> tuple[Array, Array, Array]:
+        """Return what changes of the state do in a phase.
+
+        Returns:
+            Of the gap by the state (n, state), of the state at its end by that at its start (state,), and by the
+            pressures (state, n).
+        """
+        gaps, stay, by_pressure = [], [], []
+        for member, cycle in zip(self.members, self.cycles, strict=True):
+            opened, matrix = member.opened(phase, np.eye(member.size)), member.matrix(phase, ratio)
+            compliances = member.retardation.compliances
+            for compliance, decay, taken in zip(compliances, cycle.decays[phase], cycle.taken[phase], strict=True):
+                gaps.append(compliance * opened)
+                stay.append(np.full(member.size, decay))
+                by_pressure.append(taken * matrix)
+        return np.concatenate(gaps, axis=1), np.concatenate(stay), np.concatenate(by_pressure)
+
+    # ------------------------------------------------------------------ whole cycles
+
+    def stage(self, crept: Array, cycles: float, ratios: Sequence[Array], load: float) -> CreepStage:
+        """Return what an implicit step of so many cycles from a state does to the contact of all phases.
+
+        Args:
+            crept: State at its start.
+            cycles: Its length.
+            ratios: tau of each phase, (n, d) each.
+            load: Factor of all loads.
+        """
+        shares = [cycle.within(cycles) for cycle in self.cycles]
+        gap = self._by_loads([by for by, _ in shares], ratios, load)
+        for (member, y), (_, by_state) in zip(self._each(crept), shares, strict=True):
+            for phase, own in enumerate(by_state):
+                gap[phase] += member.opened(phase, own @ y)
+        return CreepStage(self, gap, self.coupling([by for by, _ in shares], ratios), crept, cycles, list(ratios), load)
+
+    def end(self, ratios: Sequence[Array]) -> CreepStage:
+        """Return what cycles that repeat do in the end; arguments as of `stage`."""
+        shares = [cycle.repeating for cycle in self.cycles]
+        gap = self._by_loads(shares, ratios, 1.0)
+        return CreepStage(self, gap, self.coupling(shares, ratios), self.beginning(), np.inf, list(ratios), 1.0)
+
+    def lasting(self, pressure: Array, ratios: Sequence[Array], load: float) -> list[Array]:
+        """Return the v_i of each member in all phases (m, size), mm, at pressures (m, n)."""
+        return [
+            np.array([member.displacement(k, p, ratios[k], load) for k, p in enumerate(pressure)])
+            for member in self.members
+        ]
+
+    def _by_loads(self, shares: Sequence[Array], ratios: Sequence[Array], load: float) -> Array:
+        """Return the gap (m, n) that the loads alone creep open."""
+        m = len(self.durations)
+        none = np.zeros((m, self._nodes))
+        gap = np.zeros((m, self._nodes))
+        for member, own, v in zip(self.members, shares, self.lasting(none, ratios, load), strict=True):
+            for phase in range(m):
+                gap[phase] += member.opened(phase, own[phase] @ v)
+        return gap
+
+    @cached_property
+    def _couplings(self) -> list[tuple[list[Array], list[Array], Array]]:
+        return []
+
+    def coupling(self, shares: Sequence[Array], ratios: Sequence[Array]) -> Array:
+        """Return the gaps of each phase by the pressures of each phase (m, n, m, n), mm/MPa; the last ones are kept.
+
+        Args:
+            shares: Of the v_i in each phase (phases, i), of each member.
+            ratios: tau of each phase.
+        """
+        for known_shares, known_ratios, found in self._couplings:
+            if _same(known_ratios, ratios) and _same(known_shares, shares):
+                return found
+        m, n = len(self.durations), self._nodes
+        found = np.zeros((m, n, m, n))
+        for member, own in zip(self.members, shares, strict=True):
+            for i in range(m):
+                answer = member.matrix(i, ratios[i])
+                for phase in range(m):
+                    found[phase, :, i] += own[phase, i] * member.opened(phase, answer)
+        self._couplings.append((list(shares), list(ratios), found))
+        del self._couplings[:-KEPT]
+        return found
+
+
+def _same(one: Sequence[Array], other: Sequence[Array]) -> bool:
+    return all(a is b or np.array_equal(a, b) for a, b in zip(one, other, strict=True))
+
+
+@dataclass(frozen=True)
+class CreepStage:
+    """What creep does to the contact of all phases in one implicit step, or in the end.
+
+    Attributes:
+        creep: All that creeps.
+        gap: That state and loads open (m, n), mm.
+        coupling: Gaps of each phase by the pressures of each phase (m, n, m, n), mm/MPa.
+        crept: State at the start.
+        cycles: Length of the step; infinite for the end.
+        ratios: tau of each phase.
+        load: Factor of all loads.
+    """
+
+    creep: Creep
+    gap: Array
+    coupling: Array
+    crept: Array
+    cycles: float
+    ratios: list[Array]
+    load: float
+
+    def rate(self, pressure: Array) -> Array:
+        """Return what each cycle of the step adds to the state, at pressures (m, n)."""
+        creep, found = self.creep, []
+        displaced = creep.lasting(pressure, self.ratios, self.load)
+        for cycle, y, v in zip(creep.cycles, creep.parted(self.crept), displaced, strict=True):
+            by_v, by_y = cycle.rate(self.cycles)
+            found.append((by_v @ v + by_y[:, None] * y).ravel())
+        return np.concatenate(found)
+
+    def end(self, pressure: Array) -> Array:
+        """Return the state that cycles at pressures (m, n) come to in the end."""
+        displaced = self.creep.lasting(pressure, self.ratios, self.load)
+        return np.concatenate(
+            [(cycle.lasting.T @ v).ravel() for cycle, v in zip(self.creep.cycles, displaced, strict=True)]
+        )
+
+
+def creep_of(
+    placed: Placed,
+    operators: tuple[SurfaceOperator, SurfaceOperator],
+    interfaces: tuple[Interface, ...],
+    on_material: Callable[[int], Interface],
+) -> Creep | None:
+    """Return what creeps; None where nothing does; collective.
+
+    Args:
+        placed: The bodies.
+        operators: How both answer, under the mean of their loads.
+        interfaces: Both joined in each phase.
+        on_material: Returns them joined in a phase with what the strip's own material answers, wherever it is.
+    """
+    bodies, given = (placed.bodies.punch, placed.bodies.strip), getattr(placed.friction.contact.layer, "creep", None)
+    laws = [None if body.creep is None else Retardation.of(body.creep) for body in bodies]
+    if given is None and laws == [None, None]:
+        return None
+    moved = [
+        operator.under(body.with_loads(())).by_load if law is not None and body.moved else 0.0 * operator.by_load
+        for operator, body, law in zip(operators, bodies, laws, strict=True)
+    ]
+    faces = tuple(on_material(phase) for phase in range(len(interfaces)))
+    members: list[Member] = [
+        CreepingBody(which, law, faces, moved[which]) for which, law in enumerate(laws) if law is not None
+    ]
+    if given is not None and placed.layers.winkler is not None:
+        members.append(CreepingLayer(Retardation.of(given), placed.layers.winkler))
+    durations = np.array([phase.duration for phase in placed.motion.phases])
+    return Creep(tuple(members), durations, interfaces, (moved[0], moved[1]), placed.motion.positions // 2)

@@ -1,0 +1,155 @@
+"""Creep at a constant Poisson's ratio: what a body's compliance grows to, without any state in its volume.
+
+Where all of a body creeps alike, its displacement by forces f(t) on its surface is that of an elastic body whose
+compliance has a history (the correspondence principle; E. H. Lee, Q. Appl. Math. 13, 1955, 183),
+
+    u(t) = integral of J(t - s) / J(0) d[G f](s) = v(t) + sum of c_k y_k(t),    tau_k dy_k/dt = v - y_k,    v = G f,
+
+with G the elastic answer and J / J(0) = 1 + sum of c_k (1 - exp(-t / tau_k)). So the memory of the whole body is one
+displacement y_k of its contact surface for each term. Displacements that do not depend on the modulus, of moved
+supports and of thermal expansion, do not creep.
+
+Growth with the logarithm of time is an endless sum of such terms, ln(1 + t / t_0) = integral of
+(1 - exp(-t / tau)) exp(-t_0 / tau) d(ln tau), taken by the trapezoidal rule in ln tau, which errs by exp(-pi^2 / step).
+
+In a march v is constant within each phase of the motion: exactly,
+
+    y -> e y + (1 - e) v,    e = exp(-T / tau),
+
+T its duration. With v that of the end of the phase, creep is implicit, and stable for any duration. The phases of a
+cycle one after the other make y -> E y + sum of g_i v_i of it; the solution after whole cycles of
+
+    dy/dn = X (sum of g_i v_i / (1 - E) - y),    X = -ln E,
+
+which jumps take as its rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.case.creep import Creep
+
+PER_DECADE, FIRST, LAST = 2, -1, 15  # terms of a logarithm's, and the decades around its onset that they reach over
+
+
+@dataclass(frozen=True)
+class Retardation:
+    """J(t) / J(0) = 1 + sum of c_k (1 - exp(-t / tau_k)).
+
+    Attributes:
+        compliances: c (terms,).
+        times: tau (terms,), s.
+        endless: Whether it stands for a growth that has no end.
+    """
+
+    compliances: Array
+    times: Array
+    endless: bool = False
+
+    @classmethod
+    def of(cls, creep: Creep) -> Retardation:
+        """Return what a table of a case describes."""
+        compliances = [term.compliance for term in creep.terms]
+        times = [term.time for term in creep.terms]
+        if creep.per_decade is not None and creep.onset is not None:
+            step = np.log(10) / PER_DECADE
+            decades = np.arange(FIRST * PER_DECADE, LAST * PER_DECADE + 1) / PER_DECADE
+            compliances += list(creep.per_decade / np.log(10) * step * np.exp(-(10.0**-decades)))
+            times += list(creep.onset * 10.0**decades)
+        return cls(np.array(compliances), np.array(times), creep.per_decade is not None)
+
+    def growth(self, time: Array | float) -> Array:
+        """Return J(t) / J(0) at times (...), s."""
+        shares = -np.expm1(-np.asarray(time)[..., None] / self.times)
+        return np.asarray(1 + shares @ self.compliances)
+
+    def over(self, durations: Array) -> RetardedCycle:
+        """Return what a cycle does whose phases last so long (m,), s."""
+        return RetardedCycle(self, np.asarray(durations, dtype=float))
+
+
+@dataclass(frozen=True)
+class RetardedCycle:
+    """A cycle of m phases, in each of which the elastic displacement v is constant.
+
+    Attributes:
+        of: The law, with its c (terms,).
+        durations: Of the phases (m,), s.
+    """
+
+    of: Retardation
+    durations: Array
+
+    @cached_property
+    def decays(self) -> Array:
+        """What is left of y after each phase, e (m, terms)."""
+        return np.asarray(np.exp(-self.durations[:, None] / self.of.times))
+
+    @cached_property
+    def taken(self) -> Array:
+        """Share of v that y takes in each phase, 1 - e (m, terms)."""
+        return np.asarray(-np.expm1(-self.durations[:, None] / self.of.times))
+
+    @cached_property
+    def factors(self) -> Array:
+        """Compliance in each phase, over that of the elastic body (m,): 1 + sum of c (1 - e)."""
+        return 1 + self.taken @ self.of.compliances
+
+    @cached_property
+    def left(self) -> Array:
+        """What each y at the start of a phase opens at its end, c e (m, terms)."""
+        return self.of.compliances * self.decays
+
+    @cached_property
+    def cycles(self) -> Array:
+        """X, the duration of a cycle over tau (terms,)."""
+        return np.asarray(self.durations.sum() / self.of.times)
+
+    @cached_property
+    def _kept(self) -> Array:
+        """What is left of the y at the start of a cycle after each phase (m, terms)."""
+        return np.asarray(np.exp(-np.cumsum(self.durations)[:, None] / self.of.times))
+
+    @cached_property
+    def _given(self) -> Array:
+        """What each v_i has given to y after each phase (phases, i, terms); no more than those before have."""
+        ends = np.cumsum(self.durations)
+        since = ends[:, None] - ends
+        later = np.exp(-np.maximum(since, 0.0)[:, :, None] / self.of.times)
+        return np.where((since >= 0)[:, :, None], later * self.taken, 0.0)
+
+    @cached_property
+    def lasting(self) -> Array:
+        """Shares of the v_i in what y comes to at the end of cycles that repeat, g / (1 - E) (i, terms)."""
+        return self._given[-1] / -np.expm1(-self.cycles)
+
+    @cached_property
+    def repeating(self) -> Array:
+        """What each v_i adds by creep after each phase of cycles that repeat, in the end (phases, i)."""
+        found = self._kept[:, None] * self.lasting + self._given
+        return np.asarray(found @ self.of.compliances)
+
+    def within(self, cycles: float) -> tuple[Array, Array]:
+        """Return what adds by creep after each phase of the cycle whose middle an implicit step of so many ends in.
+
+        The cycle begins by half of its change before.
+
+        Returns:
+            Of each v_i (phases, i), and of each y at the start of the step (phases, terms).
+        """
+        x = self.cycles
+        before = (1 + x / 2) / (1 + cycles * x)
+        begun = self._kept * before
+        by_lasting = self._kept * (1 - before)
+        found = by_lasting[:, None] * self.lasting + self._given
+        return np.asarray(found @ self.of.compliances), self.of.compliances * begun
+
+    def rate(self, cycles: float) -> tuple[Array, Array]:
+        """Return what y changes by in each cycle of such a step: of each v_i (terms, i), and of y itself (terms,)."""
+        share = self.cycles / (1 + cycles * self.cycles)
+        return np.asarray((share * self.lasting).T), -share

@@ -21,10 +21,12 @@ from scipy.sparse import csr_array
 
 from fenwear.arrays import Array, Nodes
 from fenwear.bodies import kept
+from fenwear.bodies.assembly import transposed_times
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.factor import entries, make_together, solve_together
 from fenwear.bodies.response import Request, respond_together
 from fenwear.bodies.substructure import make_substructures
+from fenwear.parallel import total
 
 LARGE = 2**26  # entries of a factor, half a GiB, above which it is not kept beside what prepares the heat
 
@@ -168,9 +170,9 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
         one.elastic.leave_factor_to_owner()
     loads = _under_loads([one.elastic for one in requests])
     condensed = []
-    for one, (response, by_temperature), load in zip(requests, found, loads, strict=True):
+    for one, (response, warm), load in zip(requests, found, loads, strict=True):
         q, d, along = one.patterns.shape[1], one.elastic.dim, one.along
-        answers: Array = response.reshape(q, d, -1, along.shape[2])
+        answers, by_temperature = _guided(one, response.reshape(q, d, -1, along.shape[2]), warm)
         if one.kept is None:
             answers = _symmetric(answers, along)
         by_load = one.patterns.T @ load
@@ -178,6 +180,23 @@ def _condensed(requests: Sequence[Request]) -> list[CondensedBody]:
         if by_temperature is not None and entries(one.elastic.size, d) > LARGE:
             one.elastic.free_factor()
     return condensed
+
+
+def _guided(one: Request, response: Array, by_temperature: Array | None) -> tuple[Array, Array | None]:
+    """Return the response (q, d, k, a) and that to temperature of a body whose guides hold it; collective."""
+    answer = one.elastic.guide_answer
+    if answer is None:
+        return response, by_temperature
+    rotations, moved = (one.seen(fields) for fields in (answer.rotations_there, answer.moved_there))
+    along = one.along if one.kept is None else one.along[one.kept]
+    of_columns = slice(None) if one.kept is None else one.kept
+    couple, work = (np.einsum("kdg,kda->gka", seen[of_columns], along) for seen in (rotations, moved))
+    flat = [each.reshape(len(each), -1) for each in (couple, work)]
+    response = response + answer.change(rotations, moved, flat[0], flat[1]).reshape(response.shape)
+    if by_temperature is not None and one.thermal_coupling is not None:
+        warmed = np.array([transposed_times(one.thermal_coupling, field) for field in answer.moved.T])
+        by_temperature = by_temperature - np.einsum("kdg,kda,gT->kaT", rotations, one.along, warmed)[:, 0]
+    return response, by_temperature
 
 
 def _eliminate(requests: Sequence[Request]) -> None:
@@ -232,4 +251,9 @@ def _under_loads(bodies: Sequence[ElasticBody]) -> list[Array]:
             by_factor, solve_together([bodies[number].factor for number in by_factor], loads), strict=True
         ):
             found[number] = bodies[number].trace.pick(solution[:, None])[:, :, 0]
+    for number, body in enumerate(bodies):
+        answer = body.guide_answer
+        if answer is not None:
+            work = total(body.body.mesh.comm, answer.moved.T @ body.load)
+            found[number] += answer.change(answer.rotations_there, answer.moved_there, body.guided_resultant, work)
     return [found[number] for number in range(len(bodies))]

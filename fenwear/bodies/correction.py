@@ -43,6 +43,7 @@ from fenwear.bodies.assembly import assembled_vector, compiled, interpolate, tim
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.guides import GuideAnswer
 from fenwear.bodies.material import Isotropic, measure, strain_of
 from fenwear.parallel import total
 
@@ -131,12 +132,18 @@ class Correction:
         fields: Displacement of this rank's own degrees of freedom from unit forces at each point along each direction
             (owned, m, a), mm: what loads do on them they do to the contact.
         uneven: How much of the response was not symmetric, over its largest.
+        moments: Of the tractions that unit forces at the points leave on the body, about what guides hold (m, d, g): of
+            the forces themselves, but for quadrature.
+        guided: What the body answers to its guides, their rotations and what their couples move at the points
+            (m, d, g); None without.
     """
 
     counts: tuple[int, ...]
     response: Array
     fields: Array
     uneven: float
+    moments: Array
+    guided: tuple[GuideAnswer, Array, Array] | None = None
 
 
 def chebyshev_points(count: int, low: float, high: float) -> Array:
@@ -197,7 +204,8 @@ def correct(elastic: ElasticBody, ground: Ground, counts: tuple[int, ...], along
     found = found + np.einsum("iajb,bd->iajd", change, along)
     fields = moved.reshape(size, m, -1) + np.einsum("smd,ad->sma", own, along)
     uneven = float(2 * np.abs(rest).max() / max(np.abs(part).max(), 1e-300))
-    return Correction(counts, found, fields, uneven)
+    moments = np.moveaxis(elastic.couple_of(every).reshape(-1, m, d), 0, 2)
+    return Correction(counts, found, fields, uneven, moments)
 
 
 def _loads(elastic: ElasticBody, ground: Ground, points: Array) -> Array:

@@ -22,6 +22,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector, compiled
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
 from fenwear.bodies.factor import Factor, make_together
+from fenwear.bodies.guides import GuideAnswer, make_guides
 from fenwear.bodies.low_rank import LowRank
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
 from fenwear.bodies.mesh import BodyMesh
@@ -42,7 +43,8 @@ class ElasticBody:
     """One body: K u = f + C p, with rigid modes R where the supports leave some.
 
     K is made regular by a few further supports; they carry nothing as long as the equilibrium
-    R^T (f + C p) = 0 holds, and the displacement is u + R a.
+    R^T (f + C p) = 0 holds, and the displacement is u + R a. Where guides hold the body against turning their couples
+    hold that rotation in equilibrium (`guides`), and the displacement is what `held` makes of it.
 
     Attributes:
         space: Vector Lagrange space on Gauss-Lobatto nodes, mm.
@@ -51,6 +53,8 @@ class ElasticBody:
         rigid_modes: Columns of R; the displacement of each for a unit velocity.
         rigid_resultant: R^T f, shape (modes,): N/mm, and N for the rotation.
         mode_names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it).
+        guides: Rotations that guides hold, and their couples; None without.
+        guided_resultant: The loads' moments about them (g,).
         imposed: The displacements that supports prescribe, mm; zero elsewhere.
         given: Resultant of the loads (d,), N.
         acting: Sum of the loads' sizes, N: of a moment, whose resultant is none, too.
@@ -110,8 +114,10 @@ class ElasticBody:
             self._ufl, self._form = a, compiled(a)
         except (ArityMismatch, ValueError):  # UFL stumbles over some of its own messages
             raise CaseError(InputError(f"{body.name}.stress", "expected a stress that is linear in grad u")) from None
+        self.guides = make_guides(self.space, measure(mesh, law.kind), held.guided) if held.guided else None
         self._set_loads(description.loads)
         # None or one of each, of all bodies that differ by their loads.
+        self._answers: list[GuideAnswer] = []
         self._factors: list[Factor] = []
         self._substructures: list[Substructures] = []
 
@@ -119,6 +125,7 @@ class ElasticBody:
         comm, load = self.body.mesh.comm, self._assemble_load(loads)
         resultant = np.array([mode @ load for mode in self.rigid_modes])
         self.rigid_resultant = total(comm, resultant)
+        self.guided_resultant = self.couple_of(load[:, None])[:, 0]
         onto = [load.reshape(-1, self.dim).sum(axis=0), np.zeros(self.dim)]
         np.add.at(onto[1], self.supported % self.dim, load[self.supported])
         self.given, self.swallowed = (self.thickness * total(comm, part) for part in onto)
@@ -216,11 +223,46 @@ class ElasticBody:
         values = [constant.value for constant in form.constants()]
         values += [function.x.array for function in form.coefficients()]
         nodes = [mesh.geometry.x, compat.geometry_dofmap(mesh), self.space.dofmap.list]
-        return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs]
+        guided = [] if self.guides is None else [self.guides.couples, self.guided_resultant]
+        return [form.signature(), *values, *nodes, self.supported, self.load, self.surface_dofs, *guided]
 
     def solve(self, right: Array) -> Array:
         """Return K^-1 times right-hand sides on the owned degrees of freedom, (owned,) or (owned, k); collective."""
         return (self.substructures or self.factor).solve(right)
+
+    def couple_of(self, forces: Array) -> Array:
+        """Return the moments about what guides hold (g, k) of forces (owned, k), those on supports too; collective."""
+        if self.guides is None:
+            return np.zeros((0, forces.shape[1]))
+        return total(self.body.mesh.comm, self.guides.rotations.T @ forces)
+
+    @property
+    def guide_answer(self) -> GuideAnswer | None:
+        """What the body answers to its guides, solved for once; None without; collective at first use."""
+        if self.guides is None:
+            return None
+        if not self._answers:
+            guides, comm = self.guides, self.body.mesh.comm
+            right = guides.couples.copy()
+            right[self.supported] = 0.0
+            moved = self.solve(right)
+            there = [self.trace.pick(fields) for fields in (guides.rotations, moved)]
+            self._answers.append(GuideAnswer(guides, moved, total(comm, right.T @ moved), *there))
+        return self._answers[0]
+
+    def held(self, displacement: Array, forces: Array, couple: Array) -> Array:
+        """Return displacements (owned, k), K^-1 of forces (owned, k), as guides hold them; collective.
+
+        Args:
+            displacement: Without guides.
+            forces: Zero where supported.
+            couple: Their moments about what guides hold (g, k), with those on supports.
+        """
+        answer = self.guide_answer
+        if answer is None:
+            return displacement
+        work = total(self.body.mesh.comm, answer.moved.T @ forces)
+        return displacement + answer.change(answer.guides.rotations, answer.moved, couple, work)
 
     @property
     def substructures(self) -> Substructures | None:

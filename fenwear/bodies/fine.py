@@ -22,6 +22,7 @@ from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.correction import Correction, Ground, below, cell_constants, coefficients, correct, interpolation
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.guides import GuideAnswer
 from fenwear.bodies.half_space import HalfSpace, extent_along
 from fenwear.bodies.material import Isotropic
 from fenwear.bodies.response import Request
@@ -118,8 +119,13 @@ class FineBody:
 
 def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Array:
     """Return what the loads of a body do to the points of its correction (m, d) by directions (d, a); collective."""
-    own = np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64)
-    return np.asarray(total(elastic.body.mesh.comm, own) @ along.T)
+    comm = elastic.body.mesh.comm
+    own = total(comm, np.asarray(np.tensordot(elastic.load, correction.fields, 1), dtype=np.float64))
+    if correction.guided is not None:
+        answer, rotations, moved = correction.guided
+        work = total(comm, answer.moved.T @ elastic.load)
+        own = own + answer.change(rotations, moved, elastic.guided_resultant, work) @ along
+    return np.asarray(own @ along.T)
 
 
 def at_nodes(correction: Correction, grid: RegularGrid, x: Array) -> Array:
@@ -164,9 +170,45 @@ def fine(request: Request) -> FineBody:
     )
     correction, unresolved = _resolved(elastic, ground, half.directions[0].T, key)
     weights = at_nodes(correction, grid, x)
+    correction = replace(correction, guided=_guided(request, correction.moments, weights))
     loaded = by_loads(elastic, correction, half.directions[0])
+    correction = _held(correction, half.directions[0])
     elastic.free_factor()
     return FineBody(half, grid, correction, weights, unresolved, loaded)
+
+
+def _guided(request: Request, moments: Array, weights: Array) -> tuple[GuideAnswer, Array, Array] | None:
+    """Return what a body answers to its guides, and rotations and displacements by couples at points; collective.
+
+    The correction is of supports at points, about which couples turn the body far: what turns goes by the moments that
+    the correction has, and the rest of what couples move by polynomials through the nodes.
+
+    Args:
+        request: Of the body.
+        moments: Of unit forces at points about what guides hold (m, d, g).
+        weights: Values at the points to the nodes (q, m).
+
+    Returns:
+        Of the whole body, and (m, d, g) of each at the points.
+    """
+    elastic = request.elastic
+    answer = elastic.guide_answer
+    if answer is None:
+        return None
+    bent = answer.moved_there - answer.rotations_there @ answer.turning
+    seen = request.seen(elastic.on_surface(bent))
+    fit, *_ = np.linalg.lstsq(weights, seen.reshape(len(seen), -1))
+    return answer, moments, fit.reshape(moments.shape) + moments @ answer.turning
+
+
+def _held(correction: Correction, along: Array) -> Correction:
+    """Return a correction with what guides hold, for displacements asked along directions (d, a)."""
+    if correction.guided is None:
+        return correction
+    answer, rotations, moved = correction.guided
+    couple, work = (fields.reshape(-1, fields.shape[2]).T for fields in (rotations, moved))
+    change = answer.change(rotations, moved, couple, work).reshape(*rotations.shape[:2], *rotations.shape[:2])
+    return replace(correction, response=correction.response + np.einsum("da,idjk->iajk", along, change))
 
 
 def _resolved(elastic: ElasticBody, ground: Ground, along: Array, key: str) -> tuple[Correction, float]:

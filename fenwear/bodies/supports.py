@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from fenwear import compat
 from fenwear.arrays import Mask
 from fenwear.bodies.contact_surface import ContactSurface, Trace
+from fenwear.bodies.guides import Guided
 from fenwear.bodies.mesh import ENTITIES, BodyMesh
 from fenwear.bodies.parts import connected_parts, part_boxes
 from fenwear.case import Body, Kind, Support
@@ -21,7 +22,6 @@ from fenwear.errors import CaseError, InputError
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
 SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about {0}: hold it against turning"
-HOLLOW, BACK = 0.5, 0.9  # least over largest distance of a contact from its middle, and how little its front counts
 WRAPPED = 0.5  # component of normals, both ways, from which on a contact holds a body along that axis
 PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
 RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
@@ -52,6 +52,7 @@ class Supports:
         names: "lambda_F" (translation along z at the pivot) and "lambda_M" (rotation about it); "lambda_Fx" and
             "lambda_Fy" where the contact wraps around the body or is wrapped by it; of a body of several parts that
             share no node with the name of the part's contact, as "lambda_F_left", or its number, as "lambda_F_2".
+        guided: What guides hold of each part that has any.
     """
 
     def __init__(self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: Trace) -> None:
@@ -74,6 +75,7 @@ class Supports:
         self.pivot = self._pivots[0]
         self.imposed = fem.Function(space)
         own = [*self._described(description.supports), *self._on_axis()]
+        self.guided: list[Guided] = []
         self.modes, self.names, self._loose = self._free_modes(self._owned(own), description.no_turning_about)
         self.conditions = own + self._regularise()
         self.held = self._owned(self.conditions)
@@ -235,9 +237,13 @@ class Supports:
         rows = basis[held]
         gram = comm.allreduce(rows.T @ rows)
         scale = np.where(np.array(columns) < self.dim, 1.0, 1.0 / self._size())
-        loose = _null_space(gram * np.outer(scale, scale)) * scale[:, None]
+        loose = _null_space(gram * np.outer(scale, scale))
         by_guides = np.diag(np.isin(columns, turns).astype(float))
-        free = _null_space(gram * np.outer(scale, scale) + by_guides) * scale[:, None]
+        free = _null_space(gram * np.outer(scale, scale) + by_guides)
+        taken = loose @ _null_space((loose.T @ free) @ (free.T @ loose))
+        if taken.shape[1]:
+            self.guided.append(Guided(basis, [columns.index(turn) for turn in turns], scale[:, None] * taken))
+        loose, free = scale[:, None] * loose, scale[:, None] * free
         if free.shape[1] and len(names) == len(RIGID_MODES[self.kind][0]):
             _check_facing(self._trace.surface, normal)
         # A basis in which lambda_F is the velocity along z at the pivot and each lambda_M a rotation.
@@ -272,24 +278,13 @@ class Supports:
     def _remoteness(self) -> NDArray[np.float64]:
         """Return how far each owned node is from the contact's middle (owned,); collective.
 
-        No two are as far, even in a symmetric body: a millionth of it depends on the side. Where the contact goes
-        around its middle, as in a bore, what lies on its side away from the other body counts: guides act through these
-        nodes, and what they press must not dent the contact.
+        No two are as far, even in a symmetric body: a millionth of it depends on the side.
         """
         owned, comm = self.space.dofmap.index_map.size_local, self.body.mesh.comm
         x, contact = self.space.tabulate_dof_coordinates()[:owned], self.contact
         middle = comm.allreduce(x[contact].sum(axis=0)) / comm.allreduce(len(contact))
         away = (x - middle) / self._size()
-        far = np.linalg.norm(away, axis=1)
-        nearest = comm.allreduce(far[contact].min(initial=np.inf), MPI.MIN)
-        if nearest > HOLLOW * comm.allreduce(far[contact].max(initial=0.0), MPI.MAX):
-            up, surface = away[:, self.dim - 1] / np.maximum(far, 1e-300), self._trace.surface
-            bore = np.einsum("ic,ic->", surface.x - middle[: self.dim], surface.outward) < 0
-            back = (
-                -1.0 if bore == (self.body.name == "punch") else 1.0
-            )  # the punch is above: its bore touches at the top
-            far *= 1 - BACK * (1 - back * up) / 2
-        return np.asarray(far * (1 + 1e-6 * away @ (1.0, 0.7, 0.4)))
+        return np.asarray(np.linalg.norm(away, axis=1) * (1 + 1e-6 * away @ (1.0, 0.7, 0.4)))
 
     def _regularise(self) -> list[fem.DirichletBC]:
         """Return one further support for each rigid mode, at the nodes farthest from the contact; collective.
@@ -350,7 +345,7 @@ def _turn_around(outward: NDArray[np.float64], names: dict[int, str], forbidden:
 def _null_space(gram: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the vectors that a symmetric matrix takes to nothing (columns)."""
     eigenvalues, vectors = np.linalg.eigh(gram)
-    return np.asarray(vectors[:, eigenvalues <= 1e-12 * max(eigenvalues.max(), 1.0)])
+    return np.asarray(vectors[:, eigenvalues <= 1e-12 * eigenvalues.max(initial=1.0)])
 
 
 def _check_facing(surface: ContactSurface, outward: NDArray[np.float64]) -> None:

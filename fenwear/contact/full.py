@@ -6,6 +6,9 @@ change of the active set factors the whole system again.
     K_1 u_1 - C_1 p = f_1,    K_2 u_2 + C_2 p = f_2,
     gap = N_1 u_1 - N_2 u_2 + H a + g >= 0,    p >= 0,    p gap = 0,
     sum of w_i p_i (e_n + tau)_i . m_i + F = 0.
+
+Where guides hold a body against turning by couples B y (`bodies/guides`) these and the rotations s are unknowns, too:
+K_1 u_1 + B_1 y - C_1 p = f_1, the gap opens by N_1 R_1 s, y = R_1^T (C_1 p + f_1) and s = -B_1^T u_1.
 """
 
 from __future__ import annotations
@@ -20,7 +23,8 @@ from fenwear.arrays import Array
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.contact.condensed import ContactState, WearCompliance
 from fenwear.contact.inequality import check, configure
-from fenwear.interface import Interface
+from fenwear.interface import Interface, RigidEquilibrium
+from fenwear.interface.equilibrium import guided_equilibrium
 from fenwear.parallel import lasting
 
 # Where a step is cut off at p = 0 the gap, a function of u alone, is still zero up to rounding of either sign: this
@@ -42,7 +46,8 @@ class FullContact:
         self._pressure_scale = rigid.mean_pressure
         self._gap_scale = self._pressure_scale * interface.elastic_length
         self._force_scale = self._pressure_scale * float(pair.weights.sum())
-        n, modes = len(pair.weights), len(rigid.resultant)
+        guided = guided_equilibrium(pair, punch, strip)
+        n, modes, guides = len(pair.weights), len(rigid.resultant), len(guided.resultant)
         self._size = (n, modes)
 
         traction = (pair.normal + friction_ratio) * pair.weights[:, None]
@@ -56,6 +61,8 @@ class FullContact:
         if modes:
             rows = [[*rows[0], None], [*rows[1], None], [*rows[2], self._rank0_matrix(rigid.rigid_normal)]]
             rows.append([None, None, self._rank0_matrix(rigid.equilibrium(friction_ratio)), None])
+        if guides:
+            rows = self._with_guides(rows, guided, friction_ratio, (punch, strip))
         nest = PETSc.Mat().createNest(rows, comm=self.comm)
         self._operator = nest.convert("aij" if self.comm.size == 1 else "mpiaij")
         self._offset = self._operator.createVecLeft()
@@ -67,12 +74,34 @@ class FullContact:
         self._constant[: sizes[0]] = -punch.load / self._force_scale
         self._constant[sizes[0] : self._free] = -strip.load / self._force_scale
         if self.comm.rank == 0:
-            self._constant[self._free + n :] = rigid.resultant / self._force_scale
+            after = self._free + n
+            self._constant[after : after + modes] = rigid.resultant / self._force_scale
+            self._constant[after + modes : after + modes + guides] = guided.resultant / self._force_scale
         self._build_snes()
+
+    def _with_guides(
+        self,
+        rows: list[list[PETSc.Mat | None]],
+        guided: RigidEquilibrium,
+        friction_ratio: Array,
+        bodies: tuple[ElasticBody, ElasticBody],
+    ) -> list[list[PETSc.Mat | None]]:
+        """Return the rows with those of couples and rotations of guides, and their columns; collective."""
+        count, blocks = len(guided.resultant), len(rows)
+        unit = np.eye(count)
+        couples = [_couples(body, guided, k == 0) for k, body in enumerate(bodies)]
+        opened = self._rank0_matrix(guided.rigid_normal)
+        beside = [[couples[0], None], [couples[1], None], [None, opened], [None, None]]
+        rows = [[*row, *more] for row, more in zip(rows, beside, strict=False)]
+        moment = self._rank0_matrix(guided.equilibrium(friction_ratio))
+        rows.append([None, None, moment, *[None] * (blocks - 3), self._rank0_matrix(-unit), None])
+        turned = [one.copy().transpose() for one in couples]
+        rows.append([*turned, *[None] * (blocks - 1), self._rank0_matrix(unit)])
+        return rows
 
     def _scale_system(self) -> None:
         """Divide rows and unknowns by their scales, so that PETSc's tolerances fit every case."""
-        n, _ = self._size
+        n, modes = self._size
         left, right = self._operator.createVecLeft(), self._operator.createVecRight()
         right.array[: self._free] = self._gap_scale
         right.array[self._free :] = self._pressure_scale
@@ -80,6 +109,10 @@ class FullContact:
         left.array[: self._free] = 1 / self._force_scale
         left.array[self._free :] = 1 / self._gap_scale
         left.array[self._free + n :] = 1 / self._force_scale
+        last = self._free + n + modes
+        guides = (len(left.array) - last) // 2  # couples, then rotations
+        right.array[last : last + guides] = self._force_scale
+        left.array[last + guides :] = 1 / self._gap_scale
         self._right = right
         self._operator.diagonalScale(left, right)
 
@@ -126,7 +159,7 @@ class FullContact:
         """
         if wearing is not None or coupling is not None:
             raise NotImplementedError("the full inequality has no wear of the step and no coupling")
-        n, _ = self._size
+        n, modes = self._size
         contact = slice(self._free, self._free + n)
         self._offset.array[:] = self._constant
         if self.comm.rank == 0:
@@ -139,7 +172,7 @@ class FullContact:
         values = self._x.array_r[self._free :] * self._right.array_r[self._free :]
         gaps = self.snes.getFunction()[0].array_r[contact] * self._gap_scale
         values, gaps = self.comm.bcast((values, gaps))
-        return ContactState(values[None, :n], gaps[None], values[None, n:], self.snes.getIterationNumber())
+        return ContactState(values[None, :n], gaps[None], values[None, n : n + modes], self.snes.getIterationNumber())
 
     def _rank0_matrix(self, values: Array) -> PETSc.Mat:
         """Return a sparse matrix whose rows and columns all belong to rank 0."""
@@ -178,6 +211,21 @@ def _forces(elastic: ElasticBody, patterns: csr_array, traction: Array) -> PETSc
     sizes = (elastic.stiffness.getSizes()[0], (shape[1] if comm.rank == 0 else 0, shape[1]))
     csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
     matrix = PETSc.Mat().createAIJ(sizes, csr=csr, comm=comm)
+    matrix.assemble()
+    return matrix
+
+
+def _couples(elastic: ElasticBody, guided: RigidEquilibrium, of_punch: bool) -> PETSc.Mat:
+    """Return B (dofs, g) of one body among the guides of both, zero where supported; collective."""
+    comm, count = lasting(elastic.body.mesh.comm), len(guided.resultant)
+    size = elastic.stiffness.getSizes()[0]
+    values = np.zeros((size[0], count))
+    if elastic.guides is not None:
+        values[:, slice(guided.of_punch) if of_punch else slice(guided.of_punch, None)] = elastic.guides.couples
+    values[elastic.supported] = 0.0
+    local = csr_array(values)
+    csr = (local.indptr.astype(PETSc.IntType), local.indices.astype(PETSc.IntType), local.data)
+    matrix = PETSc.Mat().createAIJ((size, (count if comm.rank == 0 else 0, count)), csr=csr, comm=comm)
     matrix.assemble()
     return matrix
 

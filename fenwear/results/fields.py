@@ -138,7 +138,9 @@ def _solve(
     """Return one body's fields under forces on its contact surface's trace nodes (N, 3), N/mm; collective."""
     force, dim = elastic.load.copy(), elastic.dim
     load = elastic.on_trace(load)
-    force += elastic.trace.place(in_model(load, dim)[:, :, None])[:, 0]
+    on_surface = elastic.trace.place(in_model(load, dim)[:, :, None])
+    couple = elastic.guided_resultant[:, None] + elastic.couple_of(on_surface)
+    force += on_surface[:, 0]
     force[elastic.supported] = 0.0
     theta = change = None
     if heat is not None and temperature is not None:
@@ -149,7 +151,8 @@ def _solve(
         coupling.destroy()
     displacement = fem.Function(elastic.space, name="displacement")
     owned = dim * elastic.space.dofmap.index_map.size_local
-    displacement.x.array[:owned] = elastic.solve(force) + elastic.imposed.x.array[:owned]
+    solved = elastic.held(elastic.solve(force)[:, None], force[:, None], couple)[:, 0]
+    displacement.x.array[:owned] = solved + elastic.imposed.x.array[:owned]
     for mode, amplitude in zip(elastic.rigid_modes, rigid, strict=True):
         displacement.x.array[:owned] += amplitude * mode
     displacement.x.scatter_forward()

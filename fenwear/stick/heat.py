@@ -302,4 +302,6 @@ def free_expansion(elastic: ElasticBody, body: HeatBody, fields: Array) -> Array
         forces.append(force.array.copy())
     for one in (coupling, theta, force):
         one.destroy()
-    return elastic.trace.pick(elastic.solve(np.stack(forces, axis=1)))
+    right = np.stack(forces, axis=1)
+    none = np.zeros((0 if elastic.guides is None else elastic.guides.rotations.shape[1], right.shape[1]))
+    return elastic.trace.pick(elastic.held(elastic.solve(right), right, none))  # expansion turns nothing

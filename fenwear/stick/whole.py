@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.sparse import block_array, block_diag, coo_array, csr_array, diags_array
@@ -15,13 +15,18 @@ from fenwear.bodies.elasticity import ElasticBody
 if TYPE_CHECKING:
     from fenwear.stick.interface import Position
 
+GUIDES = ("rotations", "couples")
+
 
 @dataclass(frozen=True)
 class WholeBodies:
     """Both stiffnesses, and where the contact nodes of a position see and push the bodies; on rank 0, else empty.
 
+    Couples y and rotations s of guides (`fenwear.bodies.guides`) are further unknowns after the displacements:
+    K u + B y, y = R^T of what is pushed, s = -B^T u, and what is seen is that of u + R s.
+
     Attributes:
-        stiffness: K of both (N, N), with ones for what is held.
+        stiffness: K of both (N, N), with ones for what is held; N with the guides' unknowns.
         seen: J_1 and -J_2: the gap and the tangential displacements that displacements make (d n, N).
         pushed: What tractions add to the nodal forces (N, d n), N/mm or N.
         trace: Of the contact nodes of the punch, and of what the strip was condensed onto, each (k d, N).
@@ -51,7 +56,7 @@ def whole_bodies(bodies: Bodies, position: Position, *, moves: bool) -> WholeBod
         for body, share, ways in zip(both, shares, frames, strict=True)
     ]
     free = diags_array(np.concatenate([_free(body) for body in both]))
-    seen = block_array([[read[0], -read[1]]], format="csr")
+    seen = csr_array(block_array([[read[0], -read[1]]]))
     axes = [np.eye(d)[k] for k in range(d)]
     strip_share = csr_array(diags_array(np.ones(len(pair.strip.trace)))) if moves else shares[1]
     traces = [
@@ -59,15 +64,40 @@ def whole_bodies(bodies: Bodies, position: Position, *, moves: bool) -> WholeBod
         for body, share in zip(both, (shares[0], strip_share), strict=True)
     ]
     none = [csr_array((trace.shape[0], size)) for trace, size in zip(traces, reversed(sizes), strict=True)]
-    return WholeBodies(
+    found = WholeBodies(
         csr_array(block_diag([_gathered(body) for body in both])),
-        csr_array(seen),
+        seen,
         csr_array(free @ seen.T @ diags_array(position.weights)),
         (
             csr_array(block_array([[traces[0], none[0]]])),
             csr_array(block_array([[none[1], traces[1]]])),
         ),
     )
+    return found if all(body.guides is None for body in both) else _guided(found, both, free, position.weights)
+
+
+def _guided(whole: WholeBodies, both: tuple[ElasticBody, ElasticBody], free: Any, weights: Array) -> WholeBodies:
+    """Return both bodies with couples and rotations of their guides as further unknowns; collective."""
+    rotations, couples = (csr_array(block_diag([_whole(body, name) for body in both])) for name in GUIDES)
+    count, held = rotations.shape[1], free @ couples
+    unit, none = csr_array(np.eye(count)), csr_array((count, len(weights)))
+
+    def shown(part: csr_array) -> csr_array:
+        return csr_array(block_array([[part, csr_array((part.shape[0], count)), part @ rotations]]))
+
+    moments = rotations.T @ whole.seen.T @ diags_array(weights)
+    return WholeBodies(
+        csr_array(block_array([[whole.stiffness, held, None], [None, unit, None], [held.T, None, unit]])),
+        shown(whole.seen),
+        csr_array(block_array([[whole.pushed], [moments], [none]])),
+        (shown(whole.trace[0]), shown(whole.trace[1])),
+    )
+
+
+def _whole(body: ElasticBody, name: str) -> csr_array:
+    """Return rotations or couples of guides on all degrees of freedom of a body (N, g), on every rank; collective."""
+    own = np.zeros((body.stiffness.getLocalSize()[0], 0)) if body.guides is None else getattr(body.guides, name)
+    return csr_array(np.concatenate(body.body.mesh.comm.allgather(own)))
 
 
 def _gathered(body: ElasticBody) -> csr_array:

@@ -196,6 +196,28 @@ def test_as_the_condensed_body() -> None:
     assert error.max() < 0.005, error
 
 
+def test_a_guided_body() -> None:
+    """A punch that guides hold against turning: by the same couples as its mesh, under forces that would tilt it."""
+    case = layer(12, 1, grid={"nodes": 17, "size": [2.4, 2.4]})
+    case.geometry.parameters["punch_height"] = 4.0
+    case.geometry.parameters["punch_layers"] = 6
+    body = build_bodies(case).punch
+    found = fine(Request(body, identity(len(body.surface.x))))
+    assert body.guides is not None
+    x = body.surface.x
+    bump = np.maximum(1 - ((x[:, 0] - 0.3) ** 2 + x[:, 1] ** 2) / 0.8, 0) ** 2 * body.surface.weights
+    at = ufl.SpatialCoordinate(body.body.mesh)
+    dome = ufl.max_value(1 - ((at[0] - 0.3) ** 2 + at[1] ** 2) / 0.8, 0) ** 2
+    tag = body.body.curves["punch_contact"]
+    on_mesh = np.stack([body.surface_integral(dome * ufl.as_vector(e), tag) for e in np.eye(3)], axis=1)
+    couple = body.couple_of(on_mesh)
+    on_mesh[body.supported] = 0.0
+    theirs = body.on_surface(body.trace.pick(body.held(body.solve(on_mesh), on_mesh, couple)))
+    ours = found.apply(bump[:, None, None] * np.eye(3))
+    error = np.abs(ours - theirs).max(axis=(0, 1)) / np.abs(theirs).max(axis=(0, 1))
+    assert error.max() < 0.04, error  # of its mesh: 0.5 % on one twice as fine
+
+
 @pytest.mark.mpi
 def test_ball_on_flat_is_the_contact_of_hertz() -> None:
     """Row 19's like: pressures node by node, falling with the spacing, on meshes with four elements at the contact."""

@@ -340,7 +340,8 @@ class _Run:
         stroke = (half_cycle - 1) % motion.half_cycles
         phase = stroke * motion.positions + motion.positions // 2
         pressed = at_loads(self.system, float(block.load_factor[-1]))
-        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures, block.traction)
+        friction = block.friction_ratio[-1] if self.system.sticks else None
+        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures, friction)
         direction, worn = int(block.direction[-1]), block.end.worn
         write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 

@@ -108,10 +108,11 @@ class Case(Part):
         problems += [*self._program_problems(), *self._stick_problems()]
         problems += [f"{body}.regions: missing, but required" for body, part in self.bodies.items() if not part.regions]
         held = [*self.punch.supports, *self.strip.supports]
-        pressed = any(load.force or load.traction for load in self.punch.loads) or self._course_load is not None
+        pressed = self.punch.loads or self.strip.loads or self._course_load is not None
         if not pressed and not any(one.moves for one in held):
             problems.append(
-                "punch.loads: expected at least one load that presses the punch on the strip, or a support moved `by`"
+                "punch.loads: expected at least one load that presses the punch on the strip, of either body, or a "
+                "support moved `by`"
             )
         if problems:
             raise ValueError(self.names.told("\n".join(problems)))

@@ -99,7 +99,7 @@ class Block:
         load_factor: Of all loads in it (k,).
         end: From where the run goes on.
         steps: Time steps of each half-cycle, where the law of contact resolves it in time; else none.
-        traction: tau of the last one in its middle (n, d), where its direction alone does not tell; else None.
+        friction_ratio: tau of each in its middle position (n, d), k of them.
     """
 
     system: Tribosystem
@@ -124,7 +124,7 @@ class Block:
     between: Array = field(kw_only=True)
     crept: Array = field(kw_only=True)
     steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
-    traction: Array | None = field(default=None, kw_only=True)
+    friction_ratio: tuple[Array, ...] = field(kw_only=True)
 
     def __len__(self) -> int:
         return len(self.half_cycle)
@@ -332,7 +332,7 @@ class Recorder:
             between=np.array([row.worn.between for row in rows]),
             crept=np.array([row.worn.crept for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
-            traction=middles[-1].friction_ratio if rows[-1].steps is not None else None,
+            friction_ratio=tuple(middle.friction_ratio for middle in middles),
         )
         self._rows, self._retries, self._remedies = [], [], Counter()
         return block

@@ -15,17 +15,21 @@ import numpy as np
 from fenwear.arrays import Array, Mask
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.supports import axes
 from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.results import sheet
+from fenwear.results import place, sheet
 from fenwear.results.degrees import degrees_of
+from fenwear.results.forces import node_forces
 from fenwear.results.scar import scar_geometry
 from fenwear.results.zone import without_noise
 
 CONTACTS = "contacts"  # the table of summary.json
 SCARS = [key for key in sheet.LINES if key.startswith("scar_")]
 LINES = {
+    **{f"force_{axis}_N": sheet.Line(f"force on the punch, {axis}", "N") for axis in "xyz"},
     "pressure_integral_N": sheet.LINES["pressure_integral_N"],
+    **{key: sheet.LINES[key] for key in ("eccentricity_mm", "attitude_angle_deg")},
     "max_pressure_MPa": sheet.OF_CONTACT["max_pressure_MPa"],
     **{f"max_pressure_at_{axis}_mm": sheet.OF_CONTACT[f"max_pressure_at_{axis}_mm"] for axis in "rxyz"},
     "contact_area_mm2": sheet.OF_CONTACT["contact_area_mm2"],
@@ -43,10 +47,10 @@ LINES = {
 def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
     """Return the sheet of each named contact at the end of a run, by their names; empty where none has one.
 
-    Means and largest pressures are of the last cycle, areas in contact of its end.
+    Forces, means and largest pressures are of the last cycle, areas in contact of its end.
     """
     system, pair = last.system, last.system.pair
-    found: dict[str, dict[str, Any]] = {name: _carried(last, pair.punch.nodes_of(name)) for name in pair.punch.names}
+    found: dict[str, dict[str, Any]] = {name: _carried(last, name) for name in pair.punch.names}
     for body, surface, law, depth in zip(
         sheet.BODIES, (pair.punch, pair.strip), system.sliding.wear, (last.wear, last.wear_strip), strict=True
     ):
@@ -59,26 +63,40 @@ def contact_sheets(last: Block) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _carried(last: Block, own: Mask) -> dict[str, Any]:
-    """Return what contact nodes (n,) of one contact carry, rub and warm to."""
+def _carried(last: Block, name: str) -> dict[str, Any]:
+    """Return what the nodes of a named contact carry, rub and warm to."""
     system, cycle = last.system, slice(-last.system.motion.half_cycles, None)
+    own = system.pair.punch.nodes_of(name)
     pair, thickness = system.pair, system.bodies.punch.thickness
     area, pressure = thickness * pair.weights[own], last.pressure[cycle][:, own]
     energy, largest = last.totals.energy[-1][own], pressure.max(axis=0)
-    place = without_noise(pair.punch.x[own][largest.argmax()], pair.punch.extent())
+    where = without_noise(pair.punch.x[own][largest.argmax()], pair.punch.extent())
     found = {
+        **_force(last, own),
         "pressure_integral_N": float((pressure @ area).mean()),
         "max_pressure_MPa": float(largest.max()),
-        **{f"max_pressure_at_{axis}_mm": float(x) for axis, x in zip(sheet.axes(system), place, strict=False)},
+        **{f"max_pressure_at_{axis}_mm": float(x) for axis, x in zip(sheet.axes(system), where, strict=False)},
         "contact_area_mm2": float(area @ (pressure[-1] > 0)),
         "friction_work_mJ": float(area @ energy),
         "largest_energy_mJ_per_mm2": float(energy.max()),
     }
+    found |= place.numbers(last, name)
     if last.heat is not None:
         degrees = degrees_of(system.case)
         warmest = max(float(side[-1][own].max()) for side in (last.heat.temperature_punch, last.heat.temperature_strip))
         found[f"max_temperature_{degrees.unit}"] = warmest - degrees.zero
     return found
+
+
+def _force(last: Block, own: Mask) -> dict[str, float]:
+    """Return the force on the punch of contact nodes (n,) of one contact, mean of the last cycle; of rings along z."""
+    system, cycle = last.system, slice(-last.system.motion.half_cycles, None)
+    force = node_forces(last)[cycle][:, own].sum(axis=1).mean(axis=0)
+    force = without_noise(force, float(np.linalg.norm(force)))
+    along = axes(system.pair.punch.dim)
+    if system.bodies.punch.law.kind == "axisymmetric":
+        along = {"z": 1}
+    return {f"force_{axis}_N": float(force[component]) for axis, component in along.items()}
 
 
 def _worn(placed: Placed, surface: ContactSurface, own: Mask, depth: Array, volume: float) -> dict[str, Any]:

@@ -6,7 +6,8 @@ of the bore to that of the shaft: of circles that fit their surfaces as they are
 squares. Its size is the eccentricity; the attitude angle is that from the way in which the load presses the shaft to e,
 positive as the strip turns. Where rigid bodies wear a bore by an arc of psi0 to each side the eccentricity is
 D / cos psi0, D the radial clearance; friction has the middle of the contact at atan mu against the turning: a dry shaft
-climbs.
+climbs. A shaft in several bores, each a contact with a name, has a place in each of them, in the middle along y; there
+the angle is from the force that the bore carries.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Placed
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface.equilibrium import is_translation
+from fenwear.results.forces import node_forces
 from fenwear.results.sheet import Variable
 from fenwear.sliding.wear import Worn
 
@@ -52,11 +54,13 @@ class Bore(NamedTuple):
     Attributes:
         bore, shaft: Of the unworn surfaces.
         sign: 1 where the punch has the bore, -1 where it is the shaft.
+        nodes: Contact nodes of it (n,).
     """
 
     bore: Circle
     shaft: Circle
     sign: int
+    nodes: Mask
 
 
 def motions(placed: Placed) -> list[str]:
@@ -78,54 +82,85 @@ def variables(placed: Placed) -> dict[str, Variable]:
         unit, text = ("mm", f"moved along {axis}") if is_translation(mode) else ("rad", f"turned about {axis}")
         part = "" if len(mode.split("_")) < 3 else f" ({'_'.join(mode.split('_')[2:])})"
         found[name] = (("half_cycle",), unit, f"how far the {body}{part} has {text}, from where it was meshed")
-    return found | (ECCENTRICITY if bore_of(placed) is not None else {})
+    for name in bores_of(placed):
+        words = f" ({name})" if name else ""
+        found |= {key + _end(name): (over, unit, text + words) for key, (over, unit, text) in ECCENTRICITY.items()}
+    return found
 
 
 def values(block: Block) -> dict[str, Array]:
     """Return them of each half-cycle of a block (k,)."""
     system = block.system
     found: dict[str, Array] = dict(zip(motions(system), block.rigid.T, strict=True))
-    bore = bore_of(system)
+    for name, bore in bores_of(system).items():
+        found |= {key + _end(name): value for key, value in _eccentricity(block, bore, named=bool(name)).items()}
+    return found
+
+
+def numbers(last: Block, contact: str = "") -> dict[str, float]:
+    """Return the eccentricity at the end of a run, of the only contact or a named one, for summary.json; or nothing."""
+    bore = bores_of(last.system).get(contact)
     if bore is None:
-        return found
-    away = bore.shaft.middle - bore.bore.middle - bore.sign * _apart(block)
-    loads = system.bodies.punch.given - system.bodies.strip.given
-    pressed = -bore.sign * loads[[0, -1]]
-    cross, along = away[:, 0] * pressed[1] - away[:, 1] * pressed[0], away @ pressed
-    turn = np.sign(system.sliding.field.turn[1]) or 1.0
-    return found | {
-        "eccentricity": np.asarray(np.linalg.norm(away, axis=1)),
-        "eccentricity_x": away[:, 0],
-        "eccentricity_z": away[:, 1],
-        "attitude_angle": np.degrees(turn * np.arctan2(cross, along)),
-    }
-
-
-def numbers(last: Block) -> dict[str, float]:
-    """Return the eccentricity at the end of a run for summary.json, or nothing."""
-    if bore_of(last.system) is None:
         return {}
-    found = values(last)
+    found = _eccentricity(last, bore, named=bool(contact))
     names = {"eccentricity_mm": "eccentricity", "attitude_angle_deg": "attitude_angle"}
     return {key: float(found[name][-1]) for key, name in names.items()}
 
 
-def bore_of(placed: Placed) -> Bore | None:
-    """Return the shaft and the bore where one body is in the other, and free to move across the axis; else None."""
+def _end(name: str) -> str:
+    return f"_{name}" if name else ""
+
+
+def _eccentricity(block: Block, bore: Bore, *, named: bool) -> dict[str, Array]:
+    """Return the eccentricity of a shaft in one bore in each half-cycle (k,), by `ECCENTRICITY`.
+
+    Of one of several bores the angle is from the force that it carries, of the only one from the load.
+    """
+    system = block.system
+    away = bore.shaft.middle - bore.bore.middle - bore.sign * _apart(block, bore.nodes)
+    if named:  # by pressure and friction, on the punch: the load on it is the other way
+        loads = -np.asarray(node_forces(block)[:, bore.nodes].sum(axis=1))
+    else:
+        loads = (system.bodies.punch.given - system.bodies.strip.given)[None]
+    pressed = -bore.sign * loads[:, [0, -1]]
+    cross = away[:, 0] * pressed[:, 1] - away[:, 1] * pressed[:, 0]
+    turn = np.sign(system.sliding.field.turn[1]) or 1.0
+    return {
+        "eccentricity": np.asarray(np.linalg.norm(away, axis=1)),
+        "eccentricity_x": away[:, 0],
+        "eccentricity_z": away[:, 1],
+        "attitude_angle": np.degrees(turn * np.arctan2(cross, (away * pressed).sum(axis=1))),
+    }
+
+
+def bores_of(placed: Placed) -> dict[str, Bore]:
+    """Return the shaft and the bore of each contact, by its name or "" where it is one.
+
+    Of those alone in which one body is around the other, where a body is free to move across the axis.
+    """
     pair = placed.pair
-    across = {"lambda_F", "lambda_Fx"} & set(placed.rigid.mode_names)
-    if not across or placed.bodies.punch.law.kind == "axisymmetric":
-        return None
-    punch, strip = (_circle(surface) for surface in (pair.punch, pair.strip))
-    if punch is None or strip is None or (pair.punch.outward[:, 0] ** 2 > 0.5).sum() == 0:
-        return None
-    outwards = np.einsum("ic,ic->i", pair.punch.x[:, [0, -1]] - punch.middle, pair.punch.outward[:, [0, -1]])
-    return Bore(punch, strip, 1) if (outwards < 0).all() else Bore(strip, punch, -1)
+    free = {mode.split("_")[1] for mode in placed.rigid.mode_names} & {"F", "Fx"}
+    if not free or placed.bodies.punch.law.kind == "axisymmetric":
+        return {}
+    found = {}
+    for name in pair.punch.names or ("",):
+        nodes, opposite = (
+            surface.nodes_of(name) if name in surface.names else np.ones(len(surface.weights), dtype=bool)
+            for surface in (pair.punch, pair.strip)
+        )
+        punch, strip = _circle(pair.punch, nodes), _circle(pair.strip, opposite)
+        outward = pair.punch.outward[nodes]
+        if punch is None or strip is None or (outward[:, 0] ** 2 > 0.5).sum() == 0:
+            continue
+        outwards = np.einsum("ic,ic->i", pair.punch.x[nodes][:, [0, -1]] - punch.middle, outward[:, [0, -1]])
+        within = (outwards < 0).all()
+        found[name] = Bore(punch, strip, 1, nodes) if within else Bore(strip, punch, -1, nodes)
+    return found
 
 
-def _circle(surface: ContactSurface) -> Circle | None:
-    """Return the circle about an axis along y that a surface lies on; None where it lies on none."""
-    x = surface.unworn[:, [0, -1]]
+def _circle(surface: ContactSurface, nodes: Mask) -> Circle | None:
+    """Return the circle about an axis along y that nodes (n,) of a surface lie on; None where it lies on none."""
+    x = surface.unworn[nodes][:, [0, -1]]
     system = np.column_stack([2 * x, np.ones(len(x))])
     found, *_ = np.linalg.lstsq(system, (x**2).sum(axis=1), rcond=None)
     middle = found[:2]
@@ -135,18 +170,19 @@ def _circle(surface: ContactSurface) -> Circle | None:
     return Circle(middle, radius) if true else None
 
 
-def _apart(block: Block) -> Array:
+def _apart(block: Block, nodes: Mask) -> Array:
     """Return how far the punch's surface has moved from the strip's, x and z in the middle along y (k, 2), mm.
 
-    The translation, and in a solid the tilt, that fits what gaps have opened by best, over the whole surface.
+    The translation, and in a solid the tilt, that fits what gaps at some nodes have opened by best.
     """
     system, pair = block.system, block.system.pair
     depths = zip(block.wear, block.wear_strip, strict=True)
     undeformed = np.array([system.gap(0, Worn(np.asarray(one), np.asarray(other))) for one, other in depths])
-    fields = pair.normal[:, [0, -1]]
+    fields = pair.normal[nodes][:, [0, -1]]
     if pair.punch.dim == 3:
-        y = pair.punch.x[:, 1]
+        y = pair.punch.x[nodes, 1]
         fields = np.column_stack([fields, (y - (y.min() + y.max()) / 2)[:, None] * fields])
-    root = np.sqrt(pair.weights)
-    fit, *_ = np.linalg.lstsq(root[:, None] * fields, root[:, None] * (block.gap - undeformed).T, rcond=None)
+    root = np.sqrt(pair.weights[nodes])
+    opened = (block.gap - undeformed)[:, nodes]
+    fit, *_ = np.linalg.lstsq(root[:, None] * fields, root[:, None] * opened.T, rcond=None)
     return np.asarray(fit[:2].T)

@@ -65,7 +65,10 @@ def test_each_contact_has_its_own(tmp_path: Path) -> None:
         assert history.contact.attrs["flag_meanings"] == "left right"
     text = contact_text(summary).splitlines()
     assert text[0].split() == ["left", "right"]
-    assert text[1].split()[-2:] == ["300", "900"]
+    (integral,) = (line for line in text if line.startswith("integral of the pressure"))
+    assert integral.split()[-2:] == ["300", "900"]
+    for name, load in LOADS.items():
+        assert [contacts[name][f"force_{axis}_N"] for axis in "xz"] == pytest.approx([0, -load], abs=1e-6)
 
 
 @pytest.mark.mpi

@@ -13,7 +13,7 @@ from fenwear_verify import VerificationCase, registered, run_cases
 ONE_RANK = {
     "bushing", "bushing-elastic", "cattaneo-mindlin", "flat-punch", "flat-punch-stick", "galin",
     "nafems-cylinder", "nafems-punch", "partial-slip-end", "pin-in-hole", "rounded-punch", "sliding-punch",
-    "sphere-mindlin", "sphere-spence", "sphere-wear-end", "worn-ball",
+    "sphere-mindlin", "sphere-spence", "sphere-wear-end", "two-bushings", "worn-ball",
 }  # fmt: skip
 
 

@@ -188,7 +188,7 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
         zone: Nodes that are in contact (n,) bool; by default all.
 
     Raises:
-        ConvergenceError: Newton's method found no equilibrium, or a threshold or a cap leaves none.
+        ConvergenceError: Newton's method found no equilibrium, a threshold or a cap leaves none, or numbers overflow.
     """
     balance = rigid.equilibrium(friction_ratio)
     if zone is not None:
@@ -206,13 +206,15 @@ def optimum(rigid: RigidEquilibrium, friction_ratio: Array, wear: WearRates, zon
             f"no optimum: pressures below the pressure_threshold of {law.threshold:.4g} MPa balance the loads, so "
             "that nothing wears and any of them stays"
         )
+    if not np.isfinite(rate / even).all():
+        raise ConvergenceError("no optimum: the wear rates of the mean pressure are too large or too small for numbers")
     # Unknown y: w_n over the mean rate at the mean pressure is shape y.
     y = np.linalg.lstsq(shape * (rate / even)[:, None], np.ones(n), rcond=None)[0]
     if np.linalg.norm(y) < SMALL:  # a bore wears evenly by no motion: from that along the loads on
         y = -resultant / np.linalg.norm(resultant)
     for ramp in RAMPS if law.threshold > 0 else (RAMP,):
         y, pressure, residual = _newton(law, shape * rate, rows, resultant, y, ramp * rate)
-    if residual > 1e-10:
+    if not residual <= 1e-10:
         raise ConvergenceError(f"the optimum did not converge: residual {residual:.3g} of the load")
     if zone is not None:
         pressure = pressure * zone
@@ -243,6 +245,8 @@ def _newton(
         if residual < 1e-13:
             break
         slope = _slope(law, modes @ y, ramp)
+        if not np.isfinite(slope).all():
+            return y, pressure, np.inf
         step = np.linalg.lstsq((rows * slope) @ modes, -force, rcond=None)[0]
         for halving in range(40):
             trial = y + step / 2**halving

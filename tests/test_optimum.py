@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import fsolve
 
-from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, load_case, march
+from fenwear import CaseError, ConvergenceError, Tribosystem, assemble, jump, load_case, march
 from fenwear.arrays import Array
 
 A, MEAN = 30.0, 1e4 / 600  # half-width, mm; p_m, MPa
@@ -198,3 +198,14 @@ def test_almost_tipping_punch_is_accepted() -> None:
     for d in (1, -1):
         p = system.contact((d,)).solve(system.pair.initial_gap).pressure[0]
         assert system.pair.weights @ (p * system.pair.x) == pytest.approx(-d * 29.6 * 1000, rel=1e-9)
+
+
+def test_rates_beyond_all_numbers_have_no_optimum() -> None:
+    """A run in which they come up goes on without one."""
+    settings = ("geometry.parameters.elements_along_contact=4", "motion.positions=3", "motion.period=1e300")
+    slow = "wear.punch={beta='3e-9 MPa^-1.5', pressure_exponent=1.5}"
+    fast = "wear.strip={coefficient='1e-9 MPa^-1*mm^-1*s^1', speed_exponent=2.0}"
+    system = assemble(load_case("fretting", [*settings, "geometry.degree=1", slow, fast]))
+    (block,) = jump(system, 2, tolerance=0.05)
+    assert np.isfinite(block.pressure).all()
+    assert np.isnan(block.optimum_distance).all()

@@ -218,7 +218,10 @@ def scaled(random_: random.Random, value: Any) -> Any:
             return f"{float(number) * factor!r} {unit}"
         except ValueError:
             return value * 2
-    return type(value)(value * factor)
+    try:
+        return type(value)(value * factor)
+    except OverflowError:  # a whole number beyond all others
+        return value
 
 
 def other_unit(random_: random.Random, tables: dict[str, Any]) -> tuple[tuple[Any, ...], float | None]:

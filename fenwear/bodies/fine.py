@@ -26,6 +26,7 @@ from fenwear.bodies.guides import GuideAnswer
 from fenwear.bodies.half_space import HalfSpace, extent_along
 from fenwear.bodies.material import Isotropic
 from fenwear.bodies.response import Request
+from fenwear.bodies.tensor import TensorWeights
 from fenwear.errors import CaseError, InputError
 from fenwear.parallel import total
 
@@ -46,7 +47,7 @@ class FineBody:
         half: The half-space, on the nodes of the grid.
         grid: Where the correction is known.
         correction: Between its points.
-        weights: Values at the points to the nodes (q, m).
+        weights: L, from values at the points to the nodes.
         unresolved: What the correction's polynomials leave out, over the half-space's mean compliance over the grid.
         loaded: Displacement of each point by the loads (m, d), mm.
     """
@@ -54,7 +55,7 @@ class FineBody:
     half: HalfSpace
     grid: RegularGrid
     correction: Correction
-    weights: Array
+    weights: TensorWeights
     unresolved: float
     loaded: Array
     by_temperature: Array | None = None
@@ -68,12 +69,13 @@ class FineBody:
     @property
     def by_load(self) -> Array:
         """Displacement by the loads (q, d), mm."""
-        return np.asarray(self.weights @ self.loaded)
+        return self.weights.to_nodes(self.loaded)
 
     @cached_property
     def cost(self) -> float:
         """Of a product."""
-        return self.half.cost + 2 * self.weights.size * self.half.dim
+        longest = max(factor.shape[1] for factor in self.weights.factors)
+        return self.half.cost + 2.0 * len(self.places) * longest * self.half.dim
 
     @property
     def places(self) -> NDArray[np.int64]:
@@ -84,33 +86,29 @@ class FineBody:
         """Return the half-space's displacement along the first direction by a force (d,) at all distances."""
         return self.half.table(traction)
 
-    def smooth(self, traction: Array) -> tuple[Array, Array]:
-        """Return values at points to the nodes (q, m), and what forces along a traction (d,) at points do (m, m)."""
+    def smooth(self, traction: Array) -> tuple[TensorWeights, Array]:
+        """Return L, and what forces along a traction (d,) at points do along the first direction (m, m)."""
         return self.weights, self.correction.response[:, 0] @ traction
 
     def at(self, x: Array) -> FineBody:
         """Return the same with its nodes at other places of the body (q, d), mm."""
-        weights = at_nodes(self.correction, self.grid, x[:, self.grid.axes])
-        return replace(self, half=self.half.at(x), weights=weights)
+        half = self.half.at(x)
+        return replace(self, half=half, weights=at_nodes(self.correction, self.grid, half.places, x[:, self.grid.axes]))
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
-        q, d, *rest = forces.shape
-        at_points = (self.weights.T @ forces.reshape(q, -1)).reshape(-1, d, *rest)
-        moved = np.tensordot(self.correction.response, at_points, ((2, 3), (0, 1)))
-        smooth = (self.weights @ moved.reshape(len(moved), -1)).reshape(q, *moved.shape[1:])
-        return self.half.apply(forces) + smooth
+        moved = np.tensordot(self.correction.response, self.weights.to_points(forces), ((2, 3), (0, 1)))
+        return self.half.apply(forces) + self.weights.to_nodes(moved)
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the displacements at nodes from unit forces at others (rows, a, columns, d)."""
-        smooth = np.tensordot(self.weights[rows], self.correction.response, 1)
-        besides = np.tensordot(smooth, self.weights[columns], (2, 1))
+        smooth = np.tensordot(self.weights.rows(rows), self.correction.response, 1)
+        besides = np.tensordot(smooth, self.weights.rows(columns), (2, 1))
         return self.half.entries(rows, columns) + np.moveaxis(besides, 3, 2)
 
     def diagonal(self) -> Array:
         """Return the displacements at each node from unit forces at itself (q, a, d)."""
-        smooth = np.tensordot(self.weights, self.correction.response, 1)
-        return self.half.diagonal() + np.einsum("qamd,qm->qad", smooth, self.weights)
+        return self.half.diagonal() + self.weights.diagonal(self.correction.response.transpose(0, 2, 1, 3))
 
     def under(self, elastic: ElasticBody) -> FineBody:
         """Return the same under the loads of a body that differs by them alone; collective."""
@@ -128,14 +126,14 @@ def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Arra
     return np.asarray(own @ along.T)
 
 
-def at_nodes(correction: Correction, grid: RegularGrid, x: Array) -> Array:
-    """Return what takes values at the points of a correction to nodes x (q, d - 1): (q, m)."""
-    weights: Array = np.ones((len(x), 1))
+def at_nodes(correction: Correction, grid: RegularGrid, places: NDArray[np.int64], x: Array) -> TensorWeights:
+    """Return what takes values at the points of a correction to nodes x (q, d - 1), mm, at places of their own grid."""
+    low, factors = places.min(axis=0), []
     for k, count in enumerate(correction.counts):
-        places, which = np.unique(x[:, k], return_inverse=True)
-        one = interpolation(count, grid.corner[k], grid.corner[k] + grid.sides[k], places)
-        weights = (weights[:, :, None] * one[which][:, None]).reshape(len(x), -1)
-    return weights
+        first = x[np.argmin(places[:, k]), k]
+        along = first + grid.spacing[k] * np.arange(np.ptp(places[:, k]) + 1)
+        factors.append(interpolation(count, grid.corner[k], grid.corner[k] + grid.sides[k], along))
+    return TensorWeights(tuple(factors), places - low)
 
 
 def fine(request: Request) -> FineBody:
@@ -169,7 +167,7 @@ def fine(request: Request) -> FineBody:
         along=along,
     )
     correction, unresolved = _resolved(elastic, ground, half.directions[0].T, key)
-    weights = at_nodes(correction, grid, x)
+    weights = at_nodes(correction, grid, half.places, x)
     correction = replace(correction, guided=_guided(request, correction.moments, weights))
     loaded = by_loads(elastic, correction, half.directions[0])
     correction = _held(correction, half.directions[0])
@@ -177,7 +175,7 @@ def fine(request: Request) -> FineBody:
     return FineBody(half, grid, correction, weights, unresolved, loaded)
 
 
-def _guided(request: Request, moments: Array, weights: Array) -> tuple[GuideAnswer, Array, Array] | None:
+def _guided(request: Request, moments: Array, weights: TensorWeights) -> tuple[GuideAnswer, Array, Array] | None:
     """Return what a body answers to its guides, and rotations and displacements by couples at points; collective.
 
     The correction is of supports at points, about which couples turn the body far: what turns goes by the moments that
@@ -186,7 +184,7 @@ def _guided(request: Request, moments: Array, weights: Array) -> tuple[GuideAnsw
     Args:
         request: Of the body.
         moments: Of unit forces at points about what guides hold (m, d, g).
-        weights: Values at the points to the nodes (q, m).
+        weights: L, from values at the points to the nodes, of a whole grid.
 
     Returns:
         Of the whole body, and (m, d, g) of each at the points.
@@ -197,7 +195,7 @@ def _guided(request: Request, moments: Array, weights: Array) -> tuple[GuideAnsw
         return None
     bent = answer.moved_there - answer.rotations_there @ answer.turning
     seen = request.seen(elastic.on_surface(bent))
-    fit, *_ = np.linalg.lstsq(weights, seen.reshape(len(seen), -1))
+    fit = weights.fitted(seen.reshape(len(seen), -1))
     return answer, moments, fit.reshape(moments.shape) + moments @ answer.turning
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -23,7 +23,7 @@ from scipy.optimize import linprog
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
-from fenwear.contact.gridded import GriddedPhases
+from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator, Phases, Solve
 from fenwear.contact.row_blocks import SpreadPhases
@@ -89,8 +89,11 @@ class WearCompliance(Protocol):
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
 
-    def linear(self, pressure: Array) -> tuple[Callable[[Array], Array], Array]:
-        """Return the derivative as a product with pressures (m, n), and slopes at the nodes' own places (m, n)."""
+    def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
+        """Return its derivative but for `layer`: what unit pressures open at the punch's nodes, and on the strip's.
+
+        (m, n) each, mm/MPa; None for nothing.
+        """
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n): its derivative, of phase k to pressures j, is L_k R_j, mm/MPa."""
@@ -186,6 +189,7 @@ class CondensedContact:
                 self._dense[k, :n, :n] = interface.compliance(ratio, scale).matrix()
                 self._dense[k, :n, n:], self._dense[k, n:, :n] = modes, balance
         self.blocks = [block for block in blocks if block is not None]
+        self.__dict__.pop("_grid", None)
         if len(self.phases) > 1 and (n >= LARGE or self._shared) and not self._gridded:
             self._spread = SpreadPhases([phase.interface for phase in self.phases], self._ratios, scale)
 
@@ -253,12 +257,17 @@ class CondensedContact:
         """Whether all compliances are convolutions on a grid."""
         return bool(self.blocks) and all(isinstance(block.compliance, Convolution) for block in self.blocks)
 
+    @cached_property
+    def _grid(self) -> PhasesGrid:
+        """The grid of the phases."""
+        return PhasesGrid(self.blocks, [phase.interface.pair for phase in self.phases])
+
     def _of_nodes(
         self, wear: Array | None = None, before: Operator | None = None, layer: Array | None = None
     ) -> ManyNodes | GriddedPhases:
         """Return the derivative without a matrix of all nodes."""
         if self._gridded and wear is None:
-            return GriddedPhases(self.blocks)
+            return GriddedPhases(self._grid)
         known = before if isinstance(before, ManyNodes) else None
         if self._spread is None or layer is not None:
             return ManyNodes(self.blocks, wear, known, layer)
@@ -304,11 +313,10 @@ class CondensedContact:
     def _worn_on_grid(self, pressure: Array, scale: float) -> Operator:
         """Return the derivative with what wears at a pressure (m, n), on a grid."""
         assert self._wearing is not None
-        opening, slope = self._wearing.linear(pressure)
+        slopes = Opened(*self._wearing.by_body(pressure), self._wearing.layer(pressure)).times(scale)
         last = self._operator
-        if last is None or not self._known(slope, None):
-            self._slopes = slope, None
-            last = self._operator = GriddedPhases(self.blocks, lambda p: scale * opening(p), scale * slope)
+        if not isinstance(last, GriddedPhases) or last.opened is None or not last.opened.same(slopes):
+            last = self._operator = GriddedPhases(self._grid, slopes)
         return last
 
     def _known(self, slope: Array, layer: Array | None) -> bool:
@@ -353,6 +361,8 @@ class CondensedContact:
         self._wearing = wearing
         self.inequality.curved = wearing is not None and wearing.curved
         x, f, iterations = self._solve(start)
+        if self._gridded and isinstance(operator := self._linear, GriddedPhases):
+            x = operator.balanced(x, f)
         x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale
         pressure[x[:, :n] <= ZERO] = 0.0

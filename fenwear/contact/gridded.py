@@ -2,198 +2,370 @@
 
 Each phase has the unknowns (p, a) and [S_k, H; E_k, 0]; with wear in the step all pressures open all phases, too. The
 rows and columns of nodes in contact are solved by GMRES, with products by Fourier transforms no wider than the contact.
-The compliance is an operator of order -1, near that of an endless grid, whose inverse takes two transforms:
+The preconditioner is the inverse on an endless grid (`endless`), restricted to the nodes in contact, with the balance
+of forces held exactly: about as many iterations for any number of nodes and any length of the step.
 
-    P = restriction of (S^ + D^)^-1 to the nodes in contact,
-
-with D what wear opens where it acts, and the rigid motions eliminated exactly: about as many iterations for any number
-of nodes. What phases have in common, the wear opens; what they differ by, it does not: P is of both apart.
+Newton's method takes its residuals in double precision and its steps to some digits, by transforms in single
+precision.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-import scipy.fft
-from numpy.typing import NDArray
-from scipy.sparse.linalg import LinearOperator, gmres
+from numpy.typing import DTypeLike, NDArray
+from scipy.sparse import csr_array, hstack, vstack
 
 from fenwear.arrays import Array
 from fenwear.contact.blocks import PhaseBlock
+from fenwear.contact.endless import EndlessGrid, Passing, Patch
+from fenwear.contact.krylov import flexible
 from fenwear.contact.operators import Indices, Solve
-from fenwear.interface.convolution import Convolution, OnBox
+from fenwear.interface import ContactPair
+from fenwear.interface.convolution import Box, Convolution, OnBox
 
-ACCURACY, NEAR = 1e-12, 1e-6  # residual over the right-hand side, and where Newton's method goes on
-FAR = 1e-5  # residual over the right-hand side that is no solution, where the accuracy was not reached
-RESTART, RESTARTS = 60, 10
-LEAST = 0.05  # of the operator's symbol at its mean wave number: what a table cut off may leave of it
+ACCURACY = 1e-12  # residual over the right-hand side
+FAR = 1e-5  # the same that is no solution, where the accuracy was not reached
+ROUGH, DIGITS = 0.1, 2e-6  # residual over that before, of a set that may change, and of what single precision gives
+SETS = 60  # of nodes, after each other
+FEW = 1e-3  # of a set: by how much the next one may differ for it to be solved to all digits
+SHARE = 0.3  # of a residual that is enough, to be below it in double precision, too
+FALLS = 0.5  # of the residual on a set that stays: by less single precision is at its end
+RESTART, RESTARTS = 40, 15
+SLIGHT = 1e-2  # of pressures: what brings them into balance
+WASTE = 1.3  # of a box: how much larger than needed it may be
 
-Opening = Callable[[Array], Array]
+
+@dataclass(frozen=True)
+class Opened:
+    """What unit pressures open besides the bodies, over the phases' nodes (m, n); None for nothing.
+
+    Attributes:
+        common: At their own nodes of the punch, in every phase.
+        strip: On the strip's material below them, wherever it is in each phase.
+        own: At their own nodes in their own phase alone.
+    """
+
+    common: Array | None = None
+    strip: Array | None = None
+    own: Array | None = None
+
+    def times(self, factor: float) -> Opened:
+        """Return all of it times a factor."""
+        return Opened(*(None if one is None else factor * one for one in self.parts))
+
+    @property
+    def parts(self) -> tuple[Array | None, Array | None, Array | None]:
+        """The three."""
+        return self.common, self.strip, self.own
+
+    def same(self, other: Opened) -> bool:
+        """Return whether another one is equal."""
+        pairs = zip(self.parts, other.parts, strict=True)
+        return all(a is b or (a is not None and b is not None and np.array_equal(a, b)) for a, b in pairs)
 
 
-class GriddedPhases:
-    """The phases' blocks side by side; where wear is given, with what all phases' pressures open in each.
+class PhasesGrid:
+    """The grid that phases stand on, and what products on boxes of it need, which is kept.
 
     Args:
         blocks: Of each phase, whose compliances are convolutions on one grid.
-        opening: What pressures (m, n) wear open in each phase (m, n), linear; None without wear.
-        local: What unit pressures wear at their own nodes alone (m, n).
+        pairs: The surfaces opposite each other in each phase.
     """
 
-    def __init__(
-        self, blocks: Sequence[PhaseBlock], opening: Opening | None = None, local: Array | None = None
-    ) -> None:
-        self.blocks, self.opening, self.local = list(blocks), opening, local
-        self.of = [block.compliance for block in self.blocks if isinstance(block.compliance, Convolution)]
-        self.n, self.size = self.blocks[0].nodes, self.blocks[0].size
-        self._every = OnBox(self.of, np.arange(self.n))
+    def __init__(self, blocks: Sequence[PhaseBlock], pairs: Sequence[ContactPair]) -> None:
+        self.blocks, self.pairs = list(blocks), list(pairs)
+        self.of = [block.compliance for block in blocks if isinstance(block.compliance, Convolution)]
+        self.places, self.shape = self.of[0].places, self.of[0].shape
+        self._boxes: dict[DTypeLike, PhasesBox] = {}
+
+    @cached_property
+    def whole(self) -> PhasesBox:
+        """Products on all of it."""
+        return PhasesBox(self, Box.around(self.places, self.shape), np.float64)
+
+    def around(self, touched: NDArray[np.int64], dtype: DTypeLike) -> PhasesBox:
+        """Return a box that holds these nodes, the last one if it does."""
+        last, box = self._boxes.get(dtype), Box.around(self.places, self.shape, touched)
+        size = float(np.prod(box.counts))
+        if last is None or not last.box.holds(self.places[touched]) or np.prod(last.box.counts) > WASTE * size:
+            self._boxes[dtype] = last = PhasesBox(self, box, dtype)
+        return last
+
+    @cached_property
+    def passing(self) -> list[Passing]:
+        """How the node in the middle reads the strip, and what wears below it is put there, in each phase."""
+        middle = int(np.abs(self.places - np.array(self.shape) / 2).sum(axis=1).argmin())
+        punch, strip = self.pairs[0].punch, self.pairs[0].strip
+        far = int(np.abs(self.places - self.places[middle]).sum(axis=1).argmax())
+        apart = (self.places[far] - self.places[middle]).astype(float)
+        axes = [axis for axis in range(punch.dim) if axis != int(np.abs(punch.outward[middle]).argmax())]
+        spacing = (punch.x[far] - punch.x[middle])[axes] / apart
+        places = np.rint((strip.x - punch.x[middle])[:, axes] / spacing).astype(np.int64)
+        found = []
+        for pair in self.pairs:
+            read = csr_array(pair.wear_interpolation[[middle]])
+            put = csr_array(csr_array(pair.wear_projection)[:, [middle]].T)
+            found.append(Passing(read.data, places[read.indices], put.data, places[put.indices]))
+        return found
+
+
+class PhasesBox:
+    """Products of all phases on a box of the grid.
+
+    Args:
+        grid: What they are of.
+        box: The box.
+        dtype: Precision of the products.
+    """
+
+    def __init__(self, grid: PhasesGrid, box: Box, dtype: DTypeLike) -> None:
+        self.grid, self.box, self.dtype = grid, box, np.dtype(dtype)
+        self.products = OnBox(grid.of, box, dtype)
+        self.modes = self._boxed(np.array([block.modes.T for block in grid.blocks]))  # (m, r, ...)
+        self.balance = self._boxed(np.array([block.balance for block in grid.blocks]))
+
+    def multiply(self, p: Array, a: Array, by: Opened | None) -> tuple[Array, Array]:
+        """Return the gaps (m, ...) of pressures and of rigid motions (m, r), and the forces (m, r) of pressures."""
+        gaps, (m, r) = self.products.apply(p), a.shape
+        if by is not None:
+            gaps += self.opened(by, p)
+        gaps += (a[:, None] @ self.modes.reshape(m, r, -1)).reshape(gaps.shape)
+        return gaps, (self.balance.reshape(m, r, -1) @ p.reshape(m, -1, 1))[:, :, 0]
+
+    def _boxed(self, values: Array) -> Array:
+        m, r, n = values.shape
+        return self.box.spread(values.reshape(m * r, n)).reshape(m, r, *self.box.counts).astype(self.dtype)
+
+    @cached_property
+    def endless(self) -> EndlessGrid:
+        """The inverse on an endless grid."""
+        wears = any(pair.wear_projection.nnz for pair in self.grid.pairs)
+        return EndlessGrid(self.grid.of[0], self.box, self.grid.passing if wears else None)
+
+    @cached_property
+    def _strip(self) -> tuple[csr_array, csr_array]:
+        """What all phases put on the strip, and what all read there, over the nodes of the box."""
+        nodes, pairs = self.box.nodes, self.grid.pairs
+        to = hstack([csr_array(pair.wear_projection)[:, nodes] for pair in pairs], format="csr", dtype=self.dtype)
+        back = vstack([csr_array(pair.wear_interpolation)[nodes] for pair in pairs], format="csr", dtype=self.dtype)
+        return csr_array(to), csr_array(back)
+
+    def opened(self, by: Opened, p: Array) -> Array:
+        """Return what pressures in the box (m, ...) open besides the bodies, by slopes there."""
+        found: Array = np.zeros_like(p)
+        if by.common is not None:
+            found += (by.common * p).sum(axis=0)
+        if by.strip is not None:
+            to, back = self._strip
+            seen = back @ (to @ self.box.values(by.strip * p).ravel())
+            found.reshape(len(p), -1)[:, self.box.at] += seen.reshape(len(p), -1)
+        if by.own is not None:
+            found += by.own * p
+        return found
+
+    def slopes(self, by: Opened) -> Opened:
+        """Return slopes of all nodes in the box."""
+        return Opened(*(None if one is None else self.box.spread(one).astype(self.dtype) for one in by.parts))
+
+
+class GriddedPhases:
+    """The phases' blocks side by side; where something opens besides, with what all phases' pressures open in each.
+
+    Args:
+        grid: The phases.
+        opened: What unit pressures open besides the bodies; None for nothing.
+    """
+
+    def __init__(self, grid: PhasesGrid, opened: Opened | None = None) -> None:
+        self.grid, self.opened = grid, opened
+        self.m, self.n, self.size = len(grid.blocks), grid.blocks[0].nodes, grid.blocks[0].size
+        self._slopes = None if opened is None else grid.whole.slopes(opened)
 
     def multiply(self, x: Array) -> Array:
         """Return the matrix times x."""
-        parts = x.reshape(len(self.blocks), -1)
-        p, a = parts[:, : self.n], parts[:, self.n :]
-        found = np.empty_like(parts)
-        found[:, : self.n] = self._every.apply(p)
-        if self.opening is not None:
-            found[:, : self.n] += self.opening(p)
-        for k, block in enumerate(self.blocks):
-            found[k, : self.n] += block.modes @ a[k]
-            found[k, self.n :] = block.balance @ p[k]
-        return found.ravel()
+        parts, on = x.reshape(self.m, -1), self.grid.whole
+        gaps, forces = on.multiply(on.box.spread(parts[:, : self.n]), parts[:, self.n :], self._slopes)
+        return np.concatenate([on.box.values(gaps), forces], axis=1).ravel()
 
     def factor(self, kept: Indices) -> Solve:
-        """Return the solution operator of the rows and columns `kept`."""
-        return _Closed(self, kept, ACCURACY).solve
+        """Return the solution operator of the rows and columns `kept`.
 
-    def to_some_digits(self, kept: Indices) -> Solve:
-        """Return the same to some digits, for Newton's method."""
-        return _Closed(self, kept, NEAR).solve
+        Raises:
+            LinAlgError: nothing touches, or its loads are not balanced; the operator, where it finds no solution.
+        """
+        free = np.zeros(self.m * self.size, dtype=bool)
+        free[kept] = True
+        parts = free.reshape(self.m, self.size)
+        touched = np.flatnonzero(parts[:, : self.n].any(axis=0))
+        if not len(touched):
+            raise np.linalg.LinAlgError("singular matrix")
+        on = self.grid.around(touched, np.float64)
+        slopes = None if self.opened is None else on.slopes(self.opened)
+        closed = _Closed(on, slopes, on.box.spread(parts[:, : self.n]), parts[:, self.n :])
+
+        def solve(b: Array) -> Array:
+            right = np.zeros(self.m * self.size)
+            right[kept] = b
+            whole = right.reshape(self.m, -1)
+            p, a, rest = closed.solve(on.box.spread(whole[:, : self.n]), whole[:, self.n :], ACCURACY)
+            if not rest <= FAR:
+                raise np.linalg.LinAlgError("singular matrix")
+            found = np.zeros((self.m, self.size))
+            found[:, on.box.nodes], found[:, self.n :] = on.box.values(p), a
+            return np.asarray(found.ravel()[kept])
+
+        return solve
+
+    def improved(self, x: Array, f: Array, tolerance: float) -> Array:
+        """Return a solution of the inequality, better by some digits, from one with pressures >= 0.
+
+        The change is looked for in single precision, on a box around what touches: f is what changes are worth there.
+
+        Args:
+            x: Unknowns.
+            f: Their residual.
+            tolerance: Of the residual, which is enough.
+
+        Raises:
+            LinAlgError: nothing touches, or the loads are not balanced by what does.
+        """
+        n, (parts, rest) = self.n, (one.reshape(self.m, -1) for one in (x, f))
+        touched = np.flatnonzero(((parts[:, :n] > 0) | (rest[:, :n] < -tolerance)).any(axis=0))
+        if not len(touched):
+            raise np.linalg.LinAlgError("singular matrix")
+        on = self.grid.around(touched, np.float32)
+        slopes = None if self.opened is None else on.slopes(self.opened)
+        change = _Change(on, slopes, on.box.spread(parts[:, :n]), on.box.spread(rest[:, :n]), rest[:, n:])
+        p, a, touches = change.solve(tolerance)
+        found = parts.copy()
+        changed = found[:, on.box.nodes] + on.box.values(p)
+        found[:, on.box.nodes] = np.where(on.box.values(touches), np.maximum(changed, 0.0), 0.0)
+        found[:, n:] += a
+        return found.ravel()
+
+    def balanced(self, x: Array, f: Array) -> Array:
+        """Return the same pressures times what varies as the rigid motions do, in balance with the loads.
+
+        Args:
+            x: Unknowns, whose pressures are >= 0.
+            f: Their residual, small in the balances.
+        """
+        parts, forces = x.reshape(self.m, -1).copy(), f.reshape(self.m, -1)[:, self.n :]
+        for own, block, rest in zip(parts, self.grid.blocks, forces, strict=True):
+            pressure = own[: self.n]
+            by_share = block.balance @ (pressure[:, None] * block.modes)
+            share = block.modes @ np.linalg.lstsq(by_share, -rest)[0]
+            if np.abs(share).max(initial=0.0) < SLIGHT:
+                own[: self.n] = pressure * (1 + share)
+        return np.asarray(parts.ravel())
+
+
+class _Change:
+    """The change of pressures and rigid motions that takes gaps and forces to those of contact.
+
+    Args:
+        on: The box.
+        slopes: What opens besides in it.
+        before: Pressures (m, ...).
+        gaps: Of them (m, ...).
+        forces: That are not balanced (m, r).
+    """
+
+    def __init__(self, on: PhasesBox, slopes: Opened | None, before: Array, gaps: Array, forces: Array) -> None:
+        self.on, self.slopes = on, slopes
+        self.before, self.gaps, self.forces = (one.astype(on.dtype) for one in (before, gaps, forces))
+
+    def solve(self, tolerance: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+        """Return the changes of pressures (m, ...) and motions (m, r), and what touches, sets of nodes in turn."""
+        least = -self.before
+        p, a = np.zeros_like(self.before), np.zeros_like(self.forces)
+        gaps, forces = self.gaps, self.forces
+        closed, all_motions = (self.before > 0) | (gaps < -tolerance), np.ones(forces.shape, dtype=bool)
+        first, last, changed, idle = 0.0, np.inf, closed.sum(), False
+        solver: _Closed | None = None
+        for number in range(SETS):
+            size = float(np.sqrt((gaps[closed] ** 2).sum() + (forces**2).sum()))
+            first = max(first, size)
+            enough = max(SHARE * tolerance, DIGITS * first)
+            done = size <= enough or size > FALLS * last
+            if number and done and (idle or not changed):
+                break
+            last, idle = size, done
+            solver = _Closed(self.on, self.slopes, closed, all_motions, solver)
+            final = changed <= FEW * closed.sum()
+            by_p, by_a, _ = solver.solve(-gaps, -forces, max(enough / size, 0.0 if final else ROUGH))
+            p, a = np.maximum(p + by_p, least), a + by_a
+            by = self.on.multiply(p, a, self.slopes)
+            gaps, forces = self.gaps + by[0], self.forces + by[1]
+            now = (p > least) | (~closed & (gaps < -tolerance))
+            changed, closed = (now != closed).sum(), now
+        return p, a, p > least
 
 
 class _Closed:
-    """The solution on the nodes in contact."""
+    """The solution on nodes in contact.
 
-    def __init__(self, phases: GriddedPhases, kept: Indices, accuracy: float) -> None:
-        m, n, size = len(phases.blocks), phases.n, phases.size
-        self.phases, self.accuracy = phases, accuracy
-        free = np.zeros(m * size, dtype=bool)
-        free[kept] = True
-        parts = free.reshape(m, size)
-        self.touched = np.flatnonzero(parts[:, :n].any(axis=0))
-        self.closed = parts[:, self.touched].astype(float)
-        self._kept = np.concatenate([parts[:, self.touched], parts[:, n:]], axis=1).ravel()
-        blocks = phases.blocks
-        self.modes = np.array([block.modes[self.touched] for block in blocks])  # (m, k, r)
-        self.balance = np.array([block.balance[:, self.touched] for block in blocks])
-        self.box = OnBox(phases.of, self.touched)
-        self._symbol()
-        self._eliminate()
+    Vectors are of a box that holds them, zero where no node is in contact, and of the rigid motions.
 
-    def _symbol(self) -> None:
-        """Take the inverse of S, and of S with wear, on an endless grid of the contact's size."""
-        box, of = self.box, self.phases.of[0]
-        self.period = tuple(scipy.fft.next_fast_len(int(1.5 * count) + 2, real=True) for count in box.box)
-        reach = [min(b - 1, (size - 1) // 2) for b, size in zip(box.box, self.period, strict=True)]
-        table = box.numbers(of)
-        cut = tuple(slice(b - 1 - r, b + r) for b, r in zip(box.box, reach, strict=True))
-        wrapped = np.zeros(self.period)
-        wrapped[np.ix_(*(np.arange(-r, r + 1) % s for r, s in zip(reach, self.period, strict=True)))] = table[cut]
-        symbol = scipy.fft.rfftn(wrapped).real * float(of.weights.max())
-        self.symbol = np.maximum(symbol, LEAST * np.median(np.abs(symbol)))
-        local = self.phases.local
-        self.worn = 0.0
-        if local is not None:
-            sums = local[:, self.touched].sum(axis=0)
-            self.worn = float(sums[sums > 0].mean()) if (sums > 0).any() else 0.0
+    Args:
+        on: The box.
+        slopes: What opens besides in it.
+        closed: Whether a node touches in each phase (m, ...).
+        rigid: Whether a motion is free (m, r).
+        before: Of another set of nodes: what opens besides is taken from there.
 
-    def _inverse(self, r: Array, worn: float) -> Array:
-        """Return the product of the inverse of S + worn on an endless grid with fields (m, k)."""
-        grid = np.zeros((len(r), *self.period))
-        at = (slice(None), *self.box.at)
-        grid[at] = r
-        axes = tuple(range(1, grid.ndim))
-        image = scipy.fft.rfftn(grid, axes=axes)
-        image /= self.symbol + worn
-        return np.asarray(scipy.fft.irfftn(image, self.period, axes=axes, overwrite_x=True)[at])
+    Raises:
+        LinAlgError: the loads are not balanced by what touches.
+    """
 
-    def _of_pressures(self, r: Array) -> Array:
-        """Return P times what is left of the gaps (m, k)."""
-        if not self.worn:
-            return self._inverse(r, 0.0) * self.closed
-        share = self.closed / np.maximum(self.closed.sum(axis=0), 1.0)
-        common = (share * r).sum(axis=0)
-        alike = self._inverse(common[None], self.worn)
-        if len(r) == 1:
-            return alike * self.closed
-        return (alike + self._inverse((r - common) * self.closed, 0.0)) * self.closed
+    def __init__(
+        self,
+        on: PhasesBox,
+        slopes: Opened | None,
+        closed: NDArray[np.bool_],
+        rigid: NDArray[np.bool_],
+        before: _Closed | None = None,
+    ) -> None:
+        self.on, self.slopes, self.rigid = on, slopes, rigid
+        self.closed = closed.astype(on.dtype)
+        self._shape = (len(closed), -1)
+        if before is None:
+            self._mean(slopes or Opened())
+        free = rigid.reshape(*rigid.shape, *(1,) * len(on.box.counts)) * self.closed[:, None]
+        self.patch = Patch(on.endless, on.modes * free, on.balance * free)
 
-    def _eliminate(self) -> None:
-        """Prepare the rigid motions of every phase."""
-        r = self.modes.shape[2]
-        self._by_modes = np.stack(
-            [self._of_pressures(self.modes[:, :, j] * self.closed) for j in range(r)], axis=2
-        ) if r else np.zeros((*self.closed.shape, 0))  # fmt: skip
-        self._schur = np.einsum("mrk,mks->mrs", self.balance, self._by_modes)
-        if r and not np.abs(np.linalg.det(self._schur)).min() > 0:
-            raise np.linalg.LinAlgError("singular matrix")
+    def _mean(self, slopes: Opened) -> None:
+        """Take what unit pressures open on average, on the endless grid."""
+        inner = tuple(range(1, self.closed.ndim))
+        count = np.maximum(self.closed.sum(axis=inner), 1.0)
 
-    def _precondition(self, b: Array) -> Array:
-        parts = self._spread(b)
-        k = len(self.touched)
-        p = self._of_pressures(parts[:, :k])
-        if not self.modes.shape[2]:
-            return self._picked(p, parts[:, k:])
-        left = np.einsum("mrk,mk->mr", self.balance, p) - parts[:, k:]
-        a = np.linalg.solve(self._schur, left[:, :, None])[:, :, 0]
-        return self._picked(p - np.einsum("mks,ms->mk", self._by_modes, a), a)
+        def mean(values: Array | None) -> Array | None:
+            return None if values is None else np.asarray((values * self.closed).sum(axis=inner) / count)
 
-    def _spread(self, x: Array) -> Array:
-        whole: Array = np.zeros(len(self._kept))
-        whole[self._kept] = x.ravel()
-        return whole.reshape(len(self.closed), -1)
+        common, strip, own = map(mean, slopes.parts)
+        self.on.endless.take(common, strip, 0.0 if own is None else float(own.mean()), self.on.dtype)
 
-    def _picked(self, p: Array, a: Array) -> Array:
-        return np.asarray(np.concatenate([p, a], axis=1).ravel()[self._kept])
+    def _parts(self, x: Array) -> tuple[Array, Array]:
+        """Return pressures (m, ...) and rigid motions (m, r) of a vector."""
+        cut = self.closed.size
+        return x[:cut].reshape(self.closed.shape), x[cut:].reshape(self.rigid.shape)
 
     def _multiply(self, x: Array) -> Array:
-        parts = self._spread(x)
-        k = len(self.touched)
-        p, a = parts[:, :k], parts[:, k:]
-        gap = self.box.apply(p) + np.einsum("mkr,mr->mk", self.modes, a)
-        if self.phases.opening is not None:
-            whole = np.zeros((len(p), self.phases.n))
-            whole[:, self.touched] = p
-            gap += self.phases.opening(whole)[:, self.touched]
-        return self._picked(gap, np.einsum("mrk,mk->mr", self.balance, p))
+        p, a = self._parts(x)
+        return self._joined(*self.on.multiply(p, a * self.rigid, self.slopes))
 
-    def solve(self, b: Array) -> Array:
-        """Return the unknowns.
+    def _precondition(self, x: Array) -> Array:
+        return self._joined(*self.patch.solve(*self._parts(x)))
 
-        Raises:
-            LinAlgError: no solution was found.
-        """
-        if not len(b):
-            return np.zeros_like(b)
-        shape, count = (len(b), len(b)), 0
+    def _joined(self, p: Array, a: Array) -> Array:
+        return np.concatenate([(p * self.closed).ravel(), (a * self.rigid).ravel()], dtype=self.on.dtype)
 
-        def note(_: float) -> None:
-            nonlocal count
-            count += 1
-
-        x, failed = gmres(
-            LinearOperator(shape, matvec=self._multiply, dtype=float),
-            b,
-            rtol=self.accuracy,
-            atol=0.0,
-            restart=min(RESTART, len(b)),
-            maxiter=RESTARTS,
-            M=LinearOperator(shape, matvec=self._precondition, dtype=float),
-            callback=note,
-            callback_type="pr_norm",
-        )
-        self.iterations = count
-        if failed and not np.linalg.norm(b - self._multiply(x)) <= FAR * np.linalg.norm(b):
-            raise np.linalg.LinAlgError("singular matrix")
-        result: NDArray[np.float64] = x
-        return result
+    def solve(self, gaps: Array, forces: Array, accuracy: float) -> tuple[Array, Array, float]:
+        """Return pressures (m, ...) and rigid motions (m, r), and what residual is left over the right-hand side."""
+        right = self._joined(gaps, forces)
+        x, rest, self.iterations = flexible(self._multiply, self._precondition, right, accuracy, RESTART, RESTARTS)
+        return *self._parts(x), rest

@@ -9,7 +9,8 @@ same ones: a start that is near is first taken on by Newton's method with its ow
 kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts. Where unknowns are
 many the sets themselves are gone through first: that of the next step holds what has come out below its bound, and lets
 go what is held with a residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). It
-takes fewer of them than steps that are cut off at the bounds, but need not end.
+takes fewer of them than steps that are cut off at the bounds, but need not end. An operator whose solutions
+cost by their digits goes through sets itself, to some of them, and what it finds is taken on as it is.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave o
 SETS = 30  # that are gone through before SNES starts
 CHORDS, FALLS = 12, 0.2  # steps where the derivative changes; fall of the residual by which its factor still serves
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
+ROUNDS = 40  # of some digits each, where the derivative changes
+CLOSE = 1e-9  # of residuals, where solutions cost by their digits
 
 
 def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None:
@@ -118,6 +121,7 @@ class Inequality:
         self._operator: Operator | None = None
         self.curved = False  # whether the derivative changes with the solution
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
+        self.close = CLOSE  # residual that ends solves where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
 
     @cached_property
@@ -176,7 +180,7 @@ class Inequality:
             free = np.frombuffer(key, dtype=bool)
             kept, bounded = (np.flatnonzero(one).astype(np.int32) for one in (free, ~free))
             rows = kept if len(bounded) else slice(None)
-            last = self._kept = _Kept(operator, key, rows, bounded, _solution(operator, kept))
+            last = self._kept = _Kept(operator, key, rows, bounded, operator.factor(kept))
         return last
 
     def solve(self, start: Array, *, near: bool = False, line_search: bool = False) -> Array:
@@ -191,6 +195,9 @@ class Inequality:
         Raises:
             ConvergenceError: SNES did not converge.
         """
+        if not line_search and isinstance(self._jacobian(start), Approximate):
+            x = self._improved(start)
+            return self._by_snes(start, line_search) if x is None else x
         x = self._on_set(start) if near else None
         if x is None and self.sets_first and not line_search:
             x = self._through_sets(start)
@@ -254,6 +261,26 @@ class Inequality:
             key = wanted.tobytes()
         return None
 
+    def _improved(self, start: Array) -> Array | None:
+        """Return the solution by some digits after each other; None where they do not come."""
+        x, tolerance = start.copy(), max(self.close, self._tolerance)
+        f = self._function(x)
+        for self.iterations in range(ROUNDS):
+            free = x > self._lower
+            size = float(np.linalg.norm(f[free]))
+            if size < tolerance and f.min(where=~free, initial=0.0) >= -tolerance:
+                self.residual = f
+                return x
+            operator = self._jacobian(x)
+            if not isinstance(operator, Approximate):
+                return None
+            try:
+                x = operator.improved(x, f, tolerance)
+            except np.linalg.LinAlgError:
+                return None
+            f = self._function(x)
+        return None
+
     def _free(self, x: Array) -> bytes:
         """Return which unknowns are within their bounds, as bytes."""
         within = x > self._lower
@@ -285,11 +312,6 @@ class Inequality:
         self.iterations = snes.getIterationNumber()
         self.residual = self._function(x)
         return x
-
-
-def _solution(operator: Operator, kept: Indices) -> Solve:
-    """Return the solution operator of some rows and columns; where factors are costly to some digits."""
-    return operator.to_some_digits(kept) if isinstance(operator, Approximate) else operator.factor(kept)
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

@@ -84,3 +84,64 @@ def gmres_solution(
         raise NotSolvedError
     result: Array = x
     return result
+
+
+def flexible(
+    multiply: Callable[[Array], Array],
+    precondition: Callable[[Array], Array],
+    b: Array,
+    accuracy: float,
+    restart: int,
+    restarts: int,
+) -> tuple[Array, float, int]:
+    """Return the solution of a square system in the precision of b (size,), by flexible GMRES.
+
+    Preconditioned from the right, so that the residual is that of the system itself: a few digits end it where they
+    are asked for (Y. Saad, SIAM J. Sci. Comput. 14, 1993).
+
+    Args:
+        multiply: The product with its matrix.
+        precondition: That with a matrix near its inverse.
+        b: Right-hand side (size,).
+        accuracy: Residual over the right-hand side that ends it.
+        restart: Iterations after which it begins anew.
+        restarts: How often.
+
+    Returns:
+        The solution, its residual over the right-hand side, and how many iterations it took.
+    """
+    x, r = np.zeros_like(b), b
+    whole = size = float(np.linalg.norm(b))
+    iterations, enough = 0, accuracy * whole
+    for _ in range(restarts):
+        if not size > enough:
+            break
+        directions: list[Array] = []
+        basis = np.empty((restart + 1, len(b)), dtype=b.dtype)
+        basis[0] = r / size
+        rows: Array = np.zeros((restart + 1, restart))
+        for k in range(restart):
+            directions.append(precondition(basis[k]))
+            w = multiply(directions[k])
+            for _again in range(2):  # classical Gram and Schmidt, twice
+                parts = basis[: k + 1] @ w
+                w = w - parts @ basis[: k + 1]
+                rows[: k + 1, k] += parts
+            rows[k + 1, k] = length = float(np.linalg.norm(w))
+            iterations += 1
+            right = np.zeros(k + 2)
+            right[0] = size
+            y, *_ = np.linalg.lstsq(rows[: k + 2, : k + 1], right)
+            rest = float(np.linalg.norm(right - rows[: k + 2, : k + 1] @ y))
+            if rest <= enough or not length > 0:
+                break
+            basis[k + 1] = w / length
+        for part, direction in zip(y.astype(b.dtype), directions, strict=True):
+            x += part * direction
+        if rest <= enough:
+            return x, rest / whole, iterations
+        r = b - multiply(x)
+        before, size = size, float(np.linalg.norm(r))
+        if not size < before:
+            break
+    return x, size / max(whole, 1e-300), iterations

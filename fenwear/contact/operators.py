@@ -43,10 +43,19 @@ class Operator(Protocol):
 
 @runtime_checkable
 class Approximate(Protocol):
-    """An operator whose solutions are costly to all digits, and cheap to some."""
+    """An operator whose solutions cost by their digits."""
 
-    def to_some_digits(self, kept: Indices) -> Solve:
-        """Return the solution operator of the rows and columns `kept` to some digits, for Newton's method."""
+    def improved(self, x: Array, f: Array, tolerance: float) -> Array:
+        """Return unknowns within their bounds that fulfil the inequality better than others, by some digits.
+
+        Args:
+            x: Unknowns within their bounds.
+            f: Their residual.
+            tolerance: Of the residual, which is enough.
+
+        Raises:
+            LinAlgError: there are none.
+        """
 
 
 @dataclass(frozen=True)

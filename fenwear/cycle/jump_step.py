@@ -40,6 +40,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact.inequality import CLOSE
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, Passing
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
@@ -47,6 +48,7 @@ from fenwear.cycle.jump_error import Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
+from fenwear.interface.pair import lagrange
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import NOTHING, Worn
@@ -54,6 +56,7 @@ from fenwear.sliding.wear import NOTHING, Worn
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 PARTS = 8  # of a cycle that does not converge as a whole
+ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which a jump is solved whole, and in halves
 
 
 @dataclass(frozen=True)
@@ -84,6 +87,35 @@ class _Moment:
         return _Moment(self.worn + stage.worn.times(cycles), temperature, self.totals + stage.adds.times(cycles))
 
 
+class _Trend:
+    """How contacts change over a jump that was made whole: where its halves look for theirs."""
+
+    def __init__(self) -> None:
+        self._times: list[float] = []
+        self._contacts: list[ContactState] = []
+
+    def add(self, time: float, contact: ContactState | None) -> None:
+        """Take a contact at a time, cycles since the begin of the jump."""
+        if contact is not None:
+            self._times.append(time)
+            self._contacts.append(contact)
+
+    def from_one(self, contact: ContactState | None, since: float, to: float) -> ContactState | None:
+        """Return what a contact at one time will be near at another one."""
+        if contact is None or len(self._times) < 2:
+            return contact
+        shares = self._shares(to) - self._shares(since)
+        pressure, rigid = contact.pressure.copy(), contact.rigid.copy()
+        for share, known in zip(shares, self._contacts, strict=True):
+            pressure += share * known.pressure
+            rigid += share * known.rigid
+        return replace(contact, pressure=np.maximum(pressure, 0.0), rigid=rigid)
+
+    def _shares(self, time: float) -> Array:
+        """Return the polynomials through the times, of Lagrange, at another one."""
+        return lagrange(np.array(self._times), np.array(time))
+
+
 class Stepper:
     """Implicit steps of any number of cycles."""
 
@@ -101,7 +133,8 @@ class Stepper:
         self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
         self._conductances: Array | None = None  # in it
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
-        self._half: tuple[RunState, float, RunState] | None = None  # the first half of the last attempt
+        self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
+        self._trend = _Trend()  # of what was made last
 
     def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
@@ -115,12 +148,17 @@ class Stepper:
         """
         try:
             known, self._half = self._half, None
-            whole = known[2] if known and known[0] is state and known[1] == cycles else self.step(state, cycles)
-            half = self.step(state, cycles / 2)
-            self._half = (state, cycles / 2, half)
+            if known and known[0] is state and known[1] == cycles:
+                whole, trend = known[2:]
+            else:
+                self._solve_to(ROUGH)
+                whole, trend = self.step(state, cycles), self._trend
+            self._solve_to(FINE)
+            half = self.step(state, cycles / 2, near=trend)
+            self._half = (state, cycles / 2, half, self._trend)
             comes = _comes(state, half, whole)
             last = LAST * cycles if comes else 0.0
-            halves = self.step(half, cycles / 2 - last, cycles / 2)
+            halves = self.step(half, cycles / 2 - last, cycles / 2, trend)
             if comes:
                 halves = self._last_step(halves, last, cycles - last)
             estimate = estimated(self.system, state, whole, halves)
@@ -185,21 +223,33 @@ class Stepper:
             state = self.step(state, cycles / count, number * cycles / count)
         return state
 
-    def step(self, state: RunState, cycles: float, since: float = 0.0) -> RunState:
+    def _solve_to(self, share: float) -> None:
+        """Solve contact to a share of the tolerance, where its digits cost."""
+        if isinstance(self.contact, CondensedContact):
+            self.contact.inequality.close = max(share * self.tolerance, CLOSE)
+
+    def step(self, state: RunState, cycles: float, since: float = 0.0, near: _Trend | None = None) -> RunState:
         """Return the state `cycles` cycles later, by the two stages of one step.
 
         Args:
             state: Where it begins; its number of half-cycles is that of the jump's begin.
             cycles: Its length.
             since: Cycles from there to the begin of the step.
+            near: How contacts change, more or less; by default they are looked for where they were.
         """
-        share = GAMMA * cycles
-        begin = self._moment(state)
+        share, near = GAMMA * cycles, near or _Trend()
+        self._trend = trend = _Trend()
+        begin, contact = self._moment(state), joined(state.contacts)
+        trend.add(since, contact)
         self._press(state.half_cycle, since + share)
-        first = self._stage(begin, joined(state.contacts), share, cycles - share)
+        first = self._stage(begin, near.from_one(contact, since, since + share), share, cycles - share)
+        trend.add(since + share, first.contact)
         between = begin.after(first, cycles - share)
         self._press(state.half_cycle, since + cycles)
-        return self._end(state, between, self._stage(between, first.contact, share), share)
+        start = near.from_one(first.contact, since + share, since + cycles)
+        last = self._stage(between, start, share)
+        trend.add(since + cycles, last.contact)
+        return self._end(state, between, last, share)
 
     def _last_step(self, state: RunState, cycles: float, since: float) -> RunState:
         """Return the state `cycles` cycles later, by one implicit Euler step; as `step`."""

@@ -242,10 +242,10 @@ class Interface:
             known: Tables of convolutions that were made for other phases.
         """
         traction = self.pair.normal + friction_ratio
-        plain = self.frame is None and self.rows is None and self.layer is None
+        plain = self.frame is None and self.rows is None
         if not self.strip_moves and self.cost is not None and plain:
             tables = {} if known is None else known
-            found = convolution([self.punch, self.strip], traction, self.pair.weights, scale, tables)
+            found = convolution([self.punch, self.strip], traction, self.pair.weights, scale, tables, self.layer)
             if found is not None:
                 return found
         return PressureCompliance(self, scale * traction)

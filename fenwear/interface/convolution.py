@@ -3,7 +3,9 @@
 Where both answer on the nodes of the same regular grid, and the traction that goes with a unit pressure is the same
 everywhere, S is a table of one number for each distance of two nodes, and a correction on a few points for each body:
 
-    S_ij = w_j (T(x_i - x_j) + sum over the bodies of L(x_i) C L(x_j)^T).
+    S_ij = w_j (T(x_i - x_j) + sum over the bodies of L(x_i) C L(x_j)^T) + c_i delta_ij,
+
+with c what a layer between the bodies closes by a unit pressure.
 
 So it is in any place of a strip that passes under the punch: half-spaces do not know where they are. Only the
 correction moves.
@@ -12,17 +14,20 @@ correction moves.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from fenwear.arrays import Array, Nodes
+from fenwear.bodies.tensor import TensorWeights
 
 TRANSFORM = 85.0  # numbers that memory could give while one is transformed, there and back over two (measured)
 EVERY = slice(None)
+CACHE = 2**18  # bytes of waves that are transformed at a time
 
 
 @runtime_checkable
@@ -40,8 +45,8 @@ class Convolving(Protocol):
     def table(self, traction: Array) -> Array:
         """Return the displacement by a force (d,) at all distances of two nodes (2 m - 1, ...)."""
 
-    def smooth(self, traction: Array) -> tuple[Array, Array] | None:
-        """Return values at points to the nodes (q, k), and what forces along it at points do (k, k); None for none."""
+    def smooth(self, traction: Array) -> tuple[TensorWeights, Array] | None:
+        """Return values at points to the nodes, and what forces along it at points do (k, k); None for none."""
 
 
 class Convolution:
@@ -50,38 +55,51 @@ class Convolution:
     Args:
         places: Whole numbers of each node along the axes of the grid (n, d - 1).
         table: Gap by a unit force at all distances of two nodes (2 m - 1, ...), mm/N, scaled.
-        smooth: L (n, k) and C (k, k) of each body that has a correction.
+        smooth: L and C (k, k) of each body that has a correction.
         weights: w (n,).
+        local: c (n,), scaled; None for none.
     """
 
     def __init__(
-        self, places: NDArray[np.int64], table: Array, smooth: Sequence[tuple[Array, Array]], weights: Array
+        self,
+        places: NDArray[np.int64],
+        table: Array,
+        smooth: Sequence[tuple[TensorWeights, Array]],
+        weights: Array,
+        local: Array | None = None,
     ) -> None:
-        self.places, self.numbers, self.smooth, self.weights = places, table, list(smooth), weights
+        self.numbers, self.smooth, self.weights, self.local = table, list(smooth), weights, local
+        self.places = places - places.min(axis=0)
         self.shape = tuple((count + 1) // 2 for count in table.shape)
 
     @property
     def cost(self) -> float:
         """Of a product, in numbers that memory could give meanwhile."""
         over = TRANSFORM * 2.0 ** len(self.shape) / 4 * 2 * float(np.prod(self.shape))
-        return over + sum(2.0 * points.size for points, _ in self.smooth)
+        return over + sum(2.0 * len(self.weights) * max(weights.factors[0].shape) for weights, _ in self.smooth)
 
     @cached_property
     def whole(self) -> OnBox:
         """Its products on all nodes."""
-        return OnBox([self], np.arange(len(self.weights)))
+        return OnBox([self], Box.around(self.places, self.shape))
 
     def apply(self, x: Array) -> Array:
         """Return the gaps (n,) of pressures (n,)."""
-        return self.whole.apply(x[None])[0]
+        box = self.whole.box
+        return box.values(self.whole.apply(box.spread(x[None])))[0]
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the numbers of some rows and columns."""
         apart = self.places[rows][:, None] - self.places[columns] + np.array(self.shape) - 1
         found = self.numbers[tuple(np.moveaxis(apart, -1, 0))]
         for points, response in self.smooth:
-            found = found + (points[rows] @ response) @ points[columns].T
-        return np.asarray(found * self.weights[columns])
+            found = found + (points.rows(rows) @ response) @ points.rows(columns).T
+        found = np.asarray(found * self.weights[columns])
+        if self.local is not None:
+            every = np.arange(len(self.weights))
+            i, j = np.equal.outer(every[rows], every[columns]).nonzero()
+            found[i, j] += self.local[rows][i]
+        return found
 
     def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:
         """Return the columns of some nodes (n, k), or some rows of them."""
@@ -91,61 +109,170 @@ class Convolution:
         """Return the diagonal (n,)."""
         found = np.full(len(self.weights), self.numbers[tuple(count - 1 for count in self.shape)])
         for points, response in self.smooth:
-            found += np.einsum("nk,nk->n", points @ response, points)
-        return np.asarray(found * self.weights)
+            found += points.diagonal(response)
+        return np.asarray(found * self.weights + (0.0 if self.local is None else self.local))
 
     def matrix(self) -> Array:
         """Return all of it (n, n)."""
         return self.entries(EVERY, EVERY)
 
 
+@dataclass(frozen=True, eq=False)
+class Box:
+    """A box of places of a grid.
+
+    Attributes:
+        low: Its least place along each axis.
+        counts: Places along each axis.
+        nodes: Numbers of the nodes in it (k,); a slice where all are.
+        at: Where they stand in it, its last axis the fastest (k,); a slice where they stand in its order.
+    """
+
+    low: tuple[int, ...]
+    counts: tuple[int, ...]
+    nodes: NDArray[np.int64]
+    at: NDArray[np.int64]
+
+    @classmethod
+    def around(cls, places: NDArray[np.int64], shape: Sequence[int], touched: NDArray[np.int64] | None = None) -> Box:
+        """Return the box of all places (n, axes) of a grid of that shape, or as wide as some of them ask for.
+
+        No narrower than products on it cost as much.
+        """
+        low, counts = np.zeros(len(shape), dtype=np.int64), np.array(shape)
+        if touched is not None and len(touched):
+            low = places[touched].min(axis=0)
+            wanted = np.array([_padded(int(count)) for count in np.ptp(places[touched], axis=0) + 1])
+            counts = np.minimum(wanted, counts)
+            low = np.maximum(np.minimum(low - (counts - np.ptp(places[touched], axis=0) - 1) // 2, shape - counts), 0)
+        inside = ((places >= low) & (places < low + counts)).all(axis=1)
+        nodes = np.flatnonzero(inside)
+        at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))
+        return cls(tuple(int(k) for k in low), tuple(int(k) for k in counts), nodes, at)
+
+    def holds(self, places: NDArray[np.int64]) -> bool:
+        """Return whether all of some places (k, axes) are in it."""
+        low, high = places.min(axis=0, initial=self.low[0]), places.max(axis=0, initial=self.low[0])
+        return bool((low >= self.low).all() and (high < np.array(self.low) + self.counts).all())
+
+    def spread(self, values: Array) -> Array:
+        """Return values of all nodes (m, n) in the box, zero where no node is (m, ...)."""
+        found = np.zeros((len(values), int(np.prod(self.counts))), dtype=values.dtype)
+        found[:, self.at] = values[:, self.nodes]
+        return found.reshape(-1, *self.counts)
+
+    def values(self, boxed: Array) -> Array:
+        """Return what a box (m, ...) has at its nodes (m, k)."""
+        return np.asarray(boxed.reshape(len(boxed), -1)[:, self.at])
+
+
+def _padded(count: int) -> int:
+    """Return how many places along an axis cost no more than so many: transforms are of twice as many."""
+    return (int(scipy.fft.next_fast_len(2 * count - 1, real=True)) + 1) // 2
+
+
 class OnBox:
-    """Products of several convolutions at once, on nodes of a grid alone and no wider than these.
+    """Products of several convolutions at once, on a box of places.
 
     Args:
         of: The convolutions, on one grid.
-        nodes: Numbers of the nodes (k,).
+        box: Where pressures are, and gaps are asked for.
+        dtype: Precision.
     """
 
-    def __init__(self, of: Sequence[Convolution], nodes: NDArray[np.int64]) -> None:
-        places = of[0].places[nodes]
-        low = places.min(axis=0)
-        self.at = tuple((places - low).T)
-        self.box = tuple(int(count) for count in np.ptp(places, axis=0) + 1)
-        self.size = tuple(scipy.fft.next_fast_len(2 * count - 1, real=True) for count in self.box)
-        self._axes = tuple(range(1, len(self.box) + 1))
-        self._weights = of[0].weights[nodes]
-        same = all(one.numbers is of[0].numbers for one in of)
-        self._kernels = np.array([self._transformed(one) for one in ([of[0]] if same else of)])
-        self._smooth = [[(points[nodes], response) for points, response in one.smooth] for one in of]
+    def __init__(self, of: Sequence[Convolution], box: Box, dtype: DTypeLike = np.float64) -> None:
+        self.box, self.size = box, tuple(scipy.fft.next_fast_len(2 * k - 1, real=True) for k in box.counts)
+        self._dtype = np.dtype(dtype)
+        self._weights = box.spread(of[0].weights[None])[0].astype(dtype)
+        tables = {id(one.numbers): one for one in of}
+        self._kernels = [self._transformed(one) for one in tables.values()]
+        self._of = [np.array([k for k, one in enumerate(of) if id(one.numbers) == key]) for key in tables]
+        local = [one.local for one in of if one.local is not None]
+        self._local = box.spread(np.array(local)).astype(dtype) if local else None
+        self._smooth = [
+            _Smooth([one.smooth[k] for one in of], box, dtype) for k in range(min(len(one.smooth) for one in of))
+        ]
 
     def numbers(self, of: Convolution) -> Array:
         """Return the table of a convolution over the distances within the box (2 b - 1, ...)."""
-        cut = tuple(slice(m - b, m + b - 1) for m, b in zip(of.shape, self.box, strict=True))
+        cut = tuple(slice(m - b, m + b - 1) for m, b in zip(of.shape, self.box.counts, strict=True))
         return of.numbers[cut]
 
-    def _transformed(self, of: Convolution) -> NDArray[np.complex128]:
+    def _transformed(self, of: Convolution) -> NDArray[np.complexfloating]:
         wrapped = np.zeros(self.size)
-        to = np.ix_(*(np.arange(1 - b, b) % size for b, size in zip(self.box, self.size, strict=True)))
+        to = np.ix_(*(np.arange(1 - b, b) % size for b, size in zip(self.box.counts, self.size, strict=True)))
         wrapped[to] = self.numbers(of)
-        return np.asarray(scipy.fft.rfftn(wrapped))
+        return np.asarray(scipy.fft.rfftn(wrapped)).astype(np.result_type(self._dtype, np.complex64))
 
     def apply(self, x: Array) -> Array:
-        """Return the gaps (m, k) of pressures (m, k) of each convolution."""
-        grid = np.zeros((len(x), *self.box))
+        """Return the gaps (m, ...) of pressures (m, ...) of each convolution, in the box."""
         force = x * self._weights
-        grid[(slice(None), *self.at)] = force
-        image = scipy.fft.rfftn(grid, self.size, axes=self._axes)
-        image *= self._kernels
-        found: Array = scipy.fft.irfftn(image, self.size, axes=self._axes, overwrite_x=True)[(slice(None), *self.at)]
-        for k, smooth in enumerate(self._smooth):
-            for points, response in smooth:
-                found[k] += points @ (response @ (force[k] @ points))
+        found = self._convolved(force)
+        for smooth in self._smooth:
+            smooth.add(force, found)
+        if self._local is not None:
+            found += self._local * x
+        return found
+
+    def _convolved(self, force: Array) -> Array:
+        """Return the products with the tables alone; as many at a time as stay in the cache."""
+        counts, size, found = self.box.counts, self.size, np.empty_like(force)
+        for kernel, of in zip(self._kernels, self._of, strict=True):
+            for some in in_cache(len(of), kernel.nbytes):
+                image = forward(force[of[some]], size)
+                image *= kernel
+                found[of[some]] = back(image, size, counts)
         return found
 
 
+def in_cache(count: int, size: int) -> list[slice]:
+    """Return runs of so many arrays of a size (bytes) that stay in the cache together."""
+    step = max(CACHE // size, 1)
+    return [slice(start, start + step) for start in range(0, count, step)]
+
+
+def forward(fields: Array, size: Sequence[int]) -> NDArray[np.complexfloating]:
+    """Return the waves of fields (k, ...) over a box of at most that size; rows of zeros are not transformed."""
+    image = scipy.fft.rfft(fields, size[-1], axis=-1)
+    return np.asarray(scipy.fft.fft(image, size[0], axis=1, overwrite_x=True) if len(size) == 2 else image)
+
+
+def back(image: NDArray[np.complexfloating], size: Sequence[int], counts: Sequence[int]) -> Array:
+    """Return the fields (k, ...) over a box of waves, which are overwritten."""
+    if len(size) == 2:
+        image = scipy.fft.ifft(image, axis=1, overwrite_x=True)[:, : counts[0]]
+    return np.asarray(scipy.fft.irfft(image, size[-1], axis=-1, overwrite_x=True)[..., : counts[-1]])
+
+
+class _Smooth:
+    """The corrections of one body in several phases, on a box."""
+
+    def __init__(self, parts: Sequence[tuple[TensorWeights, Array]], box: Box, dtype: DTypeLike) -> None:
+        factors = [weights.within(box.low, box.counts) for weights, _ in parts]
+        self._factors = [np.array(own, dtype=dtype) for own in zip(*factors, strict=True)]  # of each axis (m, k, c)
+        self._response = np.array([response for _, response in parts], dtype=dtype)
+
+    def add(self, force: Array, to: Array) -> None:
+        """Add the gaps of forces (m, ...) to others."""
+        m = len(force)
+        if len(self._factors) == 1:
+            (one,) = self._factors
+            points = np.einsum("mxa,mx->ma", one, force)
+            to += np.einsum("mxa,ma->mx", one, np.einsum("mab,mb->ma", self._response, points))
+            return
+        first, second = self._factors
+        points = first.transpose(0, 2, 1) @ (force @ second)
+        moved = (self._response @ points.reshape(m, -1, 1)).reshape(points.shape)
+        to += (first @ moved) @ second.transpose(0, 2, 1)
+
+
 def convolution(
-    bodies: Sequence[object], traction: Array, weights: Array, scale: float, known: dict[bytes, Array]
+    bodies: Sequence[object],
+    traction: Array,
+    weights: Array,
+    scale: float,
+    known: dict[bytes, Array],
+    local: Array | None = None,
 ) -> Convolution | None:
     """Return S of bodies on one grid; None where they are on none, or the traction differs from node to node.
 
@@ -155,6 +282,7 @@ def convolution(
         weights: Areas of the nodes (n,).
         scale: A factor of S.
         known: Tables that were made, by the traction: they are the same in every place.
+        local: What a layer between them closes by unit pressures (n,), mm/MPa; None for none.
     """
     operators = [body for body in bodies if isinstance(body, Convolving) and body.directions.shape[2] == 1]
     if len(operators) < len(bodies) or not len(traction) or np.ptp(traction, axis=0).any():
@@ -166,4 +294,4 @@ def convolution(
     if key not in known:
         known[key] = np.sum([one.table(force) for one in operators], axis=0)
     smooth = [part for one in operators if (part := one.smooth(force)) is not None]
-    return Convolution(places, known[key], smooth, weights)
+    return Convolution(places, known[key], smooth, weights, None if local is None else scale * local)

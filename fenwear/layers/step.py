@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -131,18 +130,15 @@ class LayerStep:
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
         return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
 
-    def linear(self, pressure: Array) -> tuple[Callable[[Array], Array], Array]:
-        """Return the derivative of `opening` as a product with pressures (m, n), and slopes at own nodes (m, n)."""
-        covered, layer = self._covered(pressure), self.layer(pressure)
-        product, slopes = self._wear.linear(pressure)
+    def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
+        """Return what unit pressures open at the punch's nodes in all phases, and wear off the strip (m, n), mm/MPa."""
         if not self.implicit:
-            product, slopes, covered = np.zeros_like, np.zeros_like(slopes), np.zeros_like(covered)
-
-        def opened(change: Array) -> Array:
-            found = product(change) - (covered * change).sum(axis=0)
-            return found if layer is None else found + layer * change
-
-        return opened, slopes - covered + (0.0 if layer is None else layer)
+            return None, None
+        punch, strip = self._wear.by_body(pressure)
+        if self.passing.debris is None:
+            return punch, strip
+        covered = self._covered(pressure)
+        return -covered if punch is None else punch - covered, strip
 
     @property
     def curved(self) -> bool:

@@ -8,7 +8,7 @@ strip's wear spreads along the whole of it, see `fenwear.sliding.track`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -156,22 +156,10 @@ class PhasesWear:
                 right[k, strip:] = self.pairs[k].wear_projection.toarray() * slope
         return self._left, right
 
-    def linear(self, pressure: Array) -> tuple[Callable[[Array], Array], Array]:
-        """Return the derivative of `opening` at pressures (m, n) as a product with others (m, n), and its slopes.
-
-        The slopes (m, n), mm/MPa, are what unit pressures wear off both bodies at their own nodes.
-        """
-        slopes = [None if body is None else body.slope(pressure) for body in (self.punch, self.strip)]
-
-        def product(change: Array) -> Array:
-            punch, strip = (None if slope is None else slope * change for slope in slopes)
-            opened = np.zeros(change.shape) if punch is None else np.broadcast_to(punch.sum(axis=0), change.shape)
-            if strip is None:
-                return opened
-            worn = sum(pair.wear_projection @ own for pair, own in zip(self.pairs, strip, strict=True))
-            return opened + np.array([pair.wear_interpolation @ worn for pair in self.pairs])
-
-        return product, np.sum([slope for slope in slopes if slope is not None], axis=0)
+    def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
+        """Return what unit pressures wear off punch and strip at pressures (m, n), mm/MPa; None where one does not."""
+        punch, strip = (None if body is None else body.slope(pressure) for body in (self.punch, self.strip))
+        return punch, strip
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
@@ -222,10 +210,10 @@ class StepWear:
         found = self.wear.local(pressure)
         return None if found is None else self.repeats * found
 
-    def linear(self, pressure: Array) -> tuple[Callable[[Array], Array], Array]:
-        """Return the derivative of `opening` as a product, and what unit pressures wear at their own nodes (m, n)."""
-        product, slopes = self.wear.linear(pressure)
-        return lambda change: self.repeats * product(change), self.repeats * slopes
+    def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
+        """Return what unit pressures wear off punch and strip in the step (m, n), mm/MPa; None where one does not."""
+        punch, strip = (None if one is None else self.repeats * one for one in self.wear.by_body(pressure))
+        return punch, strip
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of its derivative L_k R_j."""

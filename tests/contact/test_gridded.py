@@ -1,0 +1,118 @@
+"""Phases on grids by products alone: as matrices of all nodes have them, in contact, wear and what gives way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fenwear import Case, assemble
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact.gridded import GriddedPhases
+from fenwear.interface.convolution import Box, OnBox
+
+WEAR = {"punch": {"coefficient": "1e-6 1/MPa"}, "strip": {"coefficient": "2e-6 1/MPa"}}
+
+
+def ball(**more: Any) -> Case:
+    """Return a block with the profile of a ball of radius 20 on another one, as half-spaces on a grid."""
+    x = np.linspace(-1.2, 1.2, 25)
+    points = [(a, b, (a * a + b * b) / 40) for a in x for b in x]
+    body = {"operator": "half-space", "regions": {}}
+    data: dict[str, Any] = {
+        "geometry": {
+            "file": "solid_blocks.geo",
+            "degree": 1,
+            "parameters": {"width": 2.4, "depth": 2.4, "margin_x": 1, "margin_y": 1, "punch_height": 1}
+            | {"strip_height": 1, "across_x": 2, "across_y": 2, "margin_elements": 1, "punch_layers": 1}
+            | {"strip_layers": 1},
+        },
+        "model": {"kind": "solid"},
+        "materials": {"steel": {"young": 2.1e5, "poisson": 0.3}, "brass": {"young": 1.0e5, "poisson": 0.34}},
+        "punch": body
+        | {"regions": {"punch_body": "steel"}, "supports": [{"on": "punch_far", "fix": ["x", "y"]}]}
+        | {"loads": [{"on": "punch_far", "force": [0, 0, -600]}], "profile": {"points": points}}
+        | {"no_turning_about": ["x", "y", "z"]},
+        "strip": body | {"regions": {"strip_body": "brass"}, "supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        "grid": {"nodes": 15, "size": [2.0, 1.8]},
+        "contact": {"friction": 0.3},
+        "wear": WEAR,
+        "motion": {"kind": "reciprocating", "amplitude": 0.12, "period": 1.0, "positions": 3},
+        "run": {"half_cycles": 40, "integration": "jump"},
+    }
+    return Case.model_validate({**data, **more})
+
+
+def solved(system: Tribosystem, *, cycles: float = 30.0) -> ContactState:
+    """Return the contact of all phases with the wear of so many cycles in it."""
+    contact = system.phase_contact(range(len(system.motion.phases)))
+    assert isinstance(contact, CondensedContact)
+    unworn = system.unworn()
+    gap = np.array([system.gap(k, unworn) for k in range(len(system.motion.phases))])
+    return contact.solve(gap, None, system.passing(system.phases_wear).step(unworn.between, cycles))
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"wear": {"strip": WEAR["strip"]}},
+        {"wear": {"punch": WEAR["punch"] | {"pressure_exponent": 1.5, "coefficient": "1e-7 1/MPa^1.5"}}},
+        {"contact": {"layer": {"kind": "linear", "stiffness": "5e5 MPa/mm"}}},
+        {"contact": {"layer": {"kind": "power", "reference": "1 um", "pressure": "300 MPa"}}},
+    ],
+    ids=["both", "strip", "power", "linear-layer", "layer"],
+)
+def test_as_by_matrices(more: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pressures and gaps of six phases that meet in their wear, node by node, and the loads carried exactly."""
+    system = assemble(ball(**more))
+    ours = solved(system)
+    monkeypatch.setattr(CondensedContact, "_gridded", False)
+    theirs = solved(assemble(ball(**more)))
+    touching = theirs.pressure > 0
+    assert 0.1 < touching.mean() < 0.9
+    scale = theirs.pressure.max()
+    np.testing.assert_allclose(ours.pressure, theirs.pressure, rtol=0, atol=1e-7 * scale)
+    np.testing.assert_allclose(ours.gap, theirs.gap, rtol=0, atol=1e-7 * theirs.gap.max())
+    forces = ours.pressure @ system.pair.weights
+    np.testing.assert_allclose(forces, 600.0, rtol=1e-13)
+
+
+def test_products_and_solutions_are_of_each_other() -> None:
+    """The solution operator of nodes in contact is that of the product's rows and columns."""
+    system = assemble(ball())
+    contact = system.phase_contact(range(len(system.motion.phases)))
+    assert isinstance(contact, CondensedContact)
+    operator = contact._jacobian(np.zeros(contact.size))
+    assert isinstance(operator, GriddedPhases)
+    free = np.ones(contact.size, dtype=bool)
+    n = len(system.pair.weights)
+    apart = np.linalg.norm(system.pair.punch.x[:, :2], axis=1)
+    free.reshape(len(system.motion.phases), -1)[:, :n] = apart < 0.7
+    kept = np.flatnonzero(free).astype(np.int32)
+    x = np.zeros(contact.size)
+    x[kept] = np.random.default_rng(3).standard_normal(len(kept))
+    found = operator.factor(kept)(operator.multiply(x)[kept])
+    np.testing.assert_allclose(found, x[kept], rtol=0, atol=1e-7)
+
+
+def test_a_box_cuts_the_whole() -> None:
+    """Products on a box are those of the whole grid there, of pressures within it."""
+    system = assemble(ball())
+    contact = system.phase_contact([0, 3])
+    assert isinstance(contact, CondensedContact)
+    of = contact._grid.of
+    x = system.pair.punch.x
+    inside = np.flatnonzero((np.abs(x[:, 0] - 0.2) < 0.35) & (np.abs(x[:, 1] + 0.1) < 0.3))
+    pressure: Array = np.zeros((2, len(x)))
+    pressure[:, inside] = np.random.default_rng(1).random((2, len(inside)))
+    box = Box.around(of[0].places, of[0].shape, inside)
+    assert np.prod(box.counts) < 0.5 * np.prod(of[0].shape)
+    found = box.values(OnBox(of, box).apply(box.spread(pressure)))
+    whole = np.array([one.apply(p) for one, p in zip(of, pressure, strict=True)])
+    np.testing.assert_allclose(found, whole[:, box.nodes], rtol=0, atol=1e-13 * whole.max())
+    rows = np.array([one.matrix() @ p for one, p in zip(of, pressure, strict=True)])
+    np.testing.assert_allclose(whole, rows, rtol=0, atol=1e-12 * whole.max())

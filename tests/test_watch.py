@@ -165,6 +165,22 @@ def test_a_corner_is_no_clip(tmp_path: Path, name: str) -> None:
     assert summary["warnings"] == []
 
 
+@pytest.mark.parametrize(("size", "clipped"), [("0.1 mm", True), ("0.3 mm", False)])
+def test_a_contact_grid_may_be_too_small(size: str, clipped: bool, assembled: Assembled) -> None:
+    """Contact at the rim of a grid within the surface is told, with Hertz's width, as it is at the rim of a mesh."""
+    grid = f"grid={{nodes=17, size=['{size}', '{size}']}}"
+    bodies = ("punch.operator='half-space'", "strip.operator='half-space'", "motion.positions=2")
+    coarse = ("geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4")
+    system = assembled("ball-on-flat", grid, *bodies, *coarse)
+    found = [text for text in initial_warnings(system) if "clipped" in text]
+    assert len(found) == clipped
+    if clipped:
+        assert "end of the contact grid" in found[0]
+        width = 2 * (3 * 20 * 5 / (4 * 210e3 / (2 * (1 - 0.3**2)))) ** (1 / 3)
+        assert f"a width of about {width:.2g}" in found[0]
+        assert "set grid.size" in found[0]
+
+
 def test_half_a_flat_is_clipped(assembled: Assembled, tmp_path: Path) -> None:
     """The same punch whose tag ends in the middle of its flat: told before anything is computed, and by `steady`."""
     system = assembled(half_tagged(tmp_path), *FLAT)

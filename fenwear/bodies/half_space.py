@@ -176,10 +176,15 @@ def _influences(
     shape: tuple[int, ...], spacing: tuple[float, ...], shear: float, poisson: float, depth: float
 ) -> Array:
     """Return displacements by unit forces on cells at all distances of two nodes of a grid (2 m - 1, ..., d, d)."""
-    counts = [np.arange(1 - count, count) for count in shape]
-    far = np.stack(np.meshgrid(*counts, indexing="ij"), axis=-1) * np.array(spacing)
-    found = influence(far.reshape(-1, len(shape)), spacing, shear, poisson, depth) / np.prod(spacing)
-    return np.asarray(found.reshape(*far.shape[:-1], *found.shape[1:]))
+    ahead = np.stack(np.meshgrid(*(np.arange(count) for count in shape), indexing="ij"), axis=-1) * np.array(spacing)
+    own = influence(ahead.reshape(-1, len(shape)), spacing, shear, poisson, depth) / np.prod(spacing)
+    found = own.reshape(*shape, *own.shape[1:])
+    for axis, count in enumerate(shape):  # the other way along an axis what that axis has one share in changes its sign
+        turned = np.ones(len(shape) + 1)
+        turned[axis] = -1.0
+        back = np.flip(found.take(range(1, count), axis=axis), axis=axis) * np.outer(turned, turned)
+        found = np.concatenate([back, found], axis=axis)
+    return np.asarray(found)
 
 
 def half_space(request: Request) -> HalfSpace:

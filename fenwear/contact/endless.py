@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -35,7 +36,7 @@ LEAST = 0.05  # of the symbol at its mean wave number: what a table cut off may 
 SAME = 1e-12  # of symbols
 MARGIN = 1.25  # of a box: the period of what is solved, which does not end
 
-Waves = NDArray[np.complexfloating]
+Waves = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 import scipy.fft
@@ -198,7 +198,7 @@ class OnBox:
         cut = tuple(slice(m - b, m + b - 1) for m, b in zip(of.shape, self.box.counts, strict=True))
         return of.numbers[cut]
 
-    def _transformed(self, of: Convolution) -> NDArray[np.complexfloating]:
+    def _transformed(self, of: Convolution) -> NDArray[np.complexfloating[Any, Any]]:
         wrapped = np.zeros(self.size)
         to = np.ix_(*(np.arange(1 - b, b) % size for b, size in zip(self.box.counts, self.size, strict=True)))
         wrapped[to] = self.numbers(of)
@@ -231,13 +231,13 @@ def in_cache(count: int, size: int) -> list[slice]:
     return [slice(start, start + step) for start in range(0, count, step)]
 
 
-def forward(fields: Array, size: Sequence[int]) -> NDArray[np.complexfloating]:
+def forward(fields: Array, size: Sequence[int]) -> NDArray[np.complexfloating[Any, Any]]:
     """Return the waves of fields (k, ...) over a box of at most that size; rows of zeros are not transformed."""
     image = scipy.fft.rfft(fields, size[-1], axis=-1)
     return np.asarray(scipy.fft.fft(image, size[0], axis=1, overwrite_x=True) if len(size) == 2 else image)
 
 
-def back(image: NDArray[np.complexfloating], size: Sequence[int], counts: Sequence[int]) -> Array:
+def back(image: NDArray[np.complexfloating[Any, Any]], size: Sequence[int], counts: Sequence[int]) -> Array:
     """Return the fields (k, ...) over a box of waves, which are overwritten."""
     if len(size) == 2:
         image = scipy.fft.ifft(image, axis=1, overwrite_x=True)[:, : counts[0]]

@@ -117,7 +117,7 @@ def contact_rim(system: Tribosystem) -> ContactRim | None:
     if not at_nodes.any():
         return None
     widths = np.ptp(x @ _tangents(pair.normal.mean(axis=0)).T, axis=0)
-    return ContactRim(at_nodes, x, float(widths.max()), _curvatures(system), contact_modulus(system.case))
+    return ContactRim(at_nodes, x, float(widths.max()), curvatures(system), contact_modulus(system.case))
 
 
 def rim_edges(elastic: ElasticBody) -> tuple[NDArray[np.int64], Array, Array]:
@@ -214,7 +214,7 @@ def _tangents(normal: Array) -> Array:
     return np.asarray(rows[1:])
 
 
-def _curvatures(system: Tribosystem) -> tuple[float, float] | None:
+def curvatures(system: Tribosystem) -> tuple[float, float] | None:
     """Return the principal curvatures of the paraboloid that is nearest to the unworn gap; None where it is none."""
     pair = system.pair
     s, t = ((pair.punch.x - pair.punch.x.mean(axis=0)) @ _tangents(pair.normal.mean(axis=0)).T).T

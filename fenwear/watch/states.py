@@ -15,6 +15,7 @@ from fenwear.results.summary import net_of
 from fenwear.watch.chamfer import contact_chamfer
 from fenwear.watch.ends import ContactEnds, contact_ends, opened
 from fenwear.watch.few import few_text
+from fenwear.watch.grid_rim import grid_limits
 from fenwear.watch.layer import layer_warnings
 from fenwear.watch.rim import ContactRim, contact_rim
 from fenwear.watch.size import size_warnings
@@ -112,6 +113,9 @@ def contact_limits(system: Tribosystem) -> ContactEnds | ContactRim | None:
     Args:
         system: On meshes as they were made, not moved by wear.
     """
+    grid = system.pair.punch.grid
+    if grid is not None:
+        return grid_limits(system, grid)
     return contact_rim(system) if system.pair.punch.dim == 3 else contact_ends(system)
 
 
@@ -124,11 +128,18 @@ def few_across(system: Tribosystem, limits: ContactEnds | ContactRim | None, pre
 def clipped_text(limits: ContactEnds | ContactRim, where: str, needed: float | None, case: Case) -> str:
     """Say that the contact is clipped, and how wide the surface should be."""
     how = "; set geometry.parameters.contact_width" if "contact_width" in case.geometry.parameters else ""
+    if case.grid is not None:
+        how = "; set grid.size, within the contact surface"
     wide = "" if needed is None else f"; a width of about {needed:.3g} mm is needed, it has {limits.width:.3g} mm"
     return (
-        f"contact reaches the end of the meshed contact surface {where}, where the bodies go on smoothly: "
+        f"contact reaches the end of the {_ending(case)} {where}, where the bodies go on smoothly: "
         f"it is clipped there, and pressures and depths are not those of a surface that is wide enough{wide}{how}"
     )
+
+
+def _ending(case: Case) -> str:
+    """Return what ends where contact is clipped."""
+    return "meshed contact surface" if case.grid is None else "contact grid"
 
 
 def mean_pressures(pressure: Array, weights: Array) -> Array:
@@ -195,7 +206,7 @@ def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
     if limits is not None and where:
         reach = f"; a width of about {limits.reach:.4g} mm is needed, from edge to edge" if limits.reach else ""
         texts.append(
-            f"contact reaches the end of the meshed contact surface {where}, where the bodies go on "
+            f"contact reaches the end of the {_ending(system.case)} {where}, where the bodies go on "
             f"smoothly: the scar of the cyclic steady state is as wide as what is meshed, "
             f"{limits.width:.4g} mm, whatever that is, and so are its pressures{reach}. "
             "A scar that still grows is followed by `run`"

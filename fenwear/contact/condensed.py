@@ -435,14 +435,19 @@ class CondensedContact:
 
         Of all forces that balance the loads those of rigid bodies do the least work on the gaps; their multipliers are
         the motion that goes as far along the loads as the gaps allow. What then is nearer than elastic bodies give
-        way by touches.
+        way by touches. Gaps are those that the loads open; where the bodies, held at a few points, bend so far by them
+        that they would press on each other from two sides, those without.
         """
         found, n = np.zeros_like(self._offset), self.shape[1]
         for k, offset in enumerate(self._offset):
             gap, load = offset[:n], offset[n:]
-            if len(load):
-                rest = linprog(gap, A_eq=self._balance(k), b_eq=-load)
-                found[k, :n] = (rest.lower.marginals < 1) if rest.status == 0 else 1.0
-            else:
+            if not len(load):
                 found[k, :n] = gap < 0
+                continue
+            found[k, :n] = 1.0
+            for one in (gap, gap - self._loads[k] / self._gap_scale):
+                rest = linprog(one, A_eq=self._balance(k), b_eq=-load)
+                if rest.status == 0:
+                    found[k, :n] = rest.lower.marginals < 1
+                    break
         return found

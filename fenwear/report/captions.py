@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray
 
 from fenwear.report.style import Look, direction_words, strip_moves
-from fenwear.report.surface import model_of, surface_of
+from fenwear.report.surface import cut_places, model_of
 from fenwear.results.sheet import BODIES
 
 TEXTS = {
@@ -22,7 +22,8 @@ TEXTS = {
     "peaks": "Largest contact pressure and {size} in contact{hot}, for each sliding direction, over the {axis}; "
     "grey: the largest of the mean pressure over the last tenth of what is done.",
     "place": "The shaft in its bore: (a) the way from the middle of the unworn bore to that of the unworn shaft, (b) "
-    "its size and (c) its angle from the way in which the load presses the shaft, as the strip turns, over the {axis}.",
+    "its size and (c) its angle from the way in which the load presses the shaft (of several bores, what each of them "
+    "carries), as the strip turns, over the {axis}.",
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
     "the sliding distance.",
     "scar": "(a) Largest worn depth and (b) size of the scar at 1 % and 5 % of it, over the {axis}; of a surface, its "
@@ -61,12 +62,10 @@ TEXTS = {
 WEAR_MAPS = "Maps of the worn depth of the punch over its largest at {chosen}, which is told above each."
 
 
-def _first_part(history: xarray.Dataset) -> str:
-    """Say which contact of a solid the cuts are of, where its parts lie behind each other."""
-    surface = surface_of(history) if model_of(history) == "solid" else None
-    if surface is None or not surface.overlaps:
-        return ""
-    return "Of the first part." if surface.contact is None else f"Of the contact {surface.contact[0]}."
+def _each(history: xarray.Dataset) -> str:
+    """Say where cuts are of several contacts of a solid."""
+    places = cut_places(history) if model_of(history) == "solid" else []
+    return "Each contact through the middle of its own wear." if len(places) > 1 else ""
 
 
 def caption(name: str, history: xarray.Dataset, look: Look) -> str:
@@ -92,4 +91,4 @@ def caption(name: str, history: xarray.Dataset, look: Look) -> str:
         back=f"{moves.removeprefix('strip ')} {words[-1]}",
         last=f"{int(history.half_cycle[-1]):,}",
     )
-    return f"{told} {_first_part(history)}".strip() if name.startswith("cuts") else told
+    return f"{told} {_each(history)}".strip() if name.startswith("cuts") else told

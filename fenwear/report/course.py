@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LAST = 0.1  # of what is done, that a mean pressure is of
+BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least
 
 
@@ -130,29 +131,43 @@ def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
 
 
 def place_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
-    """Draw a shaft's place in its bore over a run: the path of its middle, eccentricity and attitude angle."""
+    """Draw a shaft's place in its bores over a run: the path of its middle, eccentricity and attitude angle."""
     figure, axes = panels(3, 2.7, share_x=False, look=look)
-    x = look.course(history)
-    e_x, e_z = (1e3 * history[f"eccentricity_{axis}"].values for axis in "xz")
-    axes[0].plot(e_x, e_z, color="0", **mark_few(x))
+    x, bores = look.course(history), bores_of(history)
     axes[0].plot(0, 0, "+", color="0", label="middle of the bore")
-    axes[0].plot(e_x[:1], e_z[:1], "o", color=BLUE, markersize=4, label="shaft, at first")
-    axes[0].plot(e_x[-1:], e_z[-1:], "s", color=RED, markersize=4, label="shaft, at the end")
+    for number, (name, end) in enumerate(bores.items()):
+        style = run_style(number) if name else {"color": "0"}
+        words = f", {name}" if name else ""
+        e_x, e_z = (1e3 * history[f"eccentricity_{axis}{end}"].values for axis in "xz")
+        axes[0].plot(e_x, e_z, **style, **mark_few(x))
+        axes[0].plot(e_x[:1], e_z[:1], "o", color=style["color"] if name else BLUE, markersize=4,
+                     label=f"shaft, at first{words}")  # fmt: skip
+        axes[0].plot(e_x[-1:], e_z[-1:], "s", color=style["color"] if name else RED, markersize=4,
+                     label=f"shaft, at the end{words}")  # fmt: skip
+        label = {"label": name} if name else {}
+        axes[1].plot(x, 1e3 * history[f"eccentricity{end}"], **style, **label, **mark_few(x))
+        axes[2].plot(x, history[f"attitude_angle{end}"], **style, **label, **mark_few(x))
     axes[0].set_aspect("equal", adjustable="datalim")
     axes[0].margins(0.15)
     axes[0].set_xlabel("x (µm)")
     axes[0].set_ylabel("z (µm)")
-    legend_beside(axes[0], "")
-    axes[1].plot(x, 1e3 * history.eccentricity, color="0", **mark_few(x))
     axes[1].set_ylabel("eccentricity (µm)")
     from_zero(axes[1])
-    axes[2].plot(x, history.attitude_angle, color="0", **mark_few(x))
     axes[2].set_ylabel("attitude angle (degrees)")
     low, high = axes[2].get_ylim()
-    axes[2].set_ylim(min(low, -1.0), max(high, 1.0))
+    low, high = min(low, -1.0), max(high, 1.0)
+    axes[2].set_ylim(low - BEYOND * (high - low), high + BEYOND * (high - low))
+    for ax in axes if len(bores) > 1 else axes[:1]:
+        legend_beside(ax, "")
     for ax in axes[1:]:
         run_axis(ax, history, look)
     return figure
+
+
+def bores_of(history: xarray.Dataset) -> dict[str, str]:
+    """Return how the names of variables of a shaft's place end, by the name of the bore; "" of the only one."""
+    start = "attitude_angle"
+    return {name[len(start) + 1 :]: name[len(start) :] for name in map(str, history) if name.startswith(start)}
 
 
 def friction_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:

@@ -11,6 +11,7 @@ import xarray
 
 from fenwear.errors import CaseError, InputError
 from fenwear.report.course import (
+    bores_of,
     convergence_figure,
     directions_present,
     friction_figure,
@@ -161,7 +162,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
         if "max_temperature" in history:
             drawn["temperature"] = temperature_figure(history, chosen, look)
     drawn["peaks"] = peak_figure(history, look)
-    if "eccentricity" in history:
+    if bores_of(history):
         drawn["place"] = place_figure(history, look)
     if "sliding_distance" in history:
         drawn["volume"] = volume_figure(history, Look(look.width, "distance"))

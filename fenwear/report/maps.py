@@ -26,7 +26,7 @@ from fenwear.report.style import (
     panels_of_maps,
     shades,
 )
-from fenwear.report.surface import Surface, centre_of_wear, surface_of
+from fenwear.report.surface import Surface, cut_places, surface_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 LEVELS = 16
 LONG = 2.2  # length over height of a map from which on fewer stand beside each other
+BESIDE = 3  # contacts whose cuts stand beside each other
 EDGE_OF_CONTACT = 1e-2  # of the largest pressure
 
 
@@ -134,6 +135,7 @@ def _map_panels(surface: Surface, count: int, look: Look) -> tuple[Figure, list[
         for name, (across, up) in surface.labels:
             ax.text(across, up, name, ha="center", va="center", fontsize="small", color=GREY)
         ax.margins(0.03)
+        surface.set_ticks(ax)
     for lowest in shown[-columns:]:  # the last row may be shorter
         lowest.set_xlabel(surface.axis_labels[0])
         lowest.tick_params(labelbottom=True)
@@ -166,7 +168,11 @@ def _contact_edge(ax: Any, surface: Surface, pressure: Array) -> None:
 
 
 def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD, *, along: bool) -> Figure:
-    """Draw pressure, worn depths and temperatures along or across the sliding through the middle of the wear."""
+    """Draw pressure, worn depths and temperatures along or across the sliding through the middle of the wear.
+
+    Contacts with names stand beside each other, each cut through the middle of its own; below each other where the
+    figure is narrow.
+    """
     drawn = list(quantities(history).values())
     early = early_half_cycles(history, half_cycles)
     # What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
@@ -175,21 +181,37 @@ def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look 
     for quantity in drawn:
         rows += [(quantity, part) for part in ((late, early) if quantity.variable == "pressure" else (half_cycles,))]
     rows = [row for row in rows if row[1]]
-    figure, axes = panels(len(rows), 2.3, share_x=False, look=look)
-    at = centre_of_wear(history)
-    for ax, (quantity, shown) in zip(axes, rows, strict=True):
-        surface = surface_of(history, quantity.body)
+    places = cut_places(history)
+    columns = len(places) if len(places) <= BESIDE and look.width >= NARROW else 1
+    order = [(row, place) for row in rows for place in places]
+    if columns == 1:
+        order = [(row, place) for place in places for row in rows]
+    figure, axes = panels(len(order), 2.3, columns=columns, share_x=False, look=look)
+    for number, (ax, ((quantity, shown), place)) in enumerate(zip(axes, order, strict=True)):
+        surface, own = surface_of(history, quantity.body), place.nodes[quantity.body]
         for colour, n in shades(half_cycles):
             if n in shown:
                 values = quantity.factor * history[quantity.variable].sel(half_cycle=n).values
-                ax.plot(*surface.cut(values, at, along=along), color=colour, label=look.name(history, n))
-        ax.set_ylabel(f"{quantity.short} ({quantity.unit})")
+                cut = surface.cut(values, place.at, along=along, nodes=own)
+                ax.plot(*cut, color=colour, label=look.name(history, n))
         if not quantity.variable.startswith("temperature"):
             from_zero(ax)
         ax.margins(x=0.01)
-        legend_beside(ax, look.of_one)
+        first, last = number % columns == 0, number % columns == columns - 1
+        if first:
+            ax.set_ylabel(f"{quantity.short} ({quantity.unit})")
+        if last:
+            legend_beside(ax, look.of_one)
+        if place.name and (columns == 1 or number < columns):
+            ax.set_title(place.name, loc="center", fontsize="medium")
+        if (quantity, shown) == rows[-1]:
+            ax.set_xlabel(_cut_text(history, place.at, along=along))
+    return figure
+
+
+def _cut_text(history: xarray.Dataset, at: Array, *, along: bool) -> str:
+    """Return what stands below a cut through a point (2,)."""
     place, other = (float(at[1]), "across") if along else (float(at[0]), "along")
     grain = 1e-4 * float(np.ptp(surface_of(history).sliding, axis=0).max())
     place = round(place / grain) * grain
-    axes[-1].set_xlabel(f"place {'along' if along else 'across'} the sliding (mm),\nat {place:.4g} mm {other} it")
-    return figure
+    return f"place {'along' if along else 'across'} the sliding (mm),\nat {place:.4g} mm {other} it"

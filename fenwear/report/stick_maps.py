@@ -158,6 +158,7 @@ def _contact_maps(history: xarray.Dataset, surface: Surface, rows: int, columns:
         ax.set_xlim(low[0] - room, high[0] + room)
         ax.set_ylim(low[1] - room, high[1] + room)
     for ax in axes[-1]:
+        surface.set_ticks(ax)
         ax.set_xlabel(surface.axis_labels[0])
     for ax in axes[:, 0]:
         ax.set_ylabel(surface.axis_labels[1])

@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from string import ascii_lowercase
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,9 +112,12 @@ def strip_moves(data: xarray.Dataset) -> str:
 
 
 def panels(
-    count: int, height: float, *, share_x: bool = True, share_y: bool = False, look: Look = STANDARD
+    count: int, height: float, *, columns: int = 1, share_x: bool = True, share_y: bool = False, look: Look = STANDARD
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure of lettered panels below each other, each as high as given for the full width, inches."""
+    """Return a figure of lettered panels below each other, each as high as given for the full width, inches.
+
+    In several columns they follow each other row by row, and those of a row share the upward axis.
+    """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -122,10 +126,12 @@ def panels(
     with rc_context({**settings, "pdf.fonttype": 42, "svg.fonttype": "none"}):
         scale = min(1.0, 0.35 + 0.65 * look.width / WIDTH)
         above = ABOVE if look.width < NARROW else 0.0
-        figure = Figure(figsize=(look.width, scale * height * count + above), layout="constrained")
-        axes = list(figure.subplots(count, 1, sharex=share_x, sharey=share_y, squeeze=False)[:, 0])
+        rows = -(-count // columns)
+        figure = Figure(figsize=(look.width, scale * height * rows + above), layout="constrained")
+        shared: Any = "row" if columns > 1 else share_y
+        axes = list(figure.subplots(rows, columns, sharex=share_x, sharey=shared, squeeze=False).ravel())
         if count > 1:
-            for ax, letter in zip(axes, "abcdefgh", strict=False):
+            for ax, letter in zip(axes, ascii_lowercase, strict=False):
                 ax.set_title(f"({letter})", loc="left")
         return figure, axes
 
@@ -163,8 +169,12 @@ def _named(ax: Axes) -> list[str]:
 
 
 def from_zero(ax: Axes) -> None:
-    """Let the upward axis begin at zero, and leave room above what is drawn, were it a level line alone."""
-    tops = [np.nanmax(y) for line in ax.get_lines() if len(y := np.asarray(line.get_ydata())) and np.isfinite(y).any()]
+    """Let the upward axis begin at zero, and leave room above what is drawn, were it a level line alone.
+
+    Also above what other panels with the same axis have.
+    """
+    lines = [line for one in ax.get_shared_y_axes().get_siblings(ax) for line in one.get_lines()]
+    tops = [np.nanmax(y) for line in lines if len(y := np.asarray(line.get_ydata())) and np.isfinite(y).any()]
     ax.set_ylim(0, 1.08 * max(tops, default=0.0) or None)
 
 

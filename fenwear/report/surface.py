@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray
@@ -13,17 +14,21 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.report.style import ALONG_CONTACT
+from fenwear.results.sheet import BODIES
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.tri import Triangulation
 
 POINTS = 301  # along a cut
+TICKS = 2  # intervals between those of each of several parts on a map
 BESIDE = 1.1  # of the parts' size: how far apart they are laid
 AXES = ("x", "y", "z")
 EDGEWISE = 0.3  # of a surface's area: what is seen of it along an axis, less of what is seen edge-on
 OVER = 1.1  # of the area around it: more of what is seen lies over itself
+ASIDE = 0.12  # of the way along an unrolled part: where its name stands, beside what touches
 HALF = 0.5  # of the way around: longer facets go over the cut
 ARROWS = "→↗↑↖←↙↓↘"
 
@@ -109,8 +114,13 @@ class Surface:
         """Coordinates on a map (n, 2), mm."""
         seen = self._flat.copy()
         if self.overlaps:
-            seen[:, self._beside] += BESIDE * np.ptp(seen[:, self._beside]) * self.part
+            seen[:, self._beside] += self._apart * self.part
         return seen
+
+    @property
+    def _apart(self) -> float:
+        """How far parts are laid apart, mm."""
+        return BESIDE * float(np.ptp(self._flat[:, self._beside]))
 
     @cached_property
     def _beside(self) -> int:
@@ -121,31 +131,73 @@ class Surface:
     def axis_labels(self) -> tuple[str, str]:
         """What the map's axes are."""
         axes = ("along the sliding", "across it") if self.unrolled else [AXES[axis] for axis in self.seen]
-        first, second = (
-            f"{axis} (mm)" + (",\nfirst part" if self.overlaps and k == self._beside else "")
-            for k, axis in enumerate(axes)
-        )
-        return first, second
+        return f"{axes[0]} (mm)", f"{axes[1]} (mm)"
+
+    def set_ticks(self, ax: Axes) -> None:
+        """Have the axes of a map tell where each of the parts is that are laid beside each other."""
+        from matplotlib.ticker import MaxNLocator
+
+        if not self.overlaps:
+            return
+        places, texts = [], []
+        for k in range(self.part.max() + 1):
+            own = self._flat[self.part == k, self._beside]
+            values = MaxNLocator(TICKS).tick_values(own.min(), own.max())
+            values = values[(values >= own.min()) & (values <= own.max())]
+            places += [float(value + k * self._apart) for value in values]
+            texts += [f"{value:g}" for value in values]
+        (ax.xaxis, ax.yaxis)[self._beside].set_ticks(places, labels=texts)
 
     @cached_property
     def labels(self) -> list[tuple[str, Array]]:
-        """Names of contacts and where they stand on the map (2,), mm: in the middle of their parts."""
+        """Names of contacts and where they stand on the map (2,), mm: in the middle of their parts; unrolled aside."""
         if self.contact is None:
             return []
-        return [(name, self.map[self.contact == name].mean(axis=0)) for name in np.unique(self.contact)]
+        found = []
+        for name in np.unique(self.contact):
+            own = self.map[self.contact == name]
+            at = own.mean(axis=0)
+            if self.unrolled:
+                at[0] = own[:, 0].min() + ASIDE * np.ptp(own[:, 0])
+            found.append((name, at))
+        return found
 
     @cached_property
     def border(self) -> Array:
         """Segments around the map (m, 2, 2), mm."""
-        edges = np.stack([self.cells, np.roll(self.cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+        points, _, cells = self._closed
+        edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
         single, counts = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
-        found = self.map[single[counts == 1]]
-        return np.asarray(found[~self._across_the_cut(single[counts == 1])])
+        return np.asarray(points[single[counts == 1]])
 
     def _across_the_cut(self, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return which of some facets or edges (f, k) go over the line at which an unrolled surface is cut (f,)."""
         along = self.sliding[:, 0]
         return np.asarray(self.unrolled & (np.ptp(along[nodes], axis=1) > HALF * np.ptp(along)))
+
+    @cached_property
+    def _closed(self) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+        """Points of the map, the node that each is, and the points of each cell.
+
+        Where the surface was cut to be unrolled the nodes after the cut stand once more at its far end.
+        """
+        across = self._across_the_cut(self.cells)
+        every = np.arange(len(self.x))
+        if not across.any():
+            return self.map, every, self.cells
+        cells, along = self.cells.copy(), self.sliding[:, 0]
+        middle = (along.min() + along.max()) / 2
+        behind = across[:, None] & (along[self.cells] < middle)
+        again = np.unique(self.cells[behind])
+        cells[behind] = len(every) + np.searchsorted(again, self.cells[behind])
+        # Once around is the way between both ends of such a cell on the map, and that in space along the sliding.
+        ends = np.take_along_axis(self.cells[across], np.stack([along[self.cells[across]].argmax(axis=1),
+                                  along[self.cells[across]].argmin(axis=1)], axis=1), axis=1)  # fmt: skip
+        apart = self.x[ends[:, 0]] - self.x[ends[:, 1]]
+        beside = self.sliding[ends[:, 0], 1] - self.sliding[ends[:, 1], 1]
+        ways = np.sqrt(np.maximum((apart**2).sum(axis=1) - beside**2, 0.0))
+        around = np.median(along[ends[:, 0]] - along[ends[:, 1]] + ways)
+        return np.vstack([self.map, self.map[again] + np.array([around, 0.0])]), np.append(every, again), cells
 
     def drawn(self, values: Array) -> tuple[Triangulation, Array]:
         """Return triangles of the map and values at their corners: four around the middle of each quadrilateral.
@@ -155,9 +207,10 @@ class Surface:
         """
         from matplotlib.tri import Triangulation
 
-        points, triangles = self.map, self.triangles[~self._across_the_cut(self.triangles)]
-        if self.cells.shape[1] == 4:
-            cells = self.cells[~self._across_the_cut(self.cells)]
+        points, nodes, cells = self._closed
+        values = values[nodes]
+        triangles = np.concatenate([cells[:, [0, k, k + 1]] for k in range(1, cells.shape[1] - 1)])
+        if cells.shape[1] == 4:
             middle = len(points) + np.arange(len(cells))
             points = np.concatenate([points, points[cells].mean(axis=1)])
             values = np.concatenate([values, values[cells].mean(axis=1)])
@@ -171,13 +224,14 @@ class Surface:
         slope, *_ = np.linalg.lstsq(arm, self.sliding[:, 0] - self.sliding[:, 0].mean(), rcond=None)
         return ARROWS[round(np.arctan2(direction * slope[1], direction * slope[0]) / (np.pi / 4)) % 8]
 
-    def cut(self, values: Array, at: Array, *, along: bool) -> tuple[Array, Array]:
+    def cut(self, values: Array, at: Array, *, along: bool, nodes: Mask | None = None) -> tuple[Array, Array]:
         """Return places along or across the sliding and the values there, NaN beside the surface.
 
         Args:
             values: At the nodes (n,).
             at: The point that the cut goes through: its places along and across the sliding, mm.
             along: Along the sliding, or across it.
+            nodes: Those of it that are cut (n,); by default all, of parts behind each other the first.
         """
         from matplotlib.tri import LinearTriInterpolator, Triangulation
 
@@ -186,9 +240,11 @@ class Surface:
         size = np.ptp(self.sliding[self.triangles, 0], axis=1)
         whole = size < 0.5 * max(float(np.ptp(self.sliding[:, 0])), 1e-300)
         kept = self.triangles[whole] if whole.any() else self.triangles
-        kept = kept[self.part[kept[:, 0]] == 0] if self.overlaps else kept  # what lies behind cannot be seen, too
+        if nodes is None:
+            nodes = self.part == 0 if self.overlaps else np.ones(len(self.x), dtype=bool)
+        kept = kept[nodes[kept].all(axis=1)]
         plane = Triangulation(self.sliding[:, free], self.sliding[:, fixed], kept)
-        places = np.linspace(self.sliding[:, free].min(), self.sliding[:, free].max(), POINTS)
+        places = np.linspace(self.sliding[nodes, free].min(), self.sliding[nodes, free].max(), POINTS)
         found: Any = LinearTriInterpolator(plane, values)(places, np.full(POINTS, at[fixed]))
         return places, np.asarray(found.filled(np.nan))
 
@@ -208,19 +264,68 @@ def surface_of(history: xarray.Dataset, body: str = "punch") -> Surface:
     return Surface(body, x, history[f"facets{end}"].values, sliding, (first, second), contact)
 
 
-def centre_of_wear(history: xarray.Dataset) -> Array:
+class CutPlace(NamedTuple):
+    """Where one of several contacts is cut.
+
+    Attributes:
+        name: Of the contact, or of the part; "" of the only one.
+        at: The middle of its wear along and across the sliding (2,), mm.
+        nodes: That belong to it, by the body (n,).
+    """
+
+    name: str
+    at: Array
+    nodes: dict[str, Mask]
+
+
+def cut_places(history: xarray.Dataset) -> list[CutPlace]:
+    """Return where contacts are cut: each that has a name, or of parts that lie behind each other each."""
+    punch = surface_of(history)
+    strip = surface_of(history, "strip") if "x_strip" in history else None
+    if punch.contact is not None:
+        owns = {name: punch.contact == name for name in history.contact.attrs["flag_meanings"].split()}
+    elif punch.overlaps:
+        owns = {f"part {k + 1}": punch.part == k for k in range(punch.part.max() + 1)}
+    else:
+        owns = {"": np.ones(len(punch.x), dtype=bool)}
+    found = []
+    for name, own in owns.items():
+        nodes = {"punch": own} if strip is None else {"punch": own, "strip": _opposite(strip, name, punch.x[own])}
+        found.append(CutPlace(name, centre_of_wear(history, nodes), nodes))
+    return found
+
+
+def _opposite(strip: Surface, name: str, x: Array) -> Mask:
+    """Return the nodes of the strip (n,) that are of a contact: those of its name, or of the part nearest to it."""
+    if strip.contact is not None and name in strip.contact:
+        return np.asarray(strip.contact == name)
+    middle = x[np.linalg.norm(x - x.mean(axis=0), axis=1).argmin()]
+    return np.asarray(strip.part == strip.part[np.linalg.norm(strip.x - middle, axis=1).argmin()])
+
+
+def centre_of_wear(history: xarray.Dataset, nodes: Mapping[str, Mask] | None = None) -> Array:
     """Return the places along and across the sliding of the centre of what is worn off at the end (2,), mm.
 
     Of the punch, or of the strip where it alone wears; of the contact where nothing is worn yet.
+
+    Args:
+        history: Of a solid.
+        nodes: That count of each body (n,); by default all.
     """
     last = history.isel(half_cycle=-1)
-    for end in ("", "_strip"):
-        if f"wear{end}" not in last:
-            continue
-        volume = (last[f"wear{end}"] * last[f"weight{end}"]).values
-        if volume.sum() > 0:
-            return np.array([np.average(last[f"{name}{end}"].values, weights=volume) for name in ("along", "across")])
-    return np.array([np.average(last[name].values, weights=last.weight.values) for name in ("along", "across")])
+    own: dict[str, Any] = {body: slice(None) for body in BODIES} if nodes is None else dict(nodes)
+
+    def centre(weights: Array, body: str) -> Array:
+        end = BODIES[body]
+        ways = [last[f"{name}{end}"].values[own[body]] for name in ("along", "across")]
+        return np.array([np.average(way, weights=weights[own[body]]) for way in ways])
+
+    for body, end in BODIES.items():
+        if f"wear{end}" in last:
+            volume = (last[f"wear{end}"] * last[f"weight{end}"]).values
+            if volume[own[body]].sum() > 0:
+                return centre(volume, body)
+    return centre(last.weight.values, "punch")
 
 
 def along_contact(history: xarray.Dataset, body: str = "punch") -> tuple[Array, str]:

@@ -30,6 +30,7 @@ class MapFrames:
         limits = (pressure_top(history, half_cycles), max(1e3 * float(history.wear.max()), 1e-12))
         for ax, (name, colours), top in zip(axes.ravel(), named, limits, strict=True):
             found = ax.tripcolor(triangles, values, shading="gouraud", cmap=colours, vmin=0, vmax=top)
+            self._surface.set_ticks(ax)
             ax.set_xlabel(self._surface.axis_labels[0])
             colour_bar(self.figure, found, ax, name, location="bottom", shrink=0.8, aspect=25)
             self._drawn.append(found)

@@ -17,6 +17,7 @@ from fenwear.interface.placement import in_space
 from fenwear.sliding.field import SlidingField
 
 AXIAL = 0.7  # cosine between the contact's normal and the axis above which the body is a disc, not a roller
+ROUNDING = 1e-9  # rad
 INSIDE = 0.5  # of the mean radius: where the nodes' mean is nearer to the axis, the axis goes through the contact
 
 
@@ -46,7 +47,9 @@ class SlidingChart:
             return np.column_stack([points @ self.along, points @ self.across])
         height = points @ self.axis
         radial = points - height[:, None] * self.axis
-        arc = self.radius * np.arctan2(radial @ self.across, radial @ self.along)
+        angle = np.arctan2(radial @ self.across, radial @ self.along)
+        angle[angle > np.pi - ROUNDING] = -np.pi  # nodes in line behind the middle stay in line
+        arc = self.radius * angle
         return np.column_stack([arc, np.linalg.norm(radial, axis=1) if self.disc else height])
 
 

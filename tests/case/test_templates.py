@@ -16,7 +16,16 @@ from fenwear.errors import CaseError
 
 USUAL = [
     *("ball-on-disc", "ball-on-flat", "block-on-ring", "brake-pad"),
-    *("bushing", "crossed-cylinders", "cylinder-on-flat", "disc-brake", "fretting", "pin-on-disc", "plain-bearing"),
+    *(
+        "bushing",
+        "crossed-cylinders",
+        "cylinder-on-flat",
+        "disc-brake",
+        "fretting",
+        "pin-on-disc",
+        "plain-bearing",
+        "two-bushings",
+    ),
 ]
 
 

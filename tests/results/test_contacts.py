@@ -126,5 +126,5 @@ def test_both_faces_of_a_disc(back: int, tmp_path: Path) -> None:
         spans = [(surface.map[face].min(axis=0), surface.map[face].max(axis=0)) for face in faces]
         assert max(low[0] for low, _ in spans) > min(high[0] for _, high in spans)  # beside each other
     text = (directory / "figures" / "captions.txt").read_text()
-    assert "Of the contact" in text
+    assert text.count("Each contact through the middle of its own wear") == 2
     assert (directory / "report.html").is_file()

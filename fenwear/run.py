@@ -341,8 +341,9 @@ class _Run:
         phase = stroke * motion.positions + motion.positions // 2
         pressed = at_loads(self.system, float(block.load_factor[-1]))
         friction = block.friction_ratio[-1] if self.system.sticks else None
-        fields = body_fields(pressed, block.pressure[-1], block.rigid[-1], phase, temperatures, friction)
         direction, worn = int(block.direction[-1]), block.end.worn
+        now = block.pressure[-1], block.rigid[-1], phase
+        fields = body_fields(pressed, *now, temperatures, friction, worn)
         write_fields(self.directory, self.system, half_cycle, fields, direction, worn, block.pressure[-1])
 
     def _save(self) -> None:

@@ -85,6 +85,14 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
         ),
     ),
+    "laws with memory": (  # registered in `test_combinations.py`
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "wear={punch={coefficient={law='filmed'}}}",
+            "contact.friction={law='slippery'}",
+        ),
+    ),
     "in rings": (
         "ring-on-ring",
         ("geometry.parameters.across=4", "geometry.degree=2", "run.half_cycles=4", "run.integration='explicit'",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import reduce
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from combinations import CLOSED, FEATURES, LAWS, STICK, WAYS, closed
 from mpi4py import MPI
 
 import fenwear
-from fenwear import Case, CaseError, ConvergenceError, assemble, load_case, march, steady
+from fenwear import Case, CaseError, ConvergenceError, State, assemble, load_case, march, register_law, steady
+from fenwear.case import Dependence
+from fenwear.case.own_laws import forget_laws
 from fenwear.cycle import Block, evolve
 from fenwear.life import (
     DataSet,
@@ -29,7 +32,21 @@ from fenwear.results import between
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 
-KEY = "wear.punch.coefficient"
+KEY, EXPONENT = "wear.punch.coefficient", "wear.punch.pressure_exponent"
+
+
+@pytest.fixture(autouse=True)
+def laws_that_remember() -> Iterator[None]:
+    """Register a film that pressure rubs off and that grows again, and the wear and friction that it makes."""
+
+    def growth(now: Any) -> Any:
+        return 20 * (1 - now["film"]) - now["p"] * now["v"] * now["film"] / 5
+
+    film = State(growth, of=["p", "v"], initial=1.0, least=0.0)
+    register_law("filmed", lambda now: 5e-8 * (1.5 - now["film"]), states={"film": film})
+    register_law("slippery", lambda now: 0.75 - 0.1 * now["film"], of=["film"])
+    yield
+    forget_laws()
 
 
 def case_of(feature: str, law: str, *more: str) -> Case:
@@ -103,7 +120,15 @@ def resumed(feature: str, law: str, folder: Path) -> None:
     run("parts", 4, resume=True)
     one, other = (load_history(folder / name) for name in ("whole", "parts"))
     assert one.sizes == other.sizes
-    for name in ("pressure", "wear", "friction_work", "normal_force", "max_temperature", "debris_thickness"):
+    for name in (
+        "pressure",
+        "wear",
+        "friction_work",
+        "normal_force",
+        "max_temperature",
+        "debris_thickness",
+        "state_film",
+    ):
         if name in one:
             scale = np.abs(one[name].values).max()
             assert np.abs(one[name].values - other[name].values).max() <= 1e-9 * scale, name
@@ -121,6 +146,8 @@ def swept(feature: str, law: str, _: Path) -> None:
 def unknown_of(case: Case) -> str:
     """Return a key that the worn volume depends on smoothly."""
     law = case.wear.punch
+    if law is not None and isinstance(law.coefficient, Dependence) and law.coefficient.states:
+        return EXPONENT  # no other motion has to be made ready
     return KEY if law is not None and isinstance(law.coefficient, float) else "motion.amplitude"
 
 
@@ -156,10 +183,10 @@ def lived(feature: str, law: str, _: Path) -> None:
     """Lives to a volume scatter as what wears does."""
     case = case_of(feature, law)
     key = unknown_of(case)
-    made = model_value(case, key)
+    made, spread = model_value(case, key), 1 if key == EXPONENT else 5
     level = evaluate(Model(case), parse_quantity("volume after 2 cycles"), {key: made})[0]
-    found = lifetime(case, f"volume {level!r} mm^3", parse_scatter(case, f"{key}=lognormal({made!r}, 5 %)"), samples=4,
-                     comm=MPI.COMM_SELF)  # fmt: skip
+    scatter = parse_scatter(case, f"{key}=lognormal({made!r}, {spread} %)")
+    found = lifetime(case, f"volume {level!r} mm^3", scatter, samples=4, comm=MPI.COMM_SELF)
     assert not found.failures
     assert found.lives == pytest.approx(np.full(4, 2.0), rel=0.4)
     order = np.argsort(found.samples[:, 0])

@@ -9,9 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fenwear import CaseError, assemble, load_case, make_case, march, register_contact_law, steady
+from fenwear import (
+    CaseError,
+    State,
+    assemble,
+    load_case,
+    make_case,
+    march,
+    register_contact_law,
+    register_law,
+    steady,
+)
 from fenwear.assembly import laws, place_case
 from fenwear.case.contact import CONTACT_LAWS
+from fenwear.case.own_laws import forget_laws
 from fenwear.cycle.gross_sliding import GrossSliding
 from fenwear.interface import patches
 from fenwear.interface.patches import CHARTS, Side
@@ -145,3 +156,42 @@ def test_a_chart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         np.testing.assert_allclose(mine.weights.sum(), ready.weights.sum(), rtol=1e-6)
         errors.append(np.abs(mine.initial_gap - ready.initial_gap).max() / np.ptp(ready.initial_gap))
     assert errors[1] < 0.3 * errors[0] < 1e-4
+
+
+# ---- A wear law with a state of its own: an oxide film that grows again after sliding has rubbed it off.
+
+GROWN, RUBBED, LEAST, MOST = 2.0, 0.05, 1e-8, 5e-8  # s, 1/mm, 1/MPa
+
+
+@pytest.fixture
+def oxide() -> Iterator[str]:
+    """Register the law, and forget it."""
+    film = State(
+        lambda now: (1 - now["oxide"]) / GROWN - RUBBED * now["v"] * now["oxide"],
+        of=["v"],
+        initial=1.0,
+        slope=lambda now: -1 / GROWN - RUBBED * now["v"],
+    )
+    register_law("oxidative", lambda now: MOST + (LEAST - MOST) * now["oxide"], states={"oxide": film})
+    yield "wear.punch.coefficient={law='oxidative', unit='1/MPa'}"
+    forget_laws()
+
+
+def test_a_wear_law_with_a_state_of_its_own(oxide: str, tmp_path: Path) -> None:
+    """The film follows its closed form, the volume its integral; in the end growth and rubbing balance."""
+    slides = "motion={kind='one-way', direction='rightward', speed='20 mm/s', duration='0.1 s'}"
+    case = load_case("example1", [*SMALL, oxide, slides, "contact.friction=0.1", "run.half_cycles=20"])
+    rate = 1 / GROWN + RUBBED * 20
+    rest, t = 1 / GROWN / rate, 0.1 * 20
+    film = rest + (1 - rest) * np.exp(-rate * t)
+    system = assemble(case)
+    last = list(march(system, 20))[-1]
+    assert last.between[-1, 0] == pytest.approx(film, rel=1e-12)
+    over = rest * t + (1 - rest) * -np.expm1(-rate * t) / rate  # the integral of the film
+    volume = (
+        (MOST * t + (LEAST - MOST) * over) * 20 * system.rigid.mean_pressure * float(system.pair.weights.sum()) * 10
+    )
+    assert float(last.totals.of("volume_punch")[-1]) == pytest.approx(volume, rel=1e-3)
+    assert steady(system).states["oxide"] == pytest.approx(rest, rel=1e-10)
+    summary, _ = run_case(case, output=tmp_path / "run", log=lambda _: None, progress="none")
+    assert summary["states"]["oxide"]["mean"] == pytest.approx(film, rel=1e-9)

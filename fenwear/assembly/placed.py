@@ -30,7 +30,7 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import HERE, in_model, in_space
-from fenwear.layers import Layers, Passing, common_modulus, layers_of
+from fenwear.layers import Evolution, Layers, Passing, common_modulus, layers_of
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
@@ -223,21 +223,59 @@ class Placed:
         """
         case = self.made_from
         modulus = None if case is None else common_modulus(case, *self.bodies.regions)
-        found, mean = layers_of(self.friction.contact, self.pair, modulus), self.rigid.mean_pressure
+        initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
+        found = layers_of(self.friction.contact, self.pair, modulus, self.sliding.wear, initial)
         if found.hardness <= mean:
             message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
             raise CaseError(InputError("contact.hardness", message))
         return found
 
-    def passing(self, wear: PhasesWear, phases: Sequence[int] | None = None) -> Passing:
+    def passing(
+        self, wear: PhasesWear, phases: Sequence[int] | None = None, evolution: Evolution | None = None
+    ) -> Passing:
         """Return what phases of the motion, by default all, wear and do to what lies between.
 
         Args:
             wear: Of these phases.
             phases: Their numbers.
+            evolution: What they do to the states that laws remember; None where there are none.
         """
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
-        return Passing.over(self.layers, wear, self.path[chosen])
+        return Passing.over(self.layers, wear, self.path[chosen], evolution)
+
+    def evolution(
+        self, conditions: Sequence[ContactConditions], worn: Worn | None = None, phases: Sequence[int] | None = None
+    ) -> Evolution | None:
+        """Return what phases of the motion, by default all, do to the states that laws remember; None without.
+
+        Args:
+            conditions: Of these phases.
+            worn: Depths; by default none.
+            phases: Their numbers.
+        """
+        memory = self.layers.memory
+        if memory is None:
+            return None
+        chosen = list(range(len(self.motion.phases)) if phases is None else phases)
+        durations = np.array([self.motion.phases[k].duration for k in chosen])
+
+        def wearing(k: int, at: ContactConditions) -> Array:
+            taken = self.wear.phases([at], [chosen[k]]).taken(at.pressure[None])[0]
+            return np.asarray(taken / durations[k])
+
+        depth = np.zeros(len(self.pair.strip.weights)) if worn is None else worn.strip
+        return Evolution(memory, conditions, durations, [self.pairs[k] for k in chosen], wearing, depth)
+
+    def rested(self, conditions: Sequence[ContactConditions]) -> Worn:
+        """Return no depths, with the states of laws that cycles at conditions of the phases leave as they are.
+
+        Raises:
+            ConvergenceError: a state goes on as long as it slides.
+        """
+        evolution, unworn = self.evolution(conditions), self.unworn()
+        if evolution is None:
+            return unworn
+        return self.layers.with_held(unworn, evolution.rest(self.layers.held(unworn)))
 
     @property
     def position_spacing(self) -> float:
@@ -284,8 +322,7 @@ class Placed:
 
     def unworn(self) -> Worn:
         """Return the worn depths at the start, none, and what lies between then."""
-        punch, strip = (np.zeros(len(surface.weights)) for surface in (self.pair.punch, self.pair.strip))
-        return Worn(punch, strip, self.layers.beginning())
+        return self.layers.unworn(len(self.pair.strip.weights))
 
     def outworn(self, worn: Worn) -> bool:
         """Return whether the wear since the meshes were moved is large against the elements at the contact."""
@@ -342,7 +379,7 @@ class Placed:
             phase: Its number; None for the mean speed of the motion in the middle position.
             pressure: (n,), MPa; by default the mean pressure.
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
-            worn: Depths; by default none.
+            worn: Depths, and states that laws remember; by default those at the start.
             half_cycles: Done since the start of the run; by default those before its motion.
             cycle: Pressures of all phases (m, n), MPa; by default they are not known.
         """
@@ -368,6 +405,7 @@ class Placed:
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
             cycle_shear(self, cycle),
+            self.layers.known(pair, worn),
         )
 
     def friction_ratio(self, direction: int) -> Array:

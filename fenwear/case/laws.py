@@ -10,16 +10,8 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from fenwear.arrays import Array
-from fenwear.case.dependence import (
-    UNITS,
-    VARIABLES,
-    check_law,
-    evaluate,
-    evaluate_law,
-    parse_expression,
-    variables_of,
-    variables_of_law,
-)
+from fenwear.case.dependence import UNITS, VARIABLES, evaluate, parse_expression, variables_of
+from fenwear.case.own_laws import State, check_law, evaluate_law, states_of_law, variables_of_law
 from fenwear.case.quantities import Force, Number, Part, Stress, Unit, quantity
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, InputError
@@ -74,9 +66,15 @@ class Dependence(Part):
         return self.table is not None and name == self.of
 
     @property
+    def states(self) -> Mapping[str, State]:
+        """The states of a registered law, by their names."""
+        return {} if self.law is None else states_of_law(self.law)
+
+    @property
     def varies(self) -> bool:
         """Whether it changes with more than the place."""
-        return any(self.depends_on(name) for name in ("T", "p", "v", "depth", "s", "cs", "pm"))
+        names = ("T", "p", "v", "depth", "s", "cs", "pm")
+        return bool(self.states) or any(self.depends_on(name) for name in names)
 
     @property
     def passes(self) -> bool:
@@ -105,7 +103,7 @@ class Dependence(Part):
             values = np.sum([state[f"region {name}"] * value for name, value in self.regions.items()], axis=0)
         elif self.law is not None:
             try:
-                values = evaluate_law(self.law, {name: state[name] for name in VARIABLES if name in state}, shape)
+                values = evaluate_law(self.law, state, shape)
             except ValueError as error:
                 raise CaseError(InputError(key, str(error))) from error
         else:

@@ -83,6 +83,7 @@ class Block:
         wear_strip: Of the strip, on its material (k, n_strip), mm.
         between: State of what lies between at its end, by the rows of `fenwear.layers.Layers` (k, rows, n).
         crept: State of what creeps at its end, as `fenwear.assembly.Creep` has it (k, size).
+        carried: States of the strip's material that laws remember (k, rows, n_strip).
         rigid: Amplitudes of the rigid modes there (k, modes).
         totals: What all half-cycles up to its end add up to, k of them.
         adds: What it adds itself, k of them.
@@ -123,6 +124,7 @@ class Block:
     end: RunState = field(kw_only=True)
     between: Array = field(kw_only=True)
     crept: Array = field(kw_only=True)
+    carried: Array = field(kw_only=True)
     steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
     friction_ratio: tuple[Array, ...] = field(kw_only=True)
 
@@ -331,6 +333,7 @@ class Recorder:
             end=end,
             between=np.array([row.worn.between for row in rows]),
             crept=np.array([row.worn.crept for row in rows]),
+            carried=np.array([row.worn.carried for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
             friction_ratio=tuple(middle.friction_ratio for middle in middles),
         )

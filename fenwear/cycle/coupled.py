@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat, CycleJump
+from fenwear.layers.memory import Evolution, Held
 from fenwear.remedies import GRAZING
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import Worn
@@ -31,8 +32,8 @@ DISAGREE = (
 
 # Contact of all phases for a thermal gap (m, n) and its coupling (m, n, m, n), None without heat, from a start.
 SolveContact = Callable[[Array | None, Array | None, ContactState], ContactState]
-# Takes friction and wear at the conditions of the phases.
-Take = Callable[[Sequence[ContactConditions]], None]
+# Takes friction and wear at the conditions of the phases, and what these do to the states that laws remember.
+Take = Callable[[Sequence[ContactConditions], Evolution | None], None]
 
 
 def cycle_heat(system: Tribosystem) -> CycleHeat | None:
@@ -142,10 +143,12 @@ class Coupled:
     Attributes:
         heat: Of whole cycles; None without heat. Linear in mu p: where mu is not constant its own mu is 1.
         mu: What the pressures are to be multiplied by for `heat` (m, n): what friction heats.
+        held: States that laws remember, at the end of a step or at rest; None without, and before.
     """
 
     def __init__(self, system: Tribosystem, take: Take) -> None:
         self.system, self._take = system, take
+        self.held: Held | None = None
         self.heat = cycle_heat(system)
         self.mu: Array = np.ones((len(system.motion.phases), len(system.pair.weights)))
         if self.heat is not None and not system.friction.constant:
@@ -178,6 +181,7 @@ class Coupled:
         Raises:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
+        self.held = None
         try:
             return self._solve(temperature, cycles, start, solve, passing, touching, lagged=lagged)
         except ConvergenceError:
@@ -218,7 +222,7 @@ class Coupled:
             pressure = now[0].reshape(shape)
             if not constant:
                 surfaces = now[1] if warm else np.zeros(0)
-                worn = None if passing is None else Worn(now[-2], now[-1])
+                worn = None if passing is None else replace(passing.before, punch=now[-2], strip=now[-1])
                 self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing)
             found: list[Array] = []
             if heat is None or temperature is None:
@@ -301,6 +305,21 @@ class Coupled:
             system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None, worn, done, pressure)
             for k, p in enumerate(pressure)
         ]
-        self._take(conditions)
+        evolution = system.evolution(conditions, worn)
+        if evolution is not None:
+            evolution = replace(evolution, near=self.held)
+            conditions = self._remembering(evolution, passing)
+            evolution = replace(evolution, near=self.held)
+        self._take(conditions, evolution)
         if not system.friction.constant:
             self.mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
+
+    def _remembering(self, evolution: Evolution, passing: Passing | None) -> Sequence[ContactConditions]:
+        """Return the conditions of the phases with the states of laws: at the end of a step, or at rest."""
+        layers = self.system.layers
+        if passing is None:
+            self.held = evolution.rest(self.held or layers.held(self.system.unworn()))
+            return evolution.through(self.held)[0]
+        before = layers.held(passing.before)
+        self.held = evolution.implicit(before, passing.cycles)
+        return evolution.around(self.held, (self.held - before).times(1 / passing.cycles))

@@ -24,16 +24,18 @@ class Estimate:
             all jumps add up to at most the largest of them times the depth.
         pressure: How far the contact force lies from where it should, over the width in contact, in the worst phase.
         temperature: Of the contact surfaces over their rise from the initial one, root mean squares.
+        state: Of the states that laws remember, over the largest they are in the jump, both integrated.
     """
 
     depth: float
     pressure: float
     temperature: float
+    state: float = 0.0
 
     @property
     def largest(self) -> float:
-        """The largest of the three."""
-        return max(self.depth, self.pressure, self.temperature)
+        """The largest of all."""
+        return max(self.depth, self.pressure, self.temperature, self.state)
 
 
 def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:
@@ -46,7 +48,12 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
     )
     share, depth = 1 / (2**ORDER - 1), wrong / max(worn, 1e-300)
     depth = max(depth, _creep_difference(system, apart, step, halves.worn))
-    return Estimate(share * depth, share * pressure, share * _heat_difference(system, whole, halves))
+    return Estimate(
+        share * depth,
+        share * pressure,
+        share * _heat_difference(system, whole, halves),
+        share * _state_difference(system, before, whole, halves),
+    )
 
 
 def _creep_difference(system: Tribosystem, apart: Worn, step: Worn, end: Worn) -> float:
@@ -98,3 +105,20 @@ def _heat_difference(system: Tribosystem, one: RunState, other: RunState) -> flo
     weights = system.pair.weights
     apart, rise = (float(np.sqrt((t**2 @ weights).sum())) for t in (first - second, second - initial))
     return apart / max(rise, 1e-300)
+
+
+def _state_difference(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> float:
+    """Return the largest difference of a state that laws remember over its size; 0 without."""
+    if system.layers.memory is None:
+        return 0.0
+    first, one, other = (system.layers.held(state.worn) for state in (before, whole, halves))
+    return max(
+        float((weights @ np.abs(a - b).T / np.maximum(size, 1e-300)).max(initial=0.0))
+        for weights, a, b, size in (
+            (own, x, y, np.maximum(own @ np.abs(y).T, own @ np.abs(z).T))
+            for own, x, y, z in (
+                (system.pair.weights, one.contact, other.contact, first.contact),
+                (system.pair.strip.weights, one.strip, other.strip, first.strip),
+            )
+        )
+    )

@@ -49,6 +49,7 @@ from fenwear.cycle.state import RunState, beginning, joined, parted, present
 from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.interface.pair import lagrange
+from fenwear.layers import Evolution
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import NOTHING, Worn
@@ -127,6 +128,7 @@ class Stepper:
         self.contact = system.phase_contact(range(len(system.motion.phases)))
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
+        self.evolution = system.evolution([system.conditions(k) for k in range(len(self.ratios))])
         self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
         self.coupled = Coupled(system, self.take)
         self._heated: Array = np.zeros(0)  # by the last cycle
@@ -135,6 +137,7 @@ class Stepper:
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
         self._trend = _Trend()  # of what was made last
+        self._follows = bool(system.passing_laws) or system.layers.memory is not None  # coefficients do, within a step
 
     def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
@@ -164,7 +167,7 @@ class Stepper:
             estimate = estimated(self.system, state, whole, halves)
             if comes:
                 estimate = replace(estimate, depth=max(estimate.depth, self._bent(state, half, whole)))
-            if self.system.passing_laws:
+            if self._follows:
                 missed = self._missed(state, half, halves, cycles)
                 estimate = replace(estimate, depth=max(estimate.depth, missed))
             return halves, estimate
@@ -211,10 +214,13 @@ class Stepper:
         pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
         if self.coupled.heat is not None and state.temperature is not None:
             surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
-        conditions = [
+        conditions: Sequence[ContactConditions] = [
             system.conditions(k, pressure, surfaces, state.worn, half_cycles, pressures)
             for k, pressure in enumerate(pressures)
         ]
+        evolution = system.evolution(conditions, state.worn)
+        if evolution is not None:
+            conditions = evolution.around(system.layers.held(state.worn))
         return system.wear.phases(conditions).worn(pressures)
 
     def steps(self, state: RunState, cycles: float, count: int) -> RunState:
@@ -266,7 +272,7 @@ class Stepper:
     def _end(self, state: RunState, before: _Moment, last: _Stage, cycles: float) -> RunState:
         """Return the end of a step whose last stage is solved."""
         now, heat, temperature = before.after(last, cycles), self.coupled.heat, None
-        worn = replace(now.worn, between=self.system.layers.settled(now.worn.between))
+        worn = self.system.layers.settled(now.worn)
         if heat is not None and now.temperature is not None:
             temperature = heat.exchange.at(now.temperature)
             self._heated, self._conductances = last.heated, last.conductances
@@ -274,7 +280,7 @@ class Stepper:
 
     def _passing(self, worn: Worn, cycles: float) -> Passing | None:
         """Return how depths follow in a stage where coefficients depend on them."""
-        if not self.system.passing_laws:
+        if not self._follows:
             return None
         return Passing(worn, cycles, self._wear, self._done)
 
@@ -316,7 +322,8 @@ class Stepper:
         flowed: Array | None = None
         if self._flowed is not None:
             flowed = np.asarray(self._flowed / (cycles if followed is None else followed), dtype=np.float64)
-        worn = self.system.passing(self.wear).worn(contact.pressure, before.worn.between, cycles, flowed)
+        passing = self.system.passing(self.wear, evolution=self.evolution)
+        worn = passing.worn(contact.pressure, before.worn, cycles, flowed)
         creep = self._creep(before.worn, cycles)
         if creep is not None:
             worn = replace(worn, crept=creep.rate(contact.pressure))
@@ -328,7 +335,8 @@ class Stepper:
         """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
         worn, cycles = begin
-        step, near, creep = self.system.passing(self.wear).step(worn.between, cycles), start, self._creep(worn, cycles)
+        step, near = self.system.passing(self.wear, evolution=self.evolution).step(worn, cycles), start
+        creep = self._creep(worn, cycles)
         if creep is not None:
             gap, coupling = gap + creep.gap, creep.coupling if coupling is None else coupling + creep.coupling
 
@@ -345,10 +353,10 @@ class Stepper:
         creep = self.system.creep
         return None if creep is None else creep.stage(worn.crept, cycles, self.ratios, self._load)
 
-    def take(self, conditions: Sequence[ContactConditions]) -> None:
-        """Take friction and wear at the conditions of the phases."""
+    def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None) -> None:
+        """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
         system = self.system
-        self.wear = system.wear.phases(conditions)
+        self.wear, self.evolution = system.wear.phases(conditions), evolution
         self._measure([system.friction.values(state) for state in conditions])
         if system.friction.constant:
             return
@@ -388,7 +396,8 @@ class Stepper:
 
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: Worn) -> Worn:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
-        return self.system.passing(self.wear.some(phases), phases).worn(pressures, now.between)
+        evolution = None if self.evolution is None else self.evolution.some(phases)
+        return self.system.passing(self.wear.some(phases), phases, evolution).worn(pressures, now)
 
     def _phase_record(
         self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals

@@ -131,18 +131,21 @@ class PhaseStep:
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
         conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle)
+        evolution = system.evolution([conditions], worn, [self.phase])
+        if evolution is not None:  # coefficients are those of the states in the middle of the phase
+            (conditions,), _, _ = evolution.through(system.layers.held(worn))
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
             mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = system.phase_friction(self.phase, mu)
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
                 self._thermal.slide(heating_friction(system, mu))
-        return system.passing(system.wear.phases([conditions], [self.phase]), [self.phase])
+        return system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
 
     def _solve(
         self, temperature: HeatState | None, gap: Array, start: ContactState | None, passing: Passing, worn: Worn
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
-        wearing, near = passing.step(worn.between, implicit=self.implicit), start
+        wearing, near = passing.step(worn, implicit=self.implicit), start
 
         def solve(flowed: Array) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
             nonlocal near
@@ -170,7 +173,7 @@ class PhaseStep:
 
         def left() -> tuple[Totals, Worn]:
             pressure = contact.pressure[0]
-            lost, creep = passing.worn(contact.pressure, worn.between, flowed=self._flowed), self.system.creep
+            lost, creep = passing.worn(contact.pressure, worn, flowed=self._flowed), self.system.creep
             if creep is not None:
                 crept = creep.change(self.phase, worn.crept, pressure, self._friction_ratio, self._load)
                 lost = replace(lost, crept=crept)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ from fenwear.heat.periodic import CycleHeat
 from fenwear.interface import PressureCompliance
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.pressure_law import PressureLaw
-from fenwear.sliding.wear import PhasesWear
+from fenwear.sliding.wear import PhasesWear, Worn
 
 ROUNDING = 1e-12  # of a disturbance: what is left of it that is gone
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
@@ -139,11 +139,11 @@ def _factors(
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = (0 if heat is None else heat.dim) + (0 if system.creep is None else len(system.creep.beginning()))
-    cycle = np.eye(dim + n)
+    cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
         state = states[phase] if states else None
-        tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit)
+        tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit, worn=rest)
         cycle = tangent @ cycle
     if not np.isfinite(cycle).all():
         raise ConvergenceError(
@@ -277,8 +277,25 @@ class _Laws:
     worn_s: Array
 
 
-def _laws(system: Tribosystem, phase: int, pressure: Array, heat: CycleHeat | None, state: HeatState | None) -> _Laws:
-    n, conditions = len(pressure), system.conditions(phase, pressure)
+def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat | None, states: Sequence[HeatState]) -> Worn | None:
+    """Return what laws remember at rest at pressures and temperatures of the phases; None without."""
+    if system.layers.memory is None:
+        return None
+    warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
+    if heat is not None and states:
+        warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
+    return system.rested([system.conditions(k, p, own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))])
+
+
+def _laws(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    worn: Worn | None = None,
+) -> _Laws:
+    n, conditions = len(pressure), system.conditions(phase, pressure, worn=worn)
     surfaces = conditions.temperatures
     if heat is not None and state is not None:
         surfaces = heat.exchange.contact_temperatures(state, phase - 1)
@@ -314,6 +331,7 @@ def phase_tangent(
     conductance: Array | None = None,
     *,
     implicit: bool = True,
+    worn: Worn | None = None,
 ) -> Array:
     """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
 
@@ -336,9 +354,10 @@ def phase_tangent(
         state: Temperatures at its start; None where nothing depends on them.
         conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
         implicit: Whether the wear is.
+        worn: With the states that laws remember, which disturbances leave; by default those at the start.
     """
     n, interface, creep = len(pressure), system.interfaces[phase], system.creep
-    laws, rigid = _laws(system, phase, pressure, heat, state), interface.rigid
+    laws, rigid = _laws(system, phase, pressure, heat, state, worn), interface.rigid
     dim = laws.mu_s.shape[1]
     friction_ratio, further = (system.phase_friction(phase, mu) for mu in (laws.mu, laws.mu + 1))
     by_mu = PressureCompliance(interface, further - friction_ratio).matrix()  # all are linear in mu

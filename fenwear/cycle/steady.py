@@ -48,6 +48,7 @@ from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.conduction import no_heat_sink
 from fenwear.heat.field import HeatState
 from fenwear.heat.periodic import CycleHeat
+from fenwear.layers.memory import Held
 
 ZERO = 1e-12  # of the largest: a velocity that is rounding
 LEFT = 0.1  # of heat.property_tolerance: what properties may still change by in the state that is found
@@ -89,6 +90,8 @@ class Steady:
         velocity: Rigid-body wear lambda per cycle of each mode: mm and rad.
         debris: Thickness of the third body (n,), mm: what a cycle feeds, times its life; None without.
         crept: Depth that has crept (n,), mm, at the end of a cycle; None where nothing creeps.
+        states: What laws remember, at rest, at the start of a cycle, by their names (n,); those of the strip's
+            material by `NAME_strip` (n_strip,).
         iterations: Newton iterations.
         seconds: Wall time of the solve.
         heat: Temperatures; None without heat.
@@ -116,6 +119,7 @@ class Steady:
     conductances: Array | None = field(default=None, kw_only=True)
     debris: Array | None = field(default=None, kw_only=True)
     crept: Array | None = field(default=None, kw_only=True)
+    states: dict[str, Array] = field(default_factory=dict, kw_only=True)
 
     @property
     def x(self) -> Array:
@@ -263,8 +267,8 @@ def _check_exists(system: Tribosystem) -> None:
             )
 
 
-def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None]:
-    """Return the contact of all phases, with heat the temperatures, and the heat of whole cycles."""
+def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None, Held | None]:
+    """Return contact of all phases, with heat the temperatures, the heat of whole cycles, and what laws remember."""
     system = problem.system
     try:
         contact = problem.solve()
@@ -279,10 +283,10 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None]:
         ) from error
     coupled = Coupled(system, problem.take)
     if coupled.heat is None and system.constant_coefficients:
-        return Solved(contact), None
+        return Solved(contact), None, None
     initial = None if coupled.heat is None else coupled.heat.initial()
     solved = coupled.solve(initial, np.inf, contact, lambda thermal, coupling, _: problem.solve(thermal, coupling))
-    return solved, coupled.at_friction()
+    return solved, coupled.at_friction(), coupled.held
 
 
 def _no_state_under_cap(problem: SteadyInequality) -> str:
@@ -308,7 +312,7 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     )
 
 
-def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -> Steady:
+def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, held: Held | None) -> Steady:
     system, contact = problem.system, solved.contact
     hardness, peak = system.layers.hardness, float(contact.pressure.max())
     if peak > hardness:
@@ -341,6 +345,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None) -
         conductances=None if heat is None else solved.conductances,
         debris=system.passing(problem.wear).resting(contact.pressure),
         crept=None if system.creep is None or crept is None else system.creep.depth(crept),
+        states={} if held is None or system.layers.memory is None else system.layers.memory.by_name(held),
     )
 
 

@@ -16,6 +16,7 @@ from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread_shape import SpreadShape
 from fenwear.contact.worn_shape import ShapeEquations
 from fenwear.errors import CaseError, ConvergenceError, InputError
+from fenwear.layers import Evolution
 from fenwear.memory import GIB, free_memory, memory_size
 from fenwear.optimum import Optimum
 from fenwear.parallel import agreed
@@ -91,8 +92,8 @@ class SteadyInequality:
         # The last derivative, and what it is of.
         self._known: tuple[list[csr_array], Array, Array | None, Operator] | None = None
 
-    def take(self, conditions: Sequence[ContactConditions]) -> None:
-        """Take friction and wear at the conditions of the phases."""
+    def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None = None) -> None:  # noqa: ARG002
+        """Take friction and wear at the conditions of the phases; what states of laws do there, they have done."""
         self.wear = self.system.wear.phases(conditions)
         self._known = None
         if not self.system.friction.constant:

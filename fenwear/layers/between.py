@@ -11,14 +11,14 @@ the compliance of the bodies (`fenwear.interface.Interface`), so that every stud
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.case import Case, Contact
+from fenwear.case import Case, Contact, Dependence, WearLaw
 from fenwear.case.layers import (
     STIFFNESS,
     ExponentialLayer,
@@ -32,6 +32,8 @@ from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
 from fenwear.layers.debris import Debris
+from fenwear.layers.memory import Held, Memory
+from fenwear.sliding.wear import Worn
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
 DEBRIS = ("debris_thickness", "debris_ejected")
@@ -51,6 +53,8 @@ class Layers:
         winkler: Closure over pressure of a linear layer (n,), mm/MPa; None without.
         debris: Of the third body; None without.
         hardness: Largest pressure, MPa.
+        memory: States of laws of one's own; None without.
+        begun: These at the start; None without.
     """
 
     nodes: int
@@ -58,11 +62,15 @@ class Layers:
     winkler: Array | None = None
     debris: Debris | None = None
     hardness: float = np.inf
+    memory: Memory | None = None
+    begun: Held | None = None
 
     @property
     def rows(self) -> tuple[str, ...]:
-        """Names of the rows of the state, mm each: thickness of the debris, depth that is ejected, plastic depth."""
-        return (*(() if self.debris is None else DEBRIS), *((PLASTIC,) if self.hardness < np.inf else ()))
+        """Names of the rows of the state: of debris and of what has flown, mm each, and of what laws remember."""
+        remembered = () if self.memory is None else tuple(map(row_of_state, self.memory.contact))
+        flown = (PLASTIC,) if self.hardness < np.inf else ()
+        return (*(() if self.debris is None else DEBRIS), *flown, *remembered)
 
     def row(self, name: str) -> int:
         """Return the number of a row of the state, by its name in `rows`."""
@@ -78,18 +86,49 @@ class Layers:
         """Whether something gives way by a law that is not linear."""
         return self.closure is not None or self.hardness < np.inf
 
-    def beginning(self) -> Array:
-        """Return the state at the start (rows, n)."""
+    def unworn(self, strip: int) -> Worn:
+        """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""
         state = np.zeros((len(self.rows), self.nodes))
         if self.debris is not None:
             state[self.row(DEBRIS[0])] = self.debris.initial
-        return state
+        found = Worn(np.zeros(self.nodes), np.zeros(strip), state)
+        return found if self.begun is None else self.with_held(found, self.begun)
+
+    def held(self, worn: Worn) -> Held:
+        """Return what laws remember at these depths; what they do at the start where that is not told."""
+        if self.begun is None:
+            return Held(worn.between[len(self.rows) :], worn.carried)
+        first = len(self.rows) - len(self.begun.contact)
+        contact = worn.between[first:] if len(worn.between) else self.begun.contact
+        return Held(contact, worn.carried if len(worn.carried) else self.begun.strip)
+
+    def known(
+        self, pair: ContactPair, worn: Worn | None, held: Held | None = None
+    ) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """Return the states of laws at the contact's nodes, as those of punch and strip know them.
+
+        Args:
+            pair: The surfaces opposite each other.
+            worn: With the states; by default those at the start.
+            held: The states, where they are not those.
+        """
+        if self.memory is None or self.begun is None:
+            return {}, {}
+        held = held or (self.begun if worn is None else self.held(worn))
+        return self.memory.known(np.vstack([held.contact, held.strip @ pair.wear_interpolation.T]))
+
+    def with_held(self, worn: Worn, held: Held) -> Worn:
+        """Return the depths with other states of laws."""
+        first = len(self.rows) - len(held.contact)
+        return replace(worn, between=np.concatenate([worn.between[:first], held.contact]), carried=held.strip)
 
     def opening(self, state: Array) -> Array | float:
         """Return the gap that a state opens (n,), mm."""
         if not len(state):
             return 0.0
         found = np.zeros(self.nodes) if self.debris is None else -state[self.row(DEBRIS[0])]
+        if self.memory is not None:
+            found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
 
     def closing(self, pressure: Array) -> Array:
@@ -134,26 +173,42 @@ class Layers:
             "the mean pressure, so that nothing holds the punch"
         )
 
-    def settled(self, state: Array) -> Array:
-        """Return a state after a step that may have overshot: no thickness below zero, nothing lost."""
-        if self.debris is None or not len(state):
-            return state
+    def settled(self, worn: Worn) -> Worn:
+        """Return depths after a step that may have overshot: no thickness below zero, nothing lost, states bounded."""
+        found = worn
+        if self.memory is not None:
+            found = self.with_held(worn, self.memory.bounded(self.held(worn)))
+        if self.debris is None or not len(worn.between):
+            return found
         thickness, ejected = map(self.row, DEBRIS)
-        if state[thickness].min(initial=0.0) >= 0:
-            return state
-        settled = state.copy()
-        settled[thickness] = np.maximum(state[thickness], 0.0)
-        settled[ejected] += np.minimum(state[thickness], 0.0)
-        return settled
+        if found.between[thickness].min(initial=0.0) >= 0:
+            return found
+        state = found.between.copy()
+        state[ejected] += np.minimum(state[thickness], 0.0)
+        state[thickness] = np.maximum(state[thickness], 0.0)
+        return replace(found, between=state)
 
 
-def layers_of(contact: Contact, pair: ContactPair, modulus: float | None = None) -> Layers:
-    """Return what the table of the contact puts between the surfaces of a pair.
+def row_of_state(name: str) -> str:
+    """Return the name of the row of a state that a law remembers."""
+    return f"state {name}"
+
+
+def layers_of(
+    contact: Contact,
+    pair: ContactPair,
+    modulus: float | None = None,
+    wear: Sequence[WearLaw | None] = (None, None),
+    temperature: float = 0.0,
+) -> Layers:
+    """Return what the table of the contact puts between the surfaces of a pair, and what laws remember there.
 
     Args:
         contact: The table.
         pair: The surfaces.
         modulus: E* of the materials at the contact, MPa; None where there is none for all of it.
+        wear: The wear laws of punch and strip.
+        temperature: The initial one, K.
 
     Raises:
         CaseError: a value is not positive somewhere, or E* is missing.
@@ -174,7 +229,30 @@ def layers_of(contact: Contact, pair: ContactPair, modulus: float | None = None)
     if third is not None:
         life = place_values(third.life, place, n, "mm", "contact.third_body.life")
         debris = Debris(third.share, life, third.initial)
-    return Layers(n, closure, winkler, debris, np.inf if contact.hardness is None else contact.hardness)
+    hardness = np.inf if contact.hardness is None else contact.hardness
+    memory = memory_of(contact.friction, wear, temperature)
+    begun = None if memory is None else memory.beginning(pair)
+    return Layers(n, closure, winkler, debris, hardness, memory, begun)
+
+
+def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory | None:
+    """Return what the laws of friction and wear remember, and where; None for nothing.
+
+    Args:
+        friction: The coefficient.
+        wear: The wear laws of punch and strip.
+        temperature: The initial one, K.
+    """
+    given = [None if law is None else law.given_coefficient for law in wear]
+    punch, strip, both = (
+        dict(one.states) if isinstance(one, Dependence) else {} for one in (given[0], given[1], friction)
+    )
+    own = {name: state for name, state in strip.items() if not state.fills}
+    filling = {name: state for name, state in strip.items() if state.fills}
+    contact = {**punch, **filling, **{name: state for name, state in both.items() if name not in own or name in punch}}
+    if not contact and not own:
+        return None
+    return Memory(contact, own, frozenset(punch), temperature)
 
 
 def _rough(law: RoughLayer, modulus: float | None) -> Closure:

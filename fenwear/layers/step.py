@@ -9,7 +9,10 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.layers.between import DEBRIS, PLASTIC, Layers
 from fenwear.layers.debris import DebrisCycle
+from fenwear.layers.memory import Evolution, Held
 from fenwear.sliding.wear import PhasesWear, StepWear, Worn
+
+NUDGE = 1e-6  # of the largest pressure, for differences
 
 
 @dataclass(frozen=True)
@@ -20,42 +23,62 @@ class Passing:
         layers: What lies between.
         wear: Of these phases.
         debris: What they do to it; None without.
+        evolution: What they do to the states of laws; None without.
     """
 
     layers: Layers
     wear: PhasesWear
     debris: DebrisCycle | None
+    evolution: Evolution | None = None
 
     @classmethod
-    def over(cls, layers: Layers, wear: PhasesWear, slid: Array) -> Passing:
+    def over(cls, layers: Layers, wear: PhasesWear, slid: Array, evolution: Evolution | None = None) -> Passing:
         """Return what phases do that slide by these distances (m, n), mm."""
-        return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid))
+        return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid), evolution)
 
-    def worn(self, pressure: Array, before: Array, cycles: float | None = None, flowed: Array | None = None) -> Worn:
+    def worn(self, pressure: Array, before: Worn, cycles: float | None = None, flowed: Array | None = None) -> Worn:
         """Return what the phases wear, and how the state of what lies between changes.
 
         Args:
             pressure: (m, n), MPa.
-            before: State at the start of the step (rows, n).
+            before: Depths and state at the start of the step.
             cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
             flowed: What is added to the plastic depth (n,), mm; by default nothing.
         """
         worn = self.wear.worn(pressure)
-        if not len(before):
+        if not len(before.between) and not len(before.carried):
             return worn
-        changes = np.zeros_like(before)
+        changes = np.zeros_like(before.between)
         if self.debris is not None:
             rows = [self.layers.row(name) for name in DEBRIS]
             changes[rows] = self.debris_changes(pressure, before, cycles)
         if flowed is not None:
             changes[self.layers.row(PLASTIC)] = flowed
-        return Worn(worn.punch, worn.strip, changes)
+        found = Worn(worn.punch, worn.strip, changes)
+        return (
+            found if self.evolution is None else self.layers.with_held(found, self._evolved(pressure, before, cycles))
+        )
 
-    def debris_changes(self, pressure: Array, before: Array, cycles: float | None) -> tuple[Array, Array]:
+    def _evolved(self, pressure: Array, before: Worn, cycles: float | None) -> Held:
+        """Return by how much the states of laws change, as `worn`."""
+        assert self.evolution is not None
+        evolution, held = self.evolution.at(pressure), self.layers.held(before)
+        if cycles is None:
+            return evolution.after(held) - held
+        return (evolution.implicit(held, cycles) - held).times(1 / cycles)
+
+    def filled(self, pressure: Array, before: Worn, cycles: float | None) -> Array | None:
+        """Return the gap that the states of laws fill more (n,), mm, as `worn`; None where they fill none."""
+        memory = self.layers.memory
+        if self.evolution is None or memory is None or not memory.fills.any():
+            return None
+        return memory.fills @ self._evolved(pressure, before, cycles).contact
+
+    def debris_changes(self, pressure: Array, before: Worn, cycles: float | None) -> tuple[Array, Array]:
         """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
         if self.debris is None:
             return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
-        taken, thickness = self.wear.taken(pressure), before[self.layers.row(DEBRIS[0])]
+        taken, thickness = self.wear.taken(pressure), before.between[self.layers.row(DEBRIS[0])]
         if cycles is None:
             return self.debris.change(thickness, taken)
         return self.debris.rate(thickness, taken, cycles)
@@ -66,7 +89,7 @@ class Passing:
             return None
         return (self.debris.fed * self.wear.taken(pressure)).sum(axis=0) / self.debris.loss
 
-    def step(self, before: Array, cycles: float | None = None, *, implicit: bool = True) -> LayerStep | None:
+    def step(self, before: Worn, cycles: float | None = None, *, implicit: bool = True) -> LayerStep | None:
         """Return what the pressures of a step open in it; explicitly what gives way alone, None where nothing does.
 
         Args:
@@ -87,13 +110,13 @@ class LayerStep:
 
     Attributes:
         passing: The phases.
-        before: State of what lies between at the start (rows, n).
+        before: Depths and state at the start.
         cycles: Of the step; None for the phases once.
         implicit: Whether wear opens the gaps of the step itself; else what gives way alone.
     """
 
     passing: Passing
-    before: Array
+    before: Worn
     cycles: float | None
     implicit: bool = True
 
@@ -112,6 +135,8 @@ class LayerStep:
             found = found + self._wear.opening(pressure)
             if passing.debris is not None:
                 found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
+            filled = passing.filled(pressure, self.before, self.cycles)
+            found = found if filled is None else found - self._length * filled
         return found + passing.layers.closing(pressure)
 
     def local(self, pressure: Array) -> Array | None:
@@ -124,7 +149,7 @@ class LayerStep:
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
         left, right = self._wear.border(pressure)
-        if self.passing.debris is None:
+        if self.passing.debris is None and not self._fills:
             return left, right
         unit = np.eye(pressure.shape[1])
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
@@ -151,6 +176,22 @@ class LayerStep:
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
-        if self.passing.debris is None:
-            return np.zeros_like(pressure)
-        return self.passing.debris.slope(self.cycles) * self.passing.wear.taken_slope(pressure)
+        passing, found = self.passing, np.zeros_like(pressure)
+        if passing.debris is not None:
+            found = passing.debris.slope(self.cycles) * passing.wear.taken_slope(pressure)
+        filled = passing.filled(pressure, self.before, self.cycles) if self._fills else None
+        if filled is None:
+            return found
+        size = NUDGE * max(float(np.abs(pressure).max()), 1e-300)
+        for k in range(len(pressure)):
+            more = pressure.copy()
+            more[k] += size
+            other = passing.filled(more, self.before, self.cycles)
+            found[k] += 0.0 if other is None else self._length * (other - filled) / size
+        return found
+
+    @property
+    def _fills(self) -> bool:
+        """Whether states of laws fill a part of the gap."""
+        memory = self.passing.layers.memory
+        return memory is not None and bool(memory.fills.any())

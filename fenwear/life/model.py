@@ -446,6 +446,9 @@ def _snapshot(
     latest = None if temperature is None else (temperature[-1, 0], temperature[-1, 1])
     worn, done = (None, None) if end is None else (end.worn, end.half_cycle)
     states = [system.conditions(k, np.asarray(p), latest, worn, done) for k, p in enumerate(pressure)]
+    if end is None and system.layers.memory is not None:
+        rest = system.rested(states)
+        states = [system.conditions(k, np.asarray(p), latest, rest, done) for k, p in enumerate(pressure)]
     adds = cycle_totals(system, pressure, states)
     path = float(adds.of("load_path"))
     return Snapshot(

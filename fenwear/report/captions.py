@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xarray
 
+from fenwear.report.lies_between import lies_between
 from fenwear.report.style import Look, direction_words, strip_moves
 from fenwear.report.surface import cut_places, model_of
 from fenwear.results.sheet import BODIES
@@ -33,6 +34,8 @@ TEXTS = {
     "convergence": "(a) Largest change of pressure against one cycle ago, over the pressure scale (integral of p² "
     "over integral of p), and (b) share of the load that is carried elsewhere than in the optimum, over the {axis}.",
     "temperature": "Temperature along the contact surfaces of (a) the punch and (b) the strip at {chosen}.",
+    "between": "What lies between the surfaces along the contact at {chosen}: debris, plastic depth, and what laws "
+    "remember there, where there are any.",
     "heat_balance": "Heat of each half-cycle over the {axis}: what friction makes is the sum of the others.",
     "boundary_temperature": "Temperature (a) round the punch from the middle of its contact on, corners by (x, z) in "
     "mm, and (b) along the strip's upper surface, grey under the punch, at half-cycle {last}.",
@@ -60,6 +63,7 @@ TEXTS = {
     "stress_range": "Stress along the sliding in the strip's surface: the largest in a cycle, dotted the smallest.",
 }
 WEAR_MAPS = "Maps of the worn depth of the punch over its largest at {chosen}, which is told above each."
+BETWEEN_MAPS = "Maps of what lies between the surfaces at {chosen}: {between}."
 
 
 def _each(history: xarray.Dataset) -> str:
@@ -80,7 +84,7 @@ def caption(name: str, history: xarray.Dataset, look: Look) -> str:
         panels = present[0]
     axis = {"cycles": "cycles", "distance": "sliding distance", "time": "time"}[look.axis]
     chosen = {"cycles": "the cycles named", "distance": "the sliding distances named", "time": "the times named"}
-    text = WEAR_MAPS if name == "wear_map" and model_of(history) == "solid" else TEXTS[name]
+    text = WEAR_MAPS if name == "wear_map" and model_of(history) == "solid" else TEXTS.get(name, BETWEEN_MAPS)
     told = text.format(
         bodies=" and ".join(f"the {body}" for body in bodies),
         chosen=chosen[look.axis],
@@ -90,5 +94,6 @@ def caption(name: str, history: xarray.Dataset, look: Look) -> str:
         hot=" and largest temperature of the contact surfaces" if "max_temperature" in history else "",
         back=f"{moves.removeprefix('strip ')} {words[-1]}",
         last=f"{int(history.half_cycle[-1]):,}",
+        between=lies_between(history).get(name.removesuffix("_map"), "").partition(" (")[0],
     )
     return f"{told} {_each(history)}".strip() if name.startswith("cuts") else told

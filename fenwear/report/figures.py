@@ -24,7 +24,8 @@ from fenwear.report.course import (
     temperature_unit,
     volume_figure,
 )
-from fenwear.report.maps import cuts_figure, map_figure, quantities
+from fenwear.report.lies_between import between_figure, lies_between
+from fenwear.report.maps import cuts_figure, map_figure, quantities, quantities_between
 from fenwear.report.program import program_figure
 from fenwear.report.shapes import profile_figure, shape_figure, wear_map_figure
 from fenwear.report.shown import chosen_half_cycles, cycle_means, early_half_cycles, early_of, nearest_half_cycles
@@ -148,7 +149,8 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
     drawn: dict[str, Figure] = {}
     model = model_of(history)
     if model == "solid":
-        drawn |= {name: map_figure(history, one, chosen[-MAPS:], look) for name, one in quantities(history).items()}
+        shown = quantities(history) | quantities_between(history)
+        drawn |= {name: map_figure(history, one, chosen[-MAPS:], look) for name, one in shown.items()}
         drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)
         drawn["cuts_across"] = cuts_figure(history, chosen, look, along=False)
     else:
@@ -161,6 +163,8 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
             drawn["mean_pressure"] = mean_pressure_figure(history, chosen, look)
         if "max_temperature" in history:
             drawn["temperature"] = temperature_figure(history, chosen, look)
+        if lies_between(history):
+            drawn["between"] = between_figure(history, chosen, look)
     drawn["peaks"] = peak_figure(history, look)
     if bores_of(history):
         drawn["place"] = place_figure(history, look)

@@ -10,6 +10,7 @@ import xarray
 
 from fenwear.arrays import Array
 from fenwear.report.course import temperature_unit
+from fenwear.report.lies_between import DEPTHS, lies_between
 from fenwear.report.shown import early_half_cycles, pressure_top
 from fenwear.report.style import (
     GREY,
@@ -81,6 +82,18 @@ def quantities(history: xarray.Dataset) -> dict[str, Quantity]:
     return {name: q for name, q in found.items() if q.variable in history}
 
 
+def quantities_between(history: xarray.Dataset) -> dict[str, Quantity]:
+    """Return the same of what lies between the surfaces."""
+    found: dict[str, Quantity] = {}
+    for name, words in lies_between(history).items():
+        title, _, unit = words.rstrip(")").partition(" (")
+        body = "strip" if str(history[name].dims[-1]).endswith("_strip") else "punch"
+        factor = 1e3 if name in DEPTHS else 1.0
+        title = title[0].upper() + title[1:]
+        found[f"{name}_map"] = Quantity(name, body, title, unit, factor, "PuBuGn", title.lower())
+    return found
+
+
 def map_figure(
     history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int], look: Look = STANDARD
 ) -> Figure:
@@ -113,7 +126,7 @@ def map_figure(
         size = f"{most:,.0f}" if most >= 1000 else f"{most:.3g}"
         name_panel(ax, f"{title}\n≤ {size} {quantity.unit}")
     name = f"{quantity.title[0].lower()}{quantity.title[1:]}"
-    label = f"{name} over the largest one" if relative else f"{name} ({quantity.unit})"
+    label = f"{name} over the largest one" if relative else f"{name} ({quantity.unit})" if quantity.unit else name
     colour_bar(figure, drawn, axes, label, **bar_place(look))
     return figure
 

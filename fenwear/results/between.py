@@ -1,6 +1,8 @@
-"""What lies between the surfaces, in history.nc and summary.json: the third body and its balance, the plastic depth.
+"""What lies between the surfaces, in history.nc and summary.json: the third body, the plastic depth, states of laws.
 
 worn volume of both bodies + volume at the start = stored + ejected
+
+A state that a law remembers is `state_NAME` there, on the strip's material `state_NAME_strip`.
 """
 
 from __future__ import annotations
@@ -26,12 +28,37 @@ OF_FLOW: dict[str, Variable] = {
     "plastic_depth": (("half_cycle", "x"), "mm", "depth that has flown beyond the hardness, apart from wear"),
     "plastic_volume": (("half_cycle",), "mm3", "volume that has flown beyond the hardness, apart from wear"),
 }
+STATE, STATES = "state_", "states"  # how variables of states begin; where summary.json has them
 
 
 def variables(placed: Placed) -> dict[str, Variable]:
     """Return the variables of what lies between the surfaces."""
     rows = placed.layers.rows
-    return {**(OF_DEBRIS if DEBRIS[0] in rows else {}), **(OF_FLOW if PLASTIC in rows else {})}
+    own = {**(OF_DEBRIS if DEBRIS[0] in rows else {}), **(OF_FLOW if PLASTIC in rows else {})}
+    return {**own, **_of_states(placed)}
+
+
+def _of_states(placed: Placed) -> dict[str, Variable]:
+    memory, found = placed.layers.memory, dict[str, Variable]()
+    if memory is not None:
+        for states, over, end, body in (
+            (memory.contact, "x", "", ""),
+            (memory.strip, "x_strip", "_strip", " of the strip"),
+        ):
+            for name, state in states.items():
+                text = f"{name}{body}, a state that a law remembers, at the end"
+                found[f"{STATE}{name}{end}"] = (("half_cycle", over), state.unit, text)
+    return found
+
+
+def _states(block: Block) -> dict[str, Array]:
+    """Return the states of laws by the names of their variables (k, n), on the strip's material (k, n_strip)."""
+    layers = block.system.layers
+    if layers.memory is None:
+        return {}
+    first = len(layers.rows) - len(layers.memory.contact)
+    found = {f"{STATE}{name}": block.between[:, first + k] for k, name in enumerate(layers.memory.contact)}
+    return found | {f"{STATE}{name}_strip": block.carried[:, k] for k, name in enumerate(layers.memory.strip)}
 
 
 def values(block: Block) -> dict[str, Array]:
@@ -42,6 +69,7 @@ def values(block: Block) -> dict[str, Array]:
     if PLASTIC in rows:
         depth = block.between[:, rows.index(PLASTIC)]
         found = {"plastic_depth": depth, "plastic_volume": depth @ areas}
+    found |= _states(block)
     if system.layers.debris is None:
         return found
     stored, ejected = (block.between[:, rows.index(name)] for name in DEBRIS)
@@ -63,6 +91,12 @@ def numbers(last: Block) -> dict[str, Any]:
     if "plastic_volume" in found:
         told["plastic_volume_mm3"] = float(found["plastic_volume"][-1])
         told["largest_plastic_depth_mm"] = float(found["plastic_depth"][-1].max())
+    if states := _states(last):
+        units = {name: unit for name, (_, unit, _) in _of_states(last.system).items()}
+        told[STATES] = {
+            name.removeprefix(STATE): {"unit": units[name], **_extent(_weights(last, name), rows[-1])}
+            for name, rows in states.items()
+        }
     if "debris_volume" not in found:
         return told
     return {
@@ -72,3 +106,15 @@ def numbers(last: Block) -> dict[str, Any]:
         "largest_debris_thickness_mm": float(found["debris_thickness"][-1].max()),
         "debris_balance_error": float(found["debris_balance_error"][-1]),
     }
+
+
+def _weights(block: Block, name: str) -> Array:
+    """Return the areas of the nodes that a state has values at."""
+    on_strip = _of_states(block.system)[name][0][-1] == "x_strip"
+    return block.system.pair.strip.weights if on_strip else block.system.pair.weights
+
+
+def _extent(weights: Array, values: Array) -> dict[str, float]:
+    """Return mean over the surface, smallest and largest of nodal values."""
+    mean = float(weights @ values) / float(weights.sum())
+    return {"mean": mean, "smallest": float(values.min()), "largest": float(values.max())}

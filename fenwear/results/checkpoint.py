@@ -47,6 +47,7 @@ NUMBERS, WEAR, STATES = (
 TOTALS = ("totals", "energy", "pressure_sum")
 BETWEEN = "between"  # the state of what lies between the surfaces, without rows where nothing does that changes
 CREPT = "crept"  # the state of what creeps, empty where nothing does
+CARRIED = "carried"  # the states of the strip's material that laws remember, without rows where there are none
 WARMED = "warmed"  # temperatures that the properties of materials are taken at, where they depend on them
 MEMORY, REMEMBERED = "memory", "remembered"  # what a law of contact remembers, and its temperatures
 BULK = "bulk"  # what is on its way back on a closed track; NaN where there is none
@@ -205,7 +206,7 @@ def _totals(totals: Totals) -> dict[str, Any]:
 
 
 def _between(worn: Worn) -> dict[str, Any]:
-    return {BETWEEN: worn.between, CREPT: worn.crept}
+    return {BETWEEN: worn.between, CREPT: worn.crept, CARRIED: worn.carried}
 
 
 def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
@@ -272,7 +273,8 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
     length, periodic = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
-    worn, totals = Worn(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT))), Totals(*(arrays[name] for name in TOTALS))
+    worn = Worn(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
+    totals = Totals(*(arrays[name] for name in TOTALS))
     memory = _memory(folder, system, arrays)
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, length, periodic, memory)
 
@@ -322,7 +324,7 @@ def _arrays(folder: Path) -> dict[str, Any]:
         with np.load(folder / ARRAYS) as arrays:
             followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
             memory = [name for name in arrays if name.startswith(f"{MEMORY}.")]
-            depths = (*WEAR, BETWEEN, CREPT)
+            depths = (*WEAR, BETWEEN, CREPT, CARRIED)
             return {name: arrays[name] for name in (*NUMBERS, *depths, *TOTALS, BULK, *STATES, *followed, *memory)}
     except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile):
         raise damaged(folder) from None
@@ -364,7 +366,8 @@ def _read(folder: Path, system: Tribosystem) -> dict[str, Any]:
             if name in arrays and (arrays[name].shape != unworn.shape or not np.isfinite(arrays[name]).all()):
                 raise damaged(folder)
     unworn = system.unworn()
-    if arrays[BETWEEN].shape != unworn.between.shape or arrays[CREPT].shape != unworn.crept.shape:
+    kept = {BETWEEN: unworn.between, CREPT: unworn.crept, CARRIED: unworn.carried}
+    if any(arrays[name].shape != state.shape for name, state in kept.items()):
         raise damaged(folder)
     if arrays["totals"].shape != (len(SUMS),) or any(
         arrays[name].shape != system.pair.weights.shape for name in TOTALS[1:]

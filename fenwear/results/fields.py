@@ -81,6 +81,7 @@ def body_fields(
     phase: int,
     temperatures: tuple[Array, Array] | None,
     friction_ratio: Array | None = None,
+    worn: Worn | None = None,
 ) -> tuple[BodyFields, BodyFields]:
     """Return the fields of the punch and the strip; collective.
 
@@ -91,9 +92,10 @@ def body_fields(
         phase: Number of the phase in the cycle.
         temperatures: Of each body's owned nodes, K.
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure; by default that of sliding.
+        worn: Depths, and states that laws remember, for friction that depends on them; by default those at the start.
     """
     pair, traction = system.pairs[phase], friction_ratio
-    traction = _traction(system, phase, pressure, temperatures) if traction is None else in_space(traction)
+    traction = _traction(system, phase, pressure, temperatures, worn) if traction is None else in_space(traction)
     force = in_space(pair.normal) + traction
     force *= (pair.weights * pressure)[:, None]
     on_punch, on_strip = pair.punch.spread @ force, -(pair.transfer.T @ force)
@@ -115,7 +117,9 @@ def body_fields(
     return punch, strip
 
 
-def _traction(system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None) -> Array:
+def _traction(
+    system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None, worn: Worn | None
+) -> Array:
     """Return the traction of friction on the punch over this pressure, in space (n, 3); collective."""
     friction, surfaces = system.friction, None
     if not friction.constant and temperatures is not None and system.bodies.heat is not None:
@@ -124,7 +128,7 @@ def _traction(system: Tribosystem, phase: int, pressure: Array, temperatures: tu
             for body, values in zip(system.bodies.heat, temperatures, strict=True)
         )
         surfaces = (system.pair.punch.spread.T @ punch, system.pair.transfer @ strip)
-    mu = friction.values(system.conditions(phase, pressure, surfaces))
+    mu = friction.values(system.conditions(phase, pressure, surfaces, worn))
     return system.friction_in_space(phase, mu)
 
 

@@ -362,6 +362,12 @@ def sheet_rows(summary: Mapping[str, Any]) -> list[tuple[str, str, list[float | 
         if any(key in one for one in found):
             rows.append((line.label, line.unit, [shown(one.get(key), line) for one in found]))
             rows += _within(key, line, of_bodies if found is bodies else [uncertain])
+    for name, state in summary.get("states", {}).items():
+        unit = "" if state["unit"] == "1" else state["unit"]
+        labels = (f"{name.replace('_', ' ')}, mean", "... smallest", "... largest")
+        rows += [
+            (label, unit, [state[key]]) for label, key in zip(labels, ("mean", "smallest", "largest"), strict=True)
+        ]
     return rows
 
 

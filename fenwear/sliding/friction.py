@@ -9,7 +9,7 @@ the contact sees the part in the plane only.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Self
 
 import numpy as np
@@ -36,6 +36,7 @@ class ContactConditions:
         regions: Shares of the regions of punch and strip in the nodes (n,), by their names.
         cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
             straight at the present pressure.
+        states: That laws of one's own remember (n,), by their names: as those of punch and strip know them.
     """
 
     pressure: Array
@@ -46,6 +47,7 @@ class ContactConditions:
     slid: Array
     regions: tuple[Mapping[str, Array], Mapping[str, Array]]
     cycle: CycleShear | None = None
+    states: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
 
     @classmethod
     def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
@@ -77,6 +79,7 @@ class ContactConditions:
             "cs": np.zeros(self.shape) if self.cycle is None else self.cycle.ratio[own],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,
             **{f"region {name}": share for name, share in self.regions[own].items()},
+            **self.states[own],
         }
 
 

@@ -34,23 +34,26 @@ class Worn:
         strip: At the strip's contact nodes (n_strip,), on its material, mm.
         between: By the rows of `fenwear.layers.Layers` (rows, n); without rows where nothing lies between that changes.
         crept: Of what creeps (size,), as `fenwear.assembly.creep.Creep` has it; empty where nothing does.
+        carried: States of the strip's own material (rows, n_strip), see `fenwear.layers.memory`; without rows mostly.
     """
 
     punch: Array
     strip: Array
     between: Array = field(default_factory=lambda: NOTHING)
     crept: Array = field(default_factory=lambda: STIFF)
+    carried: Array = field(default_factory=lambda: NOTHING)
 
     def __add__(self, other: Worn) -> Worn:
-        between, crept = _added(self.between, other.between), _added(self.crept, other.crept)
-        return Worn(self.punch + other.punch, self.strip + other.strip, between, crept)
+        pairs = ((self.between, other.between), (self.crept, other.crept), (self.carried, other.carried))
+        return Worn(self.punch + other.punch, self.strip + other.strip, *(_added(*pair) for pair in pairs))
 
     def __sub__(self, other: Worn) -> Worn:
         return self + other.times(-1.0)
 
     def times(self, factor: float) -> Worn:
         """Return all of it times a factor."""
-        return Worn(factor * self.punch, factor * self.strip, factor * self.between, factor * self.crept)
+        kept = (factor * state for state in (self.between, self.crept, self.carried))
+        return Worn(factor * self.punch, factor * self.strip, *kept)
 
 
 def _added(one: Array, other: Array) -> Array:

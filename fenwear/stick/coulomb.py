@@ -263,10 +263,12 @@ class _Run:
             none = np.full((len(steps), n), np.nan), np.full((len(steps), n, m), np.nan)
             at = replace(at, next_step=0, pressures=none[0], trials=none[1])
         heating = np.zeros(len(self.rig.weights)) if at.heating is None else at.heating
-        at = replace(at, worn=state.worn, load=load, temperature=warm, heating=None if warm is None else heating)
+        at = replace(
+            at, worn=state.worn, held=None, load=load, temperature=warm, heating=None if warm is None else heating
+        )
         while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
             at, _ = self.rig.half_cycle(at)
-        return replace(at, temperature=warm)
+        return replace(at, temperature=warm, held=None)
 
     def half_cycle(
         self,
@@ -321,7 +323,7 @@ class HalfCycles(_Run):
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
-        lost = rig.worn_in(records, first, state.worn.between)
+        lost = rig.worn_in(records, first, begin)
         worn = state.worn + lost
         adds = self.meter(records, first)
         totals = state.totals + adds
@@ -336,7 +338,9 @@ class HalfCycles(_Run):
         warm, exchange = state.temperature, self.system.exchange
         if exchange is not None and at.temperature is not None:
             warm = exchange.at(at.temperature)
-        memory = Memory(replace(at, worn=worn, temperature=None), stuck=stuck.astype(float), meshes=self.setup.meshes)
+        memory = Memory(
+            replace(at, worn=worn, held=None, temperature=None), stuck=stuck.astype(float), meshes=self.setup.meshes
+        )
         return RunState(number, worn, tuple(contacts), warm, totals, memory=memory), [record]
 
 
@@ -378,7 +382,8 @@ class Jumps(_Run):
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
         adds = [self.meter(records, first) for first, records in parts]
-        lost = [rig.worn_in(records, first, then.worn.between) for first, records in parts]
+        ended = replace(then.end, worn=then.worn, held=None)
+        lost = [rig.worn_in(records, first, ended) for first, records in parts]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])
             sums.insert(0, sums[0] - adds[k])

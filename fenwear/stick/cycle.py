@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
+from fenwear.interface import ContactPair
+from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS
-from fenwear.sliding.wear import NOTHING, Worn
+from fenwear.layers.memory import Held
+from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import Worn
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
 from fenwear.stick.increment import advance
@@ -133,6 +137,8 @@ class RigState:
         slid: What each node has slipped from the start (n,), mm, where a law depends on it; else None.
         speed: Of the slip of each node in the last step (n,), mm/s, where a law depends on it; else None.
         coupling: Iterations of contact and heat in the last step.
+        held: What laws remember after the last step, where that is not what `worn` has; the shape stays until the end
+            of a half-cycle.
     """
 
     contact: StickState
@@ -148,6 +154,7 @@ class RigState:
     coupling: int = 0
     slid: Array | None = None
     speed: Array | None = None
+    held: Held | None = None
 
     @property
     def near(self) -> tuple[Array, Array] | None:
@@ -163,6 +170,15 @@ class RigState:
         pressures, trials = self.pressures.copy(), self.trials.copy()
         pressures[self.next_step], trials[self.next_step] = state.pressure, state.trial
         return pressures, trials
+
+
+class _Slips(NamedTuple):
+    """What laws ask of k time steps: pressure and slip (k, n), durations (k,), temperatures at their ends (k, 2, n)."""
+
+    pressure: Array
+    slid: Array
+    duration: Array
+    temperature: Array | None
 
 
 class Rig:
@@ -236,9 +252,7 @@ class Rig:
 
     def unworn(self) -> Worn:
         """Return the worn depths at the start, none, and what lies between then."""
-        pair = self.interface.middle.pair
-        between = self.interface.layers.beginning()
-        return Worn(np.zeros(len(pair.weights)), np.zeros(len(pair.strip.weights)), between)
+        return self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
 
     def beginning(self, shape: Worn | None = None, load: float = 1.0) -> RigState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
@@ -293,7 +307,20 @@ class Rig:
 
     def _step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
         after = self._stepped(at, step)
-        return after, self._record(at, after, step)
+        wear, held = self._passed(at, after, step)
+        return replace(after, held=held), self._record(at, after, step, wear)
+
+    def _passed(self, at: RigState, after: RigState, step: TimeStep) -> tuple[LocalWear, Held | None]:
+        """Return by what law a time step wears, and what laws remember at its end."""
+        laws, layers, slipped = self.laws, self.interface.layers, np.linalg.norm(after.contact.slip, axis=1)
+        if laws is None:
+            return self.wear, None
+        steps = _Slips(after.contact.pressure[None], slipped[None], np.array([step.duration]), None)
+        evolution = self._evolution(steps, at)
+        if evolution is None:
+            return laws.wear_at(self._conditions(steps, at)[0]), None
+        (conditions,), end, _ = evolution.through(at.held or layers.held(at.worn))
+        return laws.wear_at(conditions), evolution.memory.bounded(end)
 
     def _stepped(self, at: RigState, step: TimeStep) -> RigState:
         if self.laws is None or not self.laws.changes():
@@ -301,7 +328,8 @@ class Rig:
         laws, position = self.laws, self.interface.position(step.offset)
         pressure = at.contact.pressure if at.near is None else at.near[0]
         for _ in range(MOST_FRICTIONS):
-            conditions = laws.conditions(position.pair, pressure, **self._known(at))
+            states = self.interface.layers.known(position.pair, at.worn, at.held)
+            conditions = laws.conditions(position.pair, pressure, **self._known(at), states=states)
             after = self._advanced(at, step, laws.friction.values(conditions))
             change, pressure = np.abs(after.contact.pressure - pressure).max(), after.contact.pressure
             if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
@@ -381,13 +409,13 @@ class Rig:
             found.append(records)
         return at, found
 
-    def worn_in(self, records: Records, first: int, between: Array = NOTHING, *, rate: bool = False) -> Worn:
+    def worn_in(self, records: Records, first: int, before: RigState | None = None, *, rate: bool = False) -> Worn:
         """Return what the steps of a record wear off both bodies, and what becomes of what lies between.
 
         Args:
             records: Of steps one after the other.
             first: Number of the first of them in the cycle.
-            between: State of what lies between before them (rows, n); by default it is left out.
+            before: Where they began, with the state of what lies between; by default that is left out.
             rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps.
         """
         pair, steps = self.interface.middle.pair, self.program.steps
@@ -397,22 +425,71 @@ class Rig:
             for place in sorted(set(places)):
                 depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.interface.position(place).pair.wear_projection @ depth
-        return Worn(records.punch_depth.sum(axis=0), strip, self._change_between(records, between, rate=rate))
+        worn = Worn(records.punch_depth.sum(axis=0), strip)
+        return worn if before is None else self._with_between(worn, records, first, before, rate=rate)
 
-    def _change_between(self, records: Records, between: Array, *, rate: bool) -> Array:
-        """Return what steps do to what lies between (rows, n); arguments as of `worn_in`."""
-        layers = self.interface.layers
-        if not len(between):
-            return NOTHING
-        changes = np.zeros_like(between)
+    def _with_between(self, worn: Worn, records: Records, first: int, before: RigState, *, rate: bool) -> Worn:
+        """Return what is worn with what steps do to what lies between; arguments as of `worn_in`."""
+        layers, now = self.interface.layers, before.worn
+        changes = np.zeros_like(now.between)
         if layers.debris is not None:
             over, taken = layers.debris.over(records.slid), records.punch_depth + records.strip_depth
             rows = [layers.row(name) for name in DEBRIS]
-            thickness = between[rows[0]]
+            thickness = now.between[rows[0]]
             changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
-        return changes
+        found = replace(worn, between=changes)
+        evolution = self.evolution(records, replace(before, next_step=first))
+        if evolution is None:
+            return found
+        held = layers.held(now)
+        return layers.with_held(found, evolution.rate(held)[0] if rate else evolution.after(held) - held)
 
-    def _record(self, at: RigState, after: RigState, step: TimeStep) -> Records:
+    def evolution(self, records: Records, before: RigState) -> Evolution | None:
+        """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""
+        slips = _Slips(records.pressure, records.slid, records.duration, records.temperature)
+        return self._evolution(slips, before)
+
+    def _evolution(self, slips: _Slips, before: RigState) -> Evolution | None:
+        """Return what steps that begin at a state do to the states that laws remember; None without."""
+        memory, laws = self.interface.layers.memory, self.laws
+        if memory is None or laws is None:
+            return None
+
+        def wearing(k: int, at: ContactConditions) -> Array:
+            tau = float(slips.duration[k])
+            punch, strip = laws.wear_at(at).depths(at.pressure, slips.slid[k], tau)
+            return (punch + strip) / tau
+
+        conditions, pairs = self._conditions(slips, before), self._pairs(slips, before)
+        return Evolution(memory, conditions, slips.duration, pairs, wearing, before.worn.strip)
+
+    def _conditions(self, slips: _Slips, before: RigState) -> list[ContactConditions]:
+        """Return the conditions of laws in steps that begin at a state: temperatures are those at the start of each."""
+        laws, known = self.laws, self._known(before)
+        assert laws is not None
+        begun = np.zeros_like(self.weights) if before.slid is None else before.slid
+        slid = begun + np.cumsum(slips.slid, axis=0)
+        warm = [known["temperatures"]] * len(slid)
+        if slips.temperature is not None and known["temperatures"] is not None:
+            warm[1:] = [(punch, strip) for punch, strip in slips.temperature[:-1]]
+        return [
+            laws.conditions(
+                pair,
+                slips.pressure[k],
+                speed=slips.slid[k] / slips.duration[k],
+                temperatures=warm[k],
+                worn=before.worn,
+                slid=slid[k],
+            )
+            for k, pair in enumerate(self._pairs(slips, before))
+        ]
+
+    def _pairs(self, slips: _Slips, before: RigState) -> list[ContactPair]:
+        steps = self.program.steps
+        places = [steps[(before.next_step + k) % len(steps)].offset for k in range(len(slips.slid))]
+        return [self.interface.position(place).pair for place in places]
+
+    def _record(self, at: RigState, after: RigState, step: TimeStep, wear: LocalWear) -> Records:
         before, state, position = at.contact, after.contact, self.interface.position(step.offset)
         weights = position.pair.weights
         f = np.concatenate([state.pressure, state.traction.T.ravel()])
@@ -423,10 +500,7 @@ class Rig:
         work = state.force * (state.displacement - before.displacement) + lowered
         closed = self.interface.layers.given(state.pressure) - self.interface.layers.given(before.pressure)
         stored += weights @ (state.pressure * closed)
-        slipped, wear = np.linalg.norm(state.slip, axis=1), self.wear
-        if self.laws is not None:
-            known = {**self._known(at), "slid": after.slid, "speed": slipped / step.duration}
-            wear = self.laws.wear_at(self.laws.conditions(position.pair, state.pressure, **known))
+        slipped = np.linalg.norm(state.slip, axis=1)
         punch, strip = wear.depths(state.pressure, slipped, step.duration)
         values = (
             state.displacement,

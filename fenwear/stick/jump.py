@@ -17,6 +17,7 @@ is computed again until both belong together; the trapezoidal rule gives its err
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,7 +26,10 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
+from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS
+from fenwear.layers.memory import Held
+from fenwear.layers.step import NUDGE
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig, RigState
 from fenwear.stick.heat import Course
@@ -115,8 +119,9 @@ def _rate(
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
     program, heat = rig.program, rig.heat
-    at = replace(at, worn=worn)
-    for _ in range(1 if program.half_cycles == 2 and heat is None else program.half_cycles):
+    at = replace(at, worn=worn, held=None)
+    settled = heat is None and rig.interface.layers.memory is None  # what goes to and fro in a cycle is its own
+    for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
         at, _ = rig.half_cycle(at)
     if heat is not None and before is None:
         at = replace(at, temperature=heat.initial() if warm is None else warm)
@@ -140,9 +145,10 @@ def _rate(
 
 
 def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> FrettingCycle:
-    first, warm = at.next_step, at.temperature
+    at = replace(at, worn=worn, held=None)
+    first, warm, begin = at.next_step, at.temperature, at
     at, parts = rig.cycle(at)
-    rate = rig.worn_in(Records.joined(parts), first, worn.between, rate=True)
+    rate = rig.worn_in(Records.joined(parts), first, begin, rate=True)
     return FrettingCycle(number, worn, parts, rate, 0.0, first, at, warm=warm)
 
 
@@ -155,20 +161,23 @@ def _course(cycle: FrettingCycle, steps: int) -> Course:
 
 def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
     """Return the cycle after a jump."""
-    n, depths, shape = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip), now.worn.between.shape
+    n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
+    between, layers = depths + now.worn.between.size, rig.interface.layers
 
     def parted(y: Array) -> Worn:
-        return Worn(y[:n], y[n:depths], rig.interface.layers.settled(y[depths:].reshape(shape)))
+        shapes = now.worn.between.shape, now.worn.carried.shape
+        state, carried = y[depths:between].reshape(shapes[0]), y[between:].reshape(shapes[1])
+        return layers.settled(Worn(y[:n], y[n:depths], state, carried=carried))
 
     def whole(worn: Worn) -> Array:
-        return np.concatenate([worn.punch, worn.strip, worn.between.ravel()])
+        return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel()])
 
     begin, rate = whole(now.worn), whole(now.rate)
 
     def risen(y: Array) -> Array:
         return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
 
-    matrix = np.eye(depths + now.worn.between.size) - GAMMA * cycles * _derivative(rig, now)
+    matrix = np.eye(len(begin)) - GAMMA * cycles * _derivative(rig, now)
     factor = scipy.linalg.lu_factor(matrix)
     first = scipy.linalg.lu_solve(factor, rate)
     start = _slid_on(now, cycles)
@@ -178,11 +187,13 @@ def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
     then = _rate(rig, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
     missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
-    felt = [pair.weights * (row == DEBRIS[0]) for row in rig.interface.layers.rows]  # what is ejected opens nothing
-    area = np.concatenate([pair.weights, pair.strip.weights, *felt])
+    felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
+    area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(now.worn.carried.size)])
     scale = area @ np.abs(end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing)) / max(float(scale), 1e-300)
-    return replace(then, error=max(error, then.error))
+    remembered = _Remembered.of(rig, now, depths)
+    of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
+    return replace(then, error=max(error, then.error, of_states))
 
 
 def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
@@ -196,11 +207,12 @@ def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
 def _derivative(rig: Rig, now: FrettingCycle) -> Array:
     """Return A, the derivative of a cycle's wear to depths and what lies between, at the contact zone and slip of now.
 
-    Square, of the depths (n + n_s) and the state of what lies between (rows n).
+    Square, of the depths (n + n_s), the state of what lies between (rows n) and of the strip's material (rows n_s).
     """
     records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
     depths, layers = n + len(now.worn.strip), rig.interface.layers
-    debris, total = layers.debris, depths + now.worn.between.size
+    debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
+    remembered = _Remembered.of(rig, now, depths)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     A = np.zeros((total, total))
     slid, groups = records.slid, dict[tuple[float, bytes], list[int]]()
@@ -230,13 +242,82 @@ def _derivative(rig: Rig, now: FrettingCycle) -> Array:
         between = np.zeros((len(closed), total - depths))
         if debris is not None:
             between[:, stored - depths : stored - depths + n] = -np.eye(n)[closed]
+        if remembered is not None:
+            for row, fills, rate in remembered.filling(members):
+                left[row.start + closed, np.arange(len(closed))] = rate[closed]
+                between[:, row.start - depths : row.stop - depths] = -fills * np.eye(n)[closed]
         right.append(between)
         A -= left @ (answer @ np.concatenate(right, axis=1))
     if debris is not None:
         lost, at = debris.over(slid).loss, np.arange(n)
         A[stored + at, stored + at] -= lost
         A[ejected + at, stored + at] += lost
-    return A
+    return A if remembered is None else A + remembered.slopes(total)
+
+
+@dataclass(frozen=True)
+class _Remembered:
+    """The states that laws remember among all unknowns of a jump.
+
+    Attributes:
+        rows: Where each is, those of the contact first.
+        areas: Of the nodes of each.
+        evolution: What a cycle does to them.
+        held: Where it begins.
+        fills: Gap that a unit of each fills, mm.
+    """
+
+    rows: tuple[slice, ...]
+    areas: tuple[Array, ...]
+    evolution: Evolution
+    held: Held
+    fills: tuple[float, ...]
+
+    @classmethod
+    def of(cls, rig: Rig, now: FrettingCycle, depths: int) -> _Remembered | None:
+        """Return those of a cycle, behind so many depths; None without."""
+        layers, pair, memory = rig.interface.layers, rig.interface.middle.pair, rig.interface.layers.memory
+        evolution = rig.evolution(now.records, replace(now.end, worn=now.worn, held=None, next_step=now.first_step))
+        if memory is None or evolution is None:
+            return None
+        begin = depths + now.worn.between.size - len(pair.weights) * len(memory.contact)
+        weights = [*(pair.weights for _ in memory.contact), *(pair.strip.weights for _ in memory.strip)]
+        ends = begin + np.cumsum([len(own) for own in weights])
+        rows = tuple(slice(int(end) - len(own), int(end)) for end, own in zip(ends, weights, strict=True))
+        fills = tuple(state.fills for state in memory.states)
+        return cls(rows, tuple(weights), evolution, layers.held(now.worn), fills)
+
+    def error(self, missing: Array, begin: Array, end: Array) -> float:
+        """Return the largest error of a state over its size, both integrated."""
+        size = np.maximum(np.abs(end), np.abs(begin))
+        pairs = zip(self.rows, self.areas, strict=True)
+        return max(float(own @ np.abs(missing[row])) / max(float(own @ size[row]), 1e-300) for row, own in pairs)
+
+    def filling(self, steps: Sequence[int]) -> list[tuple[slice, float, Array]]:
+        """Return of states that fill the gap where they are, by how much, and how their rates follow the pressure (n,).
+
+        Args:
+            steps: Whose pressures change.
+        """
+        if not any(self.fills):
+            return []
+        pressure = np.array([one.pressure for one in self.evolution.conditions])
+        size, more = NUDGE * max(float(pressure.max()), 1e-300), pressure.copy()
+        more[list(steps)] += size
+        change = (self.evolution.at(more).rate(self.held)[0] - self.evolution.rate(self.held)[0]).times(1 / size)
+        contact = zip(self.rows, self.fills, change.contact, strict=False)
+        return [(row, fills, rate) for row, fills, rate in contact if fills]
+
+    def slopes(self, total: int) -> Array:
+        """Return how the rates follow the states themselves, among all unknowns (total, total)."""
+        found, slopes = np.zeros((total, total)), self.evolution.rate(self.held)[1]
+        q = slopes.contact.shape[1]
+        for own, part in ((self.rows[:q], slopes.contact), (self.rows[q:], slopes.strip)):
+            for i, one in enumerate(own):
+                for j, other in enumerate(own):
+                    at = np.arange(part.shape[0])
+                    found[one.start + at, other.start + at] = part[:, i, j]
+        return found
 
 
 def _stiffness(rig: Rig, position: Position, closed: NDArray[np.int64], pressure: Array) -> Array:

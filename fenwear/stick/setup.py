@@ -73,7 +73,7 @@ def unheated_rig(
     initial = 0.0 if case.heat is None else case.heat.initial
     laws = LocalLaws(sliding.friction, sliding.wear, regions, initial)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
-    conditions = laws.conditions(middle.pair, mean)
+    conditions = laws.conditions(middle.pair, mean, states=interface.layers.known(middle.pair, None))
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
     return Rig(interface, make_program(case, steps), wear, mu, laws=None if laws.constant else laws)
 

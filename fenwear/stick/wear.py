@@ -20,6 +20,8 @@ from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import Worn, coefficient
 
+States = tuple[Mapping[str, Array], Mapping[str, Array]]
+
 
 @dataclass(frozen=True)
 class BodyRate:
@@ -97,6 +99,7 @@ class LocalLaws:
         temperatures: tuple[Array, Array] | None = None,
         worn: Worn | None = None,
         slid: Array | None = None,
+        states: States = ({}, {}),
     ) -> ContactConditions:
         """Return what coefficients depend on.
 
@@ -107,6 +110,7 @@ class LocalLaws:
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths; by default none.
             slid: What each node has slipped from the start (n,), mm; by default nothing.
+            states: That laws remember, as those of punch and strip know them.
         """
         none, x = np.zeros_like(pressure), pair.punch.x
         initial = np.full_like(pressure, self.initial)
@@ -118,6 +122,7 @@ class LocalLaws:
             (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             none if slid is None else slid,
             self.regions,
+            states=states,
         )
 
     def wear_at(self, conditions: ContactConditions) -> LocalWear:

@@ -11,8 +11,8 @@ import pytest
 
 import fenwear
 from fenwear import Tribosystem, assemble, jump, load_case, make_case, march, steady
-from fenwear.case import Case, changed_case
-from fenwear.case.dependence import evaluate_law
+from fenwear.case import Case, changed_case, own_laws
+from fenwear.case.own_laws import evaluate_law
 from fenwear.cycle.stability import growth_rate
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.life.model import Model
@@ -178,7 +178,7 @@ def test_own_law_in_python(assembled: Assemble) -> None:
             with pytest.raises(CaseError, match=message):
                 next(march(own, 2))
     finally:
-        fenwear.case.dependence._LAWS.clear()
+        own_laws.forget_laws()
     with pytest.raises(CaseError, match="expected a word"):
         fenwear.register_law("my law", abs)
     with pytest.raises(CaseError, match="expected a function"):
@@ -189,11 +189,11 @@ def test_own_law_in_python(assembled: Assemble) -> None:
 
 def test_a_slow_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """Once, after the first calls; here any time counts as slow."""
-    monkeypatch.setattr(fenwear.case.dependence, "SLOW", -1.0)
+    monkeypatch.setattr(own_laws, "SLOW", -1.0)
     state = {"p": np.ones(5)}
     fenwear.register_law("slow", lambda now: now["p"], of=["p"])
     try:
-        for _ in range(fenwear.case.dependence.FIRST - 1):
+        for _ in range(own_laws.FIRST - 1):
             evaluate_law("slow", state, (5,))
         with pytest.warns(UserWarning, match=r"the law 'slow' takes .* s for 5 nodes.*arrays of numpy"):
             evaluate_law("slow", state, (5,))
@@ -201,7 +201,7 @@ def test_a_slow_law_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
             warnings.simplefilter("error")
             evaluate_law("slow", state, (5,))
     finally:
-        fenwear.case.dependence._LAWS.clear()
+        own_laws.forget_laws()
 
 
 def test_what_changes_for_ever_has_no_steady_state(assembled: Assemble) -> None:

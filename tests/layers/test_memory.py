@@ -130,6 +130,7 @@ def test_a_film_that_fills_the_gap_rests_as_debris_does() -> None:
     assert own.pressure == pytest.approx(built.pressure, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_states_that_depend_on_each_other() -> None:
     """A chain of two against the exponential of its matrix, in marches and, to the tolerance, in jumps; fast, too."""
     for fast in (0.05, 40.0):  # 1/s, in cycles of a second
@@ -149,6 +150,7 @@ def test_states_that_depend_on_each_other() -> None:
         assert steady(system).states["second"] == pytest.approx(1.0, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["gross-sliding", "coulomb"])
 def test_friction_and_wear_share_a_state(law: str) -> None:
     """A film that pressure rubs off and that grows again: marches and jumps agree, and rest where the end is."""

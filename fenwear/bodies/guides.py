@@ -96,10 +96,11 @@ def make_guides(space: fem.FunctionSpace, measure: Any, parts: Sequence[Guided])
     comm, field, v = space.mesh.comm, fem.Function(space), ufl.TestFunction(space)
     mass = compiled(ufl.inner(field, v) * measure * ufl.dx(domain=space.mesh))
     rotations, couples = [], []
-    for motions, turns, held in parts:
+    for part in parts:
+        motions, turns, held = part.motions, part.turns, part.held
         weighed = np.empty_like(motions)
-        for k, motion in enumerate(motions.T):
-            field.x.array[: len(motion)] = motion
+        for k in range(motions.shape[1]):
+            field.x.array[: len(motions)] = motions[:, k]
             field.x.scatter_forward()
             weighed[:, k] = assembled_vector(mass)
         inertia = total(comm, motions.T @ weighed)

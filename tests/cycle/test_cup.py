@@ -1,4 +1,4 @@
-"""A ball in a cup, against rigid limits; both worn, with the ball's material turning under the cup."""
+"""A ball in a cup, both worn, the ball's material turning under the cup; rigid limits stand in the verification."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import CaseError, Tribosystem, jump, march, steady
+from fenwear import CaseError, Tribosystem, march
 
 RADIUS, FORCE, RATE = 14.0, 1000.0, 1e-9
 COARSE = (
@@ -27,46 +27,6 @@ def turning(angles: list[float], **more: str) -> str:
     return (
         f"motion={{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_back', through=[0,0,0]}}{further}}}"
     )
-
-
-@pytest.mark.mpi
-def test_steady_state_of_a_cup(assembled: Callable[..., Tribosystem]) -> None:
-    """Verification 43: p = p_0 cos(longitude about the axis), and the approach of a cycle, whatever the bodies."""
-    system = assembled("ball-in-cup", *COARSE, turning([-20, 20, -20]))
-    state, normal = steady(system), system.pair.normal
-    longitude = normal[:, 2] / np.linalg.norm(np.cross(normal, AXIS), axis=1)
-    largest = 4 * FORCE / (np.pi**2 * RADIUS**2)
-    np.testing.assert_allclose(state.phase_pressure, np.tile(largest * longitude, (2, 1)), atol=0.01 * largest)
-    angle = np.radians(80)
-    assert state.velocity["lambda_F"] == pytest.approx(4 * RATE * angle * FORCE / (np.pi**2 * RADIUS), rel=5e-4)
-    volume = float((state.wear_per_cycle * system.pair.weights).sum())
-    assert volume == pytest.approx(4 / np.pi * RATE * FORCE * angle * RADIUS, rel=2e-3)
-    # All that touches wears by one rigid motion; at the rim, whose normals are square to it, a few nodes do not.
-    spread = (state.wear_per_cycle - state.velocity["lambda_F"] * normal[:, 2])[state.pressure[0] > 0]
-    assert np.abs(spread).max() < 1e-9 * state.wear_per_cycle.max()
-
-
-def test_growing_contact(assembled: Callable[..., Tribosystem]) -> None:
-    """Verification 44: sliding, volume and depth of a cup with clearance at 30, 60 and 85 degrees from the pole.
-
-    With stiff bodies the limit is of rigid ones; what they give way, 1.5 um, is a tenth of the depth at 30 degrees.
-    """
-    clearance, way = 0.1, RADIUS * np.radians(80)
-    stiff = ("geometry.parameters.clearance=0.1", "materials.polyethylene.young='20 GPa'", "geometry.follow_wear=never",
-             "materials.cobalt-chromium.young='1000 TPa'")  # fmt: skip
-    system = assembled("ball-in-cup", *COARSE, *stiff, turning([-20, 20, -20]))
-    height, end = system.pair.normal[:, 2], None
-    for angle, slid, volume, share in (
-        (30, 0.06362049, 0.06511247, 0.1),
-        (60, 1.425326, 1.570796, 0.012),
-        (85, 24.33386, 30.03636, 0.004),
-    ):
-        cycles = round(slid * RADIUS**2 * clearance / (RATE * FORCE * way))
-        *_, last = jump(system, cycles, tolerance=3e-3, start=end)
-        end, depth = last.end, last.end.worn.punch
-        assert system.pair.weights @ depth == pytest.approx(volume * RADIUS**2 * clearance, rel=2e-3)
-        rigid = np.maximum(clearance * (height / np.cos(np.radians(angle)) - 1), 0)
-        np.testing.assert_allclose(depth, rigid, rtol=0, atol=share * rigid.max())
 
 
 def test_both_bodies_worn_under_turns(assembled: Callable[..., Tribosystem]) -> None:

@@ -139,12 +139,12 @@ class Box:
 
         No narrower than products on it cost as much.
         """
-        low, counts = np.zeros(len(shape), dtype=np.int64), np.array(shape)
+        whole = np.array(shape, dtype=np.int64)
+        low, counts = np.zeros_like(whole), whole
         if touched is not None and len(touched):
-            low = places[touched].min(axis=0)
-            wanted = np.array([_padded(int(count)) for count in np.ptp(places[touched], axis=0) + 1])
-            counts = np.minimum(wanted, counts)
-            low = np.maximum(np.minimum(low - (counts - np.ptp(places[touched], axis=0) - 1) // 2, shape - counts), 0)
+            first, wide = places[touched].min(axis=0), np.ptp(places[touched], axis=0) + 1
+            counts = np.minimum([_padded(int(count)) for count in wide], whole)
+            low = np.clip(first - (counts - wide) // 2, 0, whole - counts)
         inside = ((places >= low) & (places < low + counts)).all(axis=1)
         nodes = np.flatnonzero(inside)
         at = np.ravel_multi_index(tuple((places[nodes] - low).T), tuple(counts))

@@ -1,0 +1,53 @@
+"""Contacts on grids: a ball on a flat, cold and again, by the number of nodes; beside the time of one product.
+
+python3 tests/benchmarks/grids.py [NODES...]
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from fenwear import assemble, load_case
+
+BALL = (
+    "geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4",
+    "contact.friction=0", "wear.punch.coefficient=0", "wear.strip.coefficient=0", "motion.positions=2",
+    "punch.operator='fine'", "strip.operator='fine'", "grid.size=['0.36 mm', '0.36 mm']",
+)  # fmt: skip
+
+
+def seconds(do: Callable[[], object]) -> float:
+    """Return the processor time that something takes, s."""
+    begin = time.process_time()
+    do()
+    return time.process_time() - begin
+
+
+def main() -> None:
+    """Print a row for each number of nodes."""
+    a = (3 * 20 * 5 / (4 * 210e3 / (2 * (1 - 0.3**2)))) ** (1 / 3)
+    largest = 1.5 * 20 / (np.pi * a**2)
+    print("nodes  tables (s)  contact (s)  over one product  largest pressure / Hertz - 1  memory (MiB)")
+    for nodes in [int(text) for text in sys.argv[1:]] or [65, 129, 257, 513]:
+        system = assemble(load_case("ball-on-flat", [*BALL, f"grid.nodes={nodes}"]))
+        gap = system.gap(0, system.unworn())
+        tables = seconds(partial(system.phase_contact, [0]))
+        contact = system.phase_contact([0])
+        found = contact.solve(gap)
+        again = seconds(partial(contact.solve, gap))
+        multiply = partial(system.interface.compliance(0.0).apply, found.pressure[0])
+        multiply()
+        product = np.median([seconds(multiply) for _ in range(9)])
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
+        error = found.pressure.max() / largest - 1
+        print(f"{nodes:5}  {tables:10.2f}  {again:11.2f}  {again / product:16.0f}  {error:28.1e}  {memory:12}")
+
+
+if __name__ == "__main__":
+    main()

@@ -178,6 +178,8 @@ def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
         return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
 
     matrix = np.eye(len(begin)) - GAMMA * cycles * _derivative(rig, now)
+    if not np.isfinite(matrix).all() or not np.isfinite(rate).all():
+        raise ConvergenceError("what many cycles wear is too large for numbers: expected a smaller wear coefficient")
     factor = scipy.linalg.lu_factor(matrix)
     first = scipy.linalg.lu_solve(factor, rate)
     start = _slid_on(now, cycles)

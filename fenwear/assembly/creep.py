@@ -80,7 +80,9 @@ class Creep:
         found = {}
         for member, part in zip(self.members, np.split(crept, self._cuts[:-1]), strict=True):
             y = part.reshape(-1, member.size, *crept.shape[1:])
-            found[member.name] = member.opened(self.middle, np.tensordot(member.retardation.compliances, y, 1))
+            found[member.name] = member.opened(
+                self.middle, np.asarray(np.tensordot(member.retardation.compliances, y, 1))
+            )
         return found
 
     def _each(self, crept: Array) -> list[tuple[Member, Array]]:
@@ -182,7 +184,7 @@ class Creep:
     def lasting(self, pressure: Array, ratios: Sequence[Array], load: float) -> list[Array]:
         """Return the v_i of each member in all phases (m, size), mm, at pressures (m, n)."""
         return [
-            np.array([member.displacement(k, p, ratios[k], load) for k, p in enumerate(pressure)])
+            np.array([member.displacement(k, np.asarray(p), ratios[k], load) for k, p in enumerate(pressure)])
             for member in self.members
         ]
 

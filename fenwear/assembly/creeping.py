@@ -26,7 +26,9 @@ class Member(Protocol):
         size: Of its displacement.
     """
 
-    retardation: Retardation
+    @property
+    def retardation(self) -> Retardation:
+        """Its law."""
 
     @property
     def name(self) -> str:

@@ -97,8 +97,10 @@ class FineBody:
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
-        moved = np.tensordot(self.correction.response, self.weights.to_points(forces), ((2, 3), (0, 1)))
-        return self.half.apply(forces) + self.weights.to_nodes(moved)
+        moved: Array = np.asarray(
+            np.tensordot(self.correction.response, self.weights.to_points(forces), ((2, 3), (0, 1)))
+        )
+        return np.asarray(self.half.apply(forces) + self.weights.to_nodes(moved))
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the displacements at nodes from unit forces at others (rows, a, columns, d)."""

@@ -37,7 +37,7 @@ class TensorWeights:
         """Return the rows of some nodes (k, m)."""
         found: Array = np.ones((1, 1))
         for factor, place in zip(self.factors, self.at[nodes].T, strict=True):
-            found = (found[:, :, None] * factor[place][:, None]).reshape(len(place), -1)
+            found = (found[:, :, None] * factor[place][:, None]).reshape(np.size(place), -1)
         return found
 
     def to_nodes(self, values: Array) -> Array:
@@ -53,12 +53,12 @@ class TensorWeights:
 
     def fitted(self, values: Array) -> Array:
         """Return the values at points (m, ...) that are nearest to those at the nodes of a whole grid (q, ...)."""
-        return self._gathered(values, [np.linalg.pinv(factor) for factor in self.factors])
+        return self._gathered(values, [np.asarray(np.linalg.pinv(factor)) for factor in self.factors])
 
     def _gathered(self, values: Array, factors: Sequence[Array]) -> Array:
         """Return the product of one matrix for each axis (c, k) with values at the nodes."""
         flat = values.reshape(len(values), -1)
-        whole = np.zeros((*(len(factor) for factor in self.factors), flat.shape[1]))
+        whole = np.zeros((*(factor.shape[0] for factor in self.factors), flat.shape[1]))
         whole[tuple(self.at.T)] = flat
         for axis, factor in enumerate(factors):
             whole = along(factor, whole, axis)
@@ -83,4 +83,4 @@ class TensorWeights:
 
 def along(matrix: Array, values: Array, axis: int) -> Array:
     """Return the product of a matrix (k, c) with one axis (c) of values (..., c, ...)."""
-    return np.moveaxis(np.tensordot(matrix, values, (1, axis)), 0, axis)
+    return np.moveaxis(np.asarray(np.tensordot(matrix, values, (1, axis))), 0, axis)

@@ -265,8 +265,7 @@ class Case(Part):
         if self.contact.solver == "full" and lies:
             problems.append(f"contact.solver: expected 'condensed' with contact.{lies[0]}")
         passes_on = one_way and self.passes
-        given = self.bodies, self.contact.layer, self.contact.solver
-        problems += creep_problems(*given, passes_on=passes_on)
+        problems += creep_problems(self.bodies, self.contact.layer, self.contact.solver, passes_on=passes_on)
         if self.sticks and self.contact.hardness is not None:
             problems.append("contact.hardness: expected contact.law = 'gross-sliding': with stick nothing flows yet")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
@@ -275,7 +274,7 @@ class Case(Part):
         if not self.passes and (several or (isinstance(motion, Cycle) and motion.positions == "steps")):
             problems.append("motion.positions: expected 1 for sliding out of the plane")
         if self.heat is None:
-            given = {"contact.friction": self.contact.friction}
+            given: dict[str, Any] = {"contact.friction": self.contact.friction}
             for body, law in self.wear.by_body.items():
                 if law is not None:
                     given[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient

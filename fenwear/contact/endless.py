@@ -83,7 +83,7 @@ class EndlessGrid:
             self._put = _short([self._transfer(one.put, one.put_at) for one in passing])
         self.take(None, None, 0.0, np.float64)
 
-    def _transfer(self, numbers: Array, at: NDArray[np.int64]) -> NDArray[np.complex128]:
+    def _transfer(self, numbers: Array, at: NDArray[np.int64]) -> Waves:
         """Return the waves (i, j) of numbers at places (k, axes)."""
         wrapped = np.zeros(self.period)
         np.add.at(wrapped, tuple((at % np.array(self.period)).T), numbers)
@@ -130,7 +130,7 @@ class EndlessGrid:
     def back(self, waves: Waves) -> Array:
         """Return the fields in the box of waves."""
         i, m, j = waves.shape
-        found = np.empty((m, *self.box.counts), dtype=waves.real.dtype)
+        found: Array = np.empty((m, *self.box.counts), dtype=waves.real.dtype)
         shape = (-1, i, j) if len(self.period) == 2 else (-1, i)
         for some in in_cache(m, waves[:, :1].nbytes):
             image = np.ascontiguousarray(waves[:, some].swapaxes(0, 1)).reshape(shape)

@@ -205,7 +205,7 @@ class GriddedPhases:
             raise np.linalg.LinAlgError("singular matrix")
         on = self.grid.around(touched, np.float64)
         slopes = None if self.opened is None else on.slopes(self.opened)
-        closed = _Closed(on, slopes, on.box.spread(parts[:, : self.n]), parts[:, self.n :])
+        closed = _Closed(on, slopes, on.box.spread(parts[:, : self.n]) > 0, parts[:, self.n :])
 
         def solve(b: Array) -> Array:
             right = np.zeros(self.m * self.size)
@@ -243,7 +243,7 @@ class GriddedPhases:
         p, a, touches = change.solve(tolerance)
         found = parts.copy()
         changed = found[:, on.box.nodes] + on.box.values(p)
-        found[:, on.box.nodes] = np.where(on.box.values(touches), np.maximum(changed, 0.0), 0.0)
+        found[:, on.box.nodes] = np.where(on.box.values(touches.astype(on.dtype)) > 0, np.maximum(changed, 0.0), 0.0)
         found[:, n:] += a
         return found.ravel()
 

@@ -308,7 +308,7 @@ class Coupled:
         evolution = system.evolution(conditions, worn)
         if evolution is not None:
             evolution = replace(evolution, near=self.held)
-            conditions = self._remembering(evolution, passing)
+            conditions = list(self._remembering(evolution, passing))
             evolution = replace(evolution, near=self.held)
         self._take(conditions, evolution)
         if not system.friction.constant:

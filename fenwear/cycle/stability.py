@@ -284,7 +284,9 @@ def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat | None, states
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
     if heat is not None and states:
         warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
-    return system.rested([system.conditions(k, p, own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))])
+    return system.rested(
+        [system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))]
+    )
 
 
 def _laws(

@@ -73,7 +73,7 @@ class Memory:
         """
         found = []
         for states, surface in ((self.contact, pair.punch), (self.strip, pair.strip)):
-            place = dict(zip("xyz", in_space(surface.x).T, strict=True))
+            place = {axis: np.asarray(x) for axis, x in zip("xyz", in_space(surface.x).T, strict=True)}
             n = len(surface.x)
             rows = [
                 evaluate_of_state(name, state.initial, "xyz", place, (n,))
@@ -102,14 +102,14 @@ class Memory:
     def known(self, values: Array) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Return the states (Q, n) at the contact's nodes by name, as laws of punch and strip know them."""
         q = len(self.contact)
-        contact = dict(zip(self.contact, values[:q], strict=True))
-        strip = dict(zip(self.strip, values[q:], strict=True))
+        contact = {name: np.asarray(row) for name, row in zip(self.contact, values[:q], strict=True)}
+        strip = {name: np.asarray(row) for name, row in zip(self.strip, values[q:], strict=True)}
         return {**strip, **contact}, {**contact, **strip}
 
     def by_name(self, held: Held) -> dict[str, Array]:
         """Return states by their names (n,), those of the strip's material by `NAME_strip` (n_strip,)."""
-        found = dict(zip(self.contact, held.contact, strict=True))
-        return found | {f"{name}_strip": rows for name, rows in zip(self.strip, held.strip, strict=True)}
+        found = {name: np.asarray(row) for name, row in zip(self.contact, held.contact, strict=True)}
+        return found | {f"{name}_strip": np.asarray(row) for name, row in zip(self.strip, held.strip, strict=True)}
 
     def bounded(self, held: Held) -> Held:
         """Return states within their bounds."""
@@ -173,8 +173,8 @@ def _solved(matrices: Array, rows: Array) -> Array:
     if not len(rows):
         return rows
     if matrices.shape[1] == 1:
-        return rows / matrices[:, 0, 0]
-    return np.linalg.solve(matrices, rows.T[:, :, None])[:, :, 0].T
+        return np.asarray(rows / matrices[:, 0, 0])
+    return np.asarray(np.linalg.solve(matrices, rows.T[:, :, None])[:, :, 0].T)
 
 
 def _phi(z: Array) -> Array:
@@ -223,7 +223,7 @@ class Evolution:
     def some(self, phases: Sequence[int]) -> Evolution:
         """Return the same of some of the phases, by their places among these."""
         chosen = list(phases)
-        conditions, pairs = ([own[k] for k in chosen] for own in (self.conditions, self.pairs))
+        conditions, pairs = [self.conditions[k] for k in chosen], [self.pairs[k] for k in chosen]
 
         def worn(k: int, conditions: ContactConditions) -> Array:
             return self.worn(chosen[k], conditions)
@@ -364,12 +364,13 @@ class Evolution:
             "cs": none,
             "pm": none,
             WEAR: none,
-            **dict(zip("xyz", x.T, strict=True)),
+            **{axis: np.asarray(own) for axis, own in zip("xyz", x.T, strict=True)},
             **dict.fromkeys(memory.contact, none),
         }
 
         def known(values: Array) -> list[Mapping[str, Array]]:
-            return [{**now, **dict(zip(memory.strip, values, strict=True))}] * len(memory.strip)
+            own = {name: np.asarray(row) for name, row in zip(memory.strip, values, strict=True)}
+            return [{**now, **own}] * len(memory.strip)
 
         return _Rates(list(memory.strip.items()), known)
 

@@ -144,9 +144,9 @@ def place_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
                      label=f"shaft, at first{words}")  # fmt: skip
         axes[0].plot(e_x[-1:], e_z[-1:], "s", color=style["color"] if name else RED, markersize=4,
                      label=f"shaft, at the end{words}")  # fmt: skip
-        label = {"label": name} if name else {}
-        axes[1].plot(x, 1e3 * history[f"eccentricity{end}"], **style, **label, **mark_few(x))
-        axes[2].plot(x, history[f"attitude_angle{end}"], **style, **label, **mark_few(x))
+        label = name or "_"  # no entry of a legend
+        axes[1].plot(x, 1e3 * history[f"eccentricity{end}"], label=label, **style, **mark_few(x))
+        axes[2].plot(x, history[f"attitude_angle{end}"], label=label, **style, **mark_few(x))
     axes[0].set_aspect("equal", adjustable="datalim")
     axes[0].margins(0.15)
     axes[0].set_xlabel("x (µm)")

@@ -142,13 +142,15 @@ def bores_of(placed: Placed) -> dict[str, Bore]:
     free = {mode.split("_")[1] for mode in placed.rigid.mode_names} & {"F", "Fx"}
     if not free or placed.bodies.punch.law.kind == "axisymmetric":
         return {}
+    followed = placed.bodies.followed
+    depths = (0.0, 0.0) if followed is None else (followed.punch[:, None], followed.strip[:, None])
     found = {}
     for name in pair.punch.names or ("",):
         nodes, opposite = (
             surface.nodes_of(name) if name in surface.names else np.ones(len(surface.weights), dtype=bool)
             for surface in (pair.punch, pair.strip)
         )
-        punch, strip = _circle(pair.punch, nodes), _circle(pair.strip, opposite)
+        punch, strip = _circle(pair.punch, nodes, depths[0]), _circle(pair.strip, opposite, depths[1])
         outward = pair.punch.outward[nodes]
         if punch is None or strip is None or (outward[:, 0] ** 2 > 0.5).sum() == 0:
             continue
@@ -158,9 +160,12 @@ def bores_of(placed: Placed) -> dict[str, Bore]:
     return found
 
 
-def _circle(surface: ContactSurface, nodes: Mask) -> Circle | None:
-    """Return the circle about an axis along y that nodes (n,) of a surface lie on; None where it lies on none."""
-    x = surface.unworn[nodes][:, [0, -1]]
+def _circle(surface: ContactSurface, nodes: Mask, followed: Array | float) -> Circle | None:
+    """Return the circle about an axis along y that nodes (n,) of a surface lie on; None where it lies on none.
+
+    Before its mesh has followed wear, by depths (n, 1).
+    """
+    x = (surface.unworn + followed * surface.outward)[nodes][:, [0, -1]]
     system = np.column_stack([2 * x, np.ones(len(x))])
     found, *_ = np.linalg.lstsq(system, (x**2).sum(axis=1), rcond=None)
     middle = found[:2]

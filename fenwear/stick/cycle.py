@@ -458,7 +458,7 @@ class Rig:
         def wearing(k: int, at: ContactConditions) -> Array:
             tau = float(slips.duration[k])
             punch, strip = laws.wear_at(at).depths(at.pressure, slips.slid[k], tau)
-            return (punch + strip) / tau
+            return np.asarray((punch + strip) / tau)
 
         conditions, pairs = self._conditions(slips, before), self._pairs(slips, before)
         return Evolution(memory, conditions, slips.duration, pairs, wearing, before.worn.strip)

@@ -245,9 +245,9 @@ def _derivative(rig: Rig, now: FrettingCycle) -> Array:
         if debris is not None:
             between[:, stored - depths : stored - depths + n] = -np.eye(n)[closed]
         if remembered is not None:
-            for row, fills, rate in remembered.filling(members):
-                left[row.start + closed, np.arange(len(closed))] = rate[closed]
-                between[:, row.start - depths : row.stop - depths] = -fills * np.eye(n)[closed]
+            for rows, fills, rate in remembered.filling(members):
+                left[rows.start + closed, np.arange(len(closed))] = rate[closed]
+                between[:, rows.start - depths : rows.stop - depths] = -fills * np.eye(n)[closed]
         right.append(between)
         A -= left @ (answer @ np.concatenate(right, axis=1))
     if debris is not None:
@@ -308,7 +308,7 @@ class _Remembered:
         more[list(steps)] += size
         change = (self.evolution.at(more).rate(self.held)[0] - self.evolution.rate(self.held)[0]).times(1 / size)
         contact = zip(self.rows, self.fills, change.contact, strict=False)
-        return [(row, fills, rate) for row, fills, rate in contact if fills]
+        return [(row, fills, np.asarray(rate)) for row, fills, rate in contact if fills]
 
     def slopes(self, total: int) -> Array:
         """Return how the rates follow the states themselves, among all unknowns (total, total)."""

@@ -33,7 +33,7 @@ def grid_limits(system: Tribosystem, grid: RegularGrid) -> ContactEnds | Contact
         return replace(ends, goes_on=goes_on, ends=(float(corner[0]), float(corner[0] + sides[0])))
     places = np.rint((grid.flat - corner) / np.array(grid.spacing)).astype(np.int64)
     outer = np.stack([places == 0, places == np.array(grid.counts) - 1])
-    clips = (outer & within[:, None]).any(axis=(0, 2))
+    clips: Mask = np.asarray((outer & within[:, None]).any(axis=(0, 2)))
     return ContactRim(clips, system.pair.punch.x, float(sides.max()), curvatures(system), contact_modulus(system.case))
 
 

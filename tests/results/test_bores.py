@@ -9,6 +9,7 @@ import pytest
 import xarray
 
 from fenwear import assemble, load_case, march, vary
+from fenwear.cycle import evolve
 from fenwear.results import place
 from fenwear.results.contacts import contact_sheets
 from fenwear.run import run_case
@@ -56,3 +57,17 @@ def test_in_the_results(tmp_path: Path) -> None:
         assert float(history.eccentricity_right[-1]) == right["eccentricity_mm"]
         assert "(right)" in history.attitude_angle_right.attrs["long_name"]
         assert "eccentricity" not in history
+
+
+@pytest.mark.parametrize("integration", ["explicit", "jump"])
+def test_on_meshes_that_follow(integration: str) -> None:
+    """The shaft's place does not depend on whether the depths move the mesh or open the gap."""
+    small = ["geometry.degree=1", "geometry.parameters.elements_along_contact=40", "run.half_cycles=4"]
+    fast = "wear.punch.coefficient=1e-6"
+    found = []
+    for follow in ("0.001", "never"):
+        case = load_case("bushing", [*small, fast, f"geometry.follow_wear={follow}", f"run.integration={integration}"])
+        found.append(place.numbers(list(evolve(assemble(case)))[-1]))
+    one, other = found
+    assert one["eccentricity_mm"] == pytest.approx(other["eccentricity_mm"], rel=2e-3)
+    assert one["attitude_angle_deg"] == pytest.approx(other["attitude_angle_deg"], abs=0.1)

@@ -90,4 +90,4 @@ def _approach(system: Tribosystem) -> float:
 
 
 def _giving(system: Tribosystem) -> LayerStep | None:
-    return system.passing(system.phases_wear).step(system.unworn().between, implicit=False)
+    return system.passing(system.phases_wear).step(system.unworn(), implicit=False)

@@ -388,8 +388,6 @@ class Case(Part):
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
             "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation | Cycle),
             "motion.axis: expected 'x'": not self.passes,
-            "creep: expected none": any(body.creep is not None for body in self.bodies.values())
-            or getattr(self.contact.layer, "creep", None) is not None,
             "contact.friction and wear: expected coefficients without cs and pm, which are of gross sliding,": any(
                 isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm"))
                 for one in (self.contact.friction, *(law.given_coefficient for law in self.wear.laws))

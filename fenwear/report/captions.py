@@ -27,6 +27,7 @@ TEXTS = {
     "carries), as the strip turns, over the {axis}.",
     "volume": "(a) Worn volume and (b) specific wear rate, of the half-cycle (current) and from the start (mean), over "
     "the sliding distance.",
+    "creep": "What is worn off each body, and what it has crept: (a) largest depth and (b) volume, over the time.",
     "scar": "(a) Largest worn depth and (b) size of the scar at 1 % and 5 % of it, over the {axis}; of a surface, its "
     "length along the sliding, and (c) its width across.",
     "friction": "(a) Normal force and friction force of each half-cycle and (b) work of friction from the start, over "

@@ -105,6 +105,31 @@ def volume_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
+def creep_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+    """Draw what is worn and what has crept, of each body and of a layer: largest depth and volume."""
+    figure, axes = panels(2, 2.7, look=look)
+    x = look.course(history)
+    for body, end in {**BODIES, "layer": "_layer"}.items():
+        colour = BODY_COLOURS.get(body, "0.4")
+        for text, dashes, depth, volume in (
+            ("worn off", "-", f"max_wear{end}", f"worn_volume{end}"),
+            ("crept", "--", f"creep_depth{end}", f"creep_volume{end}"),
+        ):
+            if depth not in history:
+                continue
+            deepest = history[depth].max([d for d in history[depth].dims if d != "half_cycle"])
+            style = {"color": colour, "linestyle": dashes, "label": f"{body}, {text}", **mark_few(x)}
+            axes[0].plot(x, 1e3 * deepest, **style)
+            axes[1].plot(x, history[volume], **style)
+    axes[0].set_ylabel("largest depth (µm)")
+    axes[1].set_ylabel("volume (mm³)")
+    for ax in axes:
+        from_zero(ax)
+        legend_beside(ax, "")
+    run_axis(axes[-1], history, look, logarithmic=False)
+    return figure
+
+
 def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     """Draw the largest worn depths and the sizes of the scars, unless they are worn all the way round."""
     sizes = [n for n in ("scar_length", "scar_width") if any(f"{n}{end}" in history for end in BODIES.values())]

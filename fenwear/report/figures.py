@@ -13,6 +13,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.report.course import (
     bores_of,
     convergence_figure,
+    creep_figure,
     directions_present,
     friction_figure,
     heat_balance_figure,
@@ -172,6 +173,8 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
         drawn["volume"] = volume_figure(history, Look(look.width, "distance"))
         drawn["scar"] = scar_figure(history, look)
         drawn["friction"] = friction_figure(history, look)
+    if any(str(name).startswith("creep_volume") for name in history.data_vars):
+        drawn["creep"] = creep_figure(history, Look(look.width, "time"))
     if "load_factor" in history:
         drawn["program"] = program_figure(history, look)
     drawn["convergence"] = convergence_figure(history, look)

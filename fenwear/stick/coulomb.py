@@ -263,12 +263,11 @@ class _Run:
             none = np.full((len(steps), n), np.nan), np.full((len(steps), n, m), np.nan)
             at = replace(at, next_step=0, pressures=none[0], trials=none[1])
         heating = np.zeros(len(self.rig.weights)) if at.heating is None else at.heating
-        at = replace(
-            at, worn=state.worn, held=None, load=load, temperature=warm, heating=None if warm is None else heating
-        )
+        at = replace(self.rig.shaped(at, state.worn), load=load, temperature=warm)
+        at = replace(at, heating=None if warm is None else heating)
         while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
             at, _ = self.rig.half_cycle(at)
-        return replace(at, temperature=warm, held=None)
+        return replace(self.rig.shaped(at, state.worn), temperature=warm)
 
     def half_cycle(
         self,
@@ -324,7 +323,7 @@ class HalfCycles(_Run):
         own = slice(first, first + len(records))
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
         lost = rig.worn_in(records, first, begin)
-        worn = state.worn + lost
+        worn = replace(state.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first)
         totals = state.totals + adds
         stroke, n = state.half_cycle % self.strokes, len(rig.weights)

@@ -42,7 +42,7 @@ class Records:
         slip: Of the punch against the strip in the step (k, n, m), mm.
         gap: (k, n), mm.
         work: What rig and loads do in the step (k,), N or N mm.
-        stored: What both bodies take up (k,).
+        stored: What both bodies take up, or lose in creep (k,).
         dissipated: Friction's work of each node over its area (k, n), N/mm.
         closing: Work of the pressure on gaps that close or open in the step (k,): of the step's size, it vanishes
             with it.
@@ -252,7 +252,15 @@ class Rig:
 
     def unworn(self) -> Worn:
         """Return the worn depths at the start, none, and what lies between then."""
-        return self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
+        found = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
+        return found if self.interface.creep is None else replace(found, crept=self.interface.creep.beginning())
+
+    def shaped(self, at: RigState, worn: Worn) -> RigState:
+        """Return a state on another shape, whose bodies have crept as it says; what sticks stays where it stuck."""
+        creep, contact = self.interface.creep, at.contact
+        if creep is not None and contact.crept is not worn.crept:
+            contact = creep.at(contact, worn.crept)
+        return replace(at, worn=worn, held=None, contact=contact)
 
     def beginning(self, shape: Worn | None = None, load: float = 1.0) -> RigState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
@@ -274,6 +282,8 @@ class Rig:
         state, before = untouched(interface), Imposed(loaded.times(0), opening)
         for k in range(1, program.pressing + 1):
             imposed = Imposed(loaded.times(k / program.pressing), opening)
+            if interface.creep is not None and len(worn.crept):  # creep comes with the loads
+                state = interface.creep.at(state, k / program.pressing * worn.crept)
             state, before = advance(interface, state, before, imposed, self.friction), imposed
         if program.steps[0].force is not None:
             before = replace(before, displacement=None, force=state.force)
@@ -298,8 +308,9 @@ class Rig:
         interface = self.interface
         position = interface.position(step.offset)
         given = interface.loaded(step.fraction if step.fraction is not None else 0.0).times(load)
-        loaded = self.expanded(given, step.offset)
-        return position, Imposed(loaded, self.opening(position, worn), step.displacement, step.force, step.strain)
+        opening, loaded = self.opening(position, worn), self.expanded(given, step.offset)
+        duration = 0.0 if step.fraction is None else step.duration  # before the cycle begins nothing creeps
+        return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration)
 
     def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
         """Return the state after a time step, and its record; the shape stays; collective."""
@@ -495,10 +506,16 @@ class Rig:
         f = np.concatenate([state.pressure, state.traction.T.ravel()])
         force = position.in_space(f * position.weights)
         back = position.reading.T @ position.pair.placement.back(force)
-        stored = np.vdot(force, state.on_punch - before.on_punch) - np.vdot(back, state.on_strip - before.on_strip)
+        on_punch, on_strip = state.on_punch - before.on_punch, state.on_strip - before.on_strip
+        closed = self.interface.layers.given(state.pressure) - self.interface.layers.given(before.pressure)
+        if self.interface.creep is not None:
+            crept = zip(*map(self.interface.creep.displaced, (state.crept, before.crept)), strict=True)
+            on_punch, on_strip, closed = (
+                own + now - had for own, (now, had) in zip((on_punch, on_strip, closed), crept, strict=True)
+            )
+        stored = np.vdot(force, on_punch) - np.vdot(back, on_strip)
         lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
         work = state.force * (state.displacement - before.displacement) + lowered
-        closed = self.interface.layers.given(state.pressure) - self.interface.layers.given(before.pressure)
         stored += weights @ (state.pressure * closed)
         slipped = np.linalg.norm(state.slip, axis=1)
         punch, strip = wear.depths(state.pressure, slipped, step.duration)

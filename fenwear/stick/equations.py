@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cone import derivative, project
+from fenwear.stick.creep import Displaced, StickCreep
 from fenwear.stick.interface import OppositeBodies, Position
 from fenwear.stick.state import Imposed, StickState
 
@@ -73,19 +74,30 @@ class Step:
     def __init__(
         self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
     ) -> None:
+        creep = interface.creep
+        if creep is not None:
+            position = creep.grown(position, imposed.duration)
         self.interface, self.position, self.before, self.imposed = interface, position, before, imposed
-        self.mu = friction
+        self.mu, self.creep = friction, creep
         self.n, self.d = position.pair.normal.shape
         self.m = self.d - 1
         self.free_punch = imposed.loaded.on_punch
         self.free_strip = imposed.loaded.on_strip + imposed.strain * interface.bulk
         read, turn = position.reading, position.pair.placement.vectors
-        now = position.in_frame(self.free_punch - turn(read @ self.free_strip))
-        old = position.in_frame(before.on_punch - turn(read @ before.on_strip))
+
+        def apart(on_punch: Array, on_strip: Array) -> Array:
+            return position.in_frame(on_punch - turn(read @ on_strip))
+
+        now, old = apart(self.free_punch, self.free_strip), apart(before.on_punch, before.on_strip)
+        closed = interface.layers.given(before.pressure)
+        if creep is not None:
+            (*crept, layer), (*had, closed_before) = self._crept(creep)
+            now, old = now + apart(crept[0], crept[1]), old + apart(had[0], had[1])
+            now[: self.n] += layer
+            closed = closed + closed_before
         old += position.modes @ before.rigid - position.drive * before.displacement
         self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
-        self.approached = now[: self.n] - old[: self.n] - self.free[: self.n]
-        self.approached -= interface.layers.given(before.pressure)
+        self.approached = now[: self.n] - old[: self.n] - self.free[: self.n] - closed
         self.closure = interface.layers.closure
         # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area. One c for both
         # tangents: t = P(t - c s) turns slip against the traction only where c is a number, not a matrix.
@@ -94,6 +106,19 @@ class Step:
         self.length = float(np.median(self.scale[0]))
         self.units = self.length / np.maximum(np.abs(position.modes).max(axis=0, initial=0.0), 1e-300)
         self.area = float(position.pair.weights.sum())
+
+    def _crept(self, creep: StickCreep) -> tuple[Displaced, Displaced]:
+        """Return what has crept at the end of the step but for what its tractions add, and at its start.
+
+        Of punch, strip and layer: what was there before, and what the loads add in the step.
+        """
+        duration, state = self.imposed.duration, self.before.crept
+        punch, strip, layer = creep.displaced(state, duration)
+        if self.imposed.loaded.by_force is not None:
+            grown = [factor - 1 for factor in creep.factors(duration)]
+            punch = punch + grown[0] * self.imposed.loaded.by_force[0]
+            strip = strip + grown[1] * self.imposed.loaded.by_force[1]
+        return (punch, strip, layer), creep.displaced(state)
 
     def jumps(self, found: Found) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
@@ -202,6 +227,11 @@ class Step:
         slip = np.where(stuck[:, None], 0.0, slip)
         f = np.concatenate([pressure, traction.T.ravel()])
         moved = found.moved or self._moved(f)
+        crept = self.before.crept
+        if self.creep is not None and self.imposed.loaded.by_force is not None:
+            forced = self.imposed.loaded.by_force
+            elastic = forced[0] + moved.on_punch, forced[1] + moved.on_strip, self.creep.closure * pressure
+            crept = self.creep.after(crept, elastic, self.imposed.duration)
         return StickState(
             pressure,
             traction,
@@ -216,6 +246,7 @@ class Step:
             status.trial,
             iterations,
             unique,
+            crept=crept,
         )
 
     def _moved(self, f: Array) -> Moved:

@@ -13,6 +13,8 @@ are located within their elements (`edge`). A zone of nodes has an edge, too, wh
 surface beside it: the shape of the located zone lies between those of the two zones of nodes whose edges are on either
 side, in equilibrium as they are. What is left of the interval of each edge is told.
 
+What creeps has come to its end: the state of a cycle that leaves it as it is.
+
 Where nothing slips under pressure friction makes no heat. So in the end both bodies are as warm as held temperatures
 and surroundings make them, and the shape is that of bodies of these temperatures.
 """
@@ -28,6 +30,7 @@ import numpy as np
 import scipy.optimize
 
 from fenwear.arrays import Array, Mask
+from fenwear.cycle.fixed_point import fixed_point
 from fenwear.errors import ConvergenceError
 from fenwear.sliding.wear import Worn
 from fenwear.stick.cycle import Records, Rig
@@ -96,8 +99,35 @@ def stick_zone_edges(rig: Rig) -> list[Edge]:
 
 
 def _second_cycle(rig: Rig) -> Records:
-    settled, _ = rig.cycle(rig.beginning())
+    settled, _ = rig.cycle(rig.beginning(_crept(rig, rig.unworn())))
     return Records.joined(rig.cycle(settled)[1])
+
+
+def _crept(rig: Rig, shape: Worn) -> Worn:
+    """Return a shape whose bodies have crept as far as its cycles let them.
+
+    Raises:
+        ConvergenceError: something creeps without an end, or cycle and creep do not come together.
+    """
+    creep = rig.interface.creep
+    if creep is None:
+        return shape
+    if creep.endless:
+        raise ConvergenceError(
+            f"no final shape exists: {creep.endless} grows with the logarithm of time, for ever: follow it by `run`, "
+            "or give it terms alone"
+        )
+
+    def advance(crept: Array) -> tuple[Array, Worn, bool]:
+        own = replace(shape, crept=crept)
+        at, _ = rig.cycle(rig.beginning(own))
+        return creep.lasting(crept, at.contact.crept, rig.program.period), own, False
+
+    def close(change: Array, crept: Array) -> bool:
+        return float(np.abs(change).max()) <= SAME * max(float(np.abs(crept).max()), 1e-300)
+
+    first = creep.beginning()
+    return fixed_point(advance, first, close, "what creeps, and the cycle that it belongs to, did not come together")
 
 
 def final_shape(rig: Rig, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
@@ -221,7 +251,9 @@ def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
     Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
     edge c follow from the second and third node. The first one carries what the discrete edge makes of it.
     """
-    position = rig.interface.middle
+    position, creep = rig.interface.middle, rig.interface.creep
+    if creep is not None:
+        position = creep.grown(position, np.inf)
     x, n, zone = position.pair.x, len(rig.weights), np.arange(first, last + 1)
     places = (last if side > 0 else first) + side * np.array([2, 3])
     if places.min() < 0 or places.max() >= n:
@@ -276,7 +308,8 @@ def _carried(rig: Rig, zone: Mask) -> tuple[Array, Array]:
     gap = rig.opening(rig.interface.middle, unworn)
     far = FAR * (np.abs(gap).max() + float(np.abs(rig.interface.middle.compliance.diagonal()).max()))
     opened = np.where(zone, 0.0, far)
-    records = Records.joined(rig.cycle(rig.beginning(Worn(opened, unworn.strip)))[1])
+    carried = _crept(rig, Worn(opened, unworn.strip, crept=unworn.crept))
+    records = Records.joined(rig.cycle(rig.beginning(carried))[1])
     return records.pressure, np.asarray(records.gap.min(axis=0) - opened)
 
 

@@ -115,7 +115,8 @@ def _advance(
     middle = start.towards(end, 0.5)
     try:
         first = _advance(interface, position, before, start, middle, friction, halvings - 1)
-        second = _advance(interface, position, first, middle, end, friction, halvings - 1)
+        rest = replace(end, duration=end.duration - middle.duration)
+        second = _advance(interface, position, first, middle, rest, friction, halvings - 1)
     except ConvergenceError as error:
         raise (whole if isinstance(whole, ManyAnswersError) else error) from None
     return replace(

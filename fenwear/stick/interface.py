@@ -22,6 +22,7 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.assembly import Bodies, Needs, Sliding, body_needs, settle
 from fenwear.assembly.needs import condensed
+from fenwear.bodies.creep import Retardation
 from fenwear.bodies.operators import SurfaceOperator, operators_for
 from fenwear.bodies.response import Request, identity
 from fenwear.case import Case
@@ -40,6 +41,7 @@ from fenwear.layers import Layers, common_modulus, layers_of
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.wear import Worn
+from fenwear.stick.creep import StickCreep
 from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
@@ -51,17 +53,29 @@ class Loaded:
         resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
         on_punch: Displacement of the punch's contact nodes (n, d), mm.
         on_strip: Of the strip at the nodes of its operator (q, d), mm.
+        by_force: Of both of these what forces do, and so creeps; None where nothing creeps.
     """
 
     resultant: Array
     on_punch: Array
     on_strip: Array
+    by_force: tuple[Array, Array] | None = None
 
     def times(self, factor: float) -> Loaded:
         """Return the same of loads times a factor."""
         if factor == 1:
             return self
-        return Loaded(factor * self.resultant, factor * self.on_punch, factor * self.on_strip)
+        forced = None if self.by_force is None else (factor * self.by_force[0], factor * self.by_force[1])
+        return Loaded(factor * self.resultant, factor * self.on_punch, factor * self.on_strip, forced)
+
+    def plus(self, other: Loaded) -> Loaded:
+        """Return what both loads do."""
+        forced = None
+        if self.by_force is not None and other.by_force is not None:
+            forced = self.by_force[0] + other.by_force[0], self.by_force[1] + other.by_force[1]
+        return Loaded(
+            self.resultant + other.resultant, self.on_punch + other.on_punch, self.on_strip + other.on_strip, forced
+        )
 
 
 @dataclass(frozen=True)
@@ -151,6 +165,7 @@ class OppositeBodies:
     full = False  # whether each step is solved on all displacements
     team = ALONE  # the ranks that have them, of which one leads
     moved: Worn | None = None  # depths that the meshes have followed
+    creep: StickCreep | None = None  # what creeps
 
     def __init__(
         self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
@@ -236,6 +251,7 @@ class StickInterface(OppositeBodies):
         else:
             self.needs = self._needs(len(middle.weights), onto.shape[1])
             self.punch, self.strip = condensed
+        self.creep = self._creep()
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
         self._loaded: dict[float | None, Loaded] = {}
         self._whole: dict[float, WholeBodies] = {}
@@ -253,6 +269,21 @@ class StickInterface(OppositeBodies):
             body_needs(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
         )
         return Needs(punch, strip, nodes, positions * d, d**2, both.comm.size, condensed(both))
+
+    def _creep(self) -> StickCreep | None:
+        """Return what creeps; None where nothing does; collective."""
+        bodies, operators = (self.bodies.punch, self.bodies.strip), (self.punch, self.strip)
+        layer = None if self.case is None else getattr(self.case.contact.layer, "creep", None)
+        laws = [None if table is None else Retardation.of(table) for table in (bodies[0].creep, bodies[1].creep, layer)]
+        if laws == [None, None, None]:
+            return None
+        moved = [
+            operator.under(body.with_loads(())).by_load if body.moved else np.zeros_like(operator.by_load)
+            for operator, body in zip(operators, bodies, strict=True)
+        ]
+        closure = np.zeros(len(operators[0].by_load)) if self.layers.winkler is None else self.layers.winkler
+        shapes = moved[0].shape, moved[1].shape, closure.shape
+        return StickCreep((laws[0], laws[1], laws[2]), shapes, (moved[0], moved[1]), closure)
 
     @cached_property
     def bulk(self) -> Array:
@@ -305,11 +336,10 @@ class StickInterface(OppositeBodies):
     def prepare_load(self, fraction: float | None) -> None:
         """Find what the loads do at a fraction of the cycle, or their mean; collective."""
         bodies = self.bodies if fraction is None or self.case is None else self.bodies.under(self.case, fraction)
-        self._loaded[fraction] = Loaded(
-            np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant]),
-            self.punch.under(bodies.punch).by_load,
-            self.strip.under(bodies.strip).by_load,
-        )
+        resultant = np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant])
+        punch, strip = self.punch.under(bodies.punch).by_load, self.strip.under(bodies.strip).by_load
+        forced = None if self.creep is None else (punch - self.creep.moved[0], strip - self.creep.moved[1])
+        self._loaded[fraction] = Loaded(resultant, punch, strip, forced)
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)

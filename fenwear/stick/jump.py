@@ -31,12 +31,15 @@ from fenwear.layers.between import DEBRIS
 from fenwear.layers.memory import Held
 from fenwear.layers.step import NUDGE
 from fenwear.sliding.wear import Worn
+from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
 from fenwear.stick.cycle import Records, Rig, RigState
 from fenwear.stick.heat import Course
 from fenwear.stick.interface import Position
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 GAMMA = 1 + np.sqrt(0.5)
+CREPT = 1e-2  # of all that has crept: near its end errors are no longer measured by what a jump adds
+TOO_LARGE = "what many cycles wear is too large for numbers: expected a smaller wear coefficient"
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
 
@@ -113,14 +116,14 @@ def first_cycle(rig: Rig, at: RigState, worn: Worn, number: int, warm: Array | N
 def _rate(
     rig: Rig, at: RigState, worn: Worn, number: int, before: FrettingCycle | None = None, warm: Array | None = None
 ) -> FrettingCycle:
-    """Return the cycle at a shape, after one that leads to it, half a one without heat.
+    """Return the cycle at a shape, after one that leads to it, half a one where nothing else changes within a cycle.
 
     Raises:
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
-    program, heat = rig.program, rig.heat
-    at = replace(at, worn=worn, held=None)
-    settled = heat is None and rig.interface.layers.memory is None  # what goes to and fro in a cycle is its own
+    program, heat, own = rig.program, rig.heat, (rig.interface.layers.memory, rig.interface.creep)
+    at = rig.shaped(at, worn)
+    settled = heat is None and own == (None, None)  # what goes to and fro in a cycle is its own
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
         at, _ = rig.half_cycle(at)
     if heat is not None and before is None:
@@ -145,10 +148,12 @@ def _rate(
 
 
 def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> FrettingCycle:
-    at = replace(at, worn=worn, held=None)
+    at, creep = rig.shaped(at, worn), rig.interface.creep
     first, warm, begin = at.next_step, at.temperature, at
     at, parts = rig.cycle(at)
     rate = rig.worn_in(Records.joined(parts), first, begin, rate=True)
+    if creep is not None:
+        rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, rig.program.period))
     return FrettingCycle(number, worn, parts, rate, 0.0, first, at, warm=warm)
 
 
@@ -163,39 +168,108 @@ def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
     """Return the cycle after a jump."""
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
     between, layers = depths + now.worn.between.size, rig.interface.layers
+    size = between + now.worn.carried.size
 
     def parted(y: Array) -> Worn:
         shapes = now.worn.between.shape, now.worn.carried.shape
-        state, carried = y[depths:between].reshape(shapes[0]), y[between:].reshape(shapes[1])
-        return layers.settled(Worn(y[:n], y[n:depths], state, carried=carried))
+        state, carried = y[depths:between].reshape(shapes[0]), y[between:size].reshape(shapes[1])
+        return layers.settled(Worn(y[:n], y[n:depths], state, y[size:], carried))
 
     def whole(worn: Worn) -> Array:
-        return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel()])
+        return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept])
 
     begin, rate = whole(now.worn), whole(now.rate)
 
     def risen(y: Array) -> Array:
         return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
 
-    matrix = np.eye(len(begin)) - GAMMA * cycles * _derivative(rig, now)
-    if not np.isfinite(matrix).all() or not np.isfinite(rate).all():
-        raise ConvergenceError("what many cycles wear is too large for numbers: expected a smaller wear coefficient")
-    factor = scipy.linalg.lu_factor(matrix)
-    first = scipy.linalg.lu_solve(factor, rate)
+    if not np.isfinite(rate).all():
+        raise ConvergenceError(TOO_LARGE)
+    solve = _Implicit(rig, now, cycles).solve
+    first = solve(rate)
     start = _slid_on(now, cycles)
     middle = _rate(rig, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
-    second = scipy.linalg.lu_solve(factor, whole(middle.rate) - 2 * first)
+    second = solve(whole(middle.rate) - 2 * first)
     end = whole(parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
     then = _rate(rig, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
-    missing = scipy.linalg.lu_solve(factor, end - begin - cycles / 2 * (rate + whole(then.rate)))
+    missing = solve(end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = rig.interface.middle.pair
     felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
-    area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(now.worn.carried.size)])
+    area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(len(begin) - depths - n * len(felt))])
     scale = area @ np.abs(end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing)) / max(float(scale), 1e-300)
     remembered = _Remembered.of(rig, now, depths)
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
-    return replace(then, error=max(error, then.error, of_states))
+    of_creep = _creep_error(rig, missing[size:], (end - begin)[size:], end[size:])
+    return replace(then, error=max(error, then.error, of_states, of_creep))
+
+
+def _creep_error(rig: Rig, missing: Array, change: Array, end: Array) -> float:
+    """Return the error of what has crept over what a jump creeps; near the end of creep over a part of all."""
+    creep, middle = rig.interface.creep, rig.interface.middle
+    if creep is None:
+        return 0.0
+    wrong, done, there = (
+        float(rig.weights @ np.abs(opened_by_creep(middle, creep, state))) for state in (missing, change, end)
+    )
+    return wrong / max(done, CREPT * there, 1e-300)
+
+
+class _Implicit:
+    """(1 - T) z = r with T near N dF/dy: depths and what lies between by g N A, and what creeps.
+
+    Along the normal what creeps follows the pressures' answer to it, as depths do. Its steps are of the more accurate
+    of the two methods that are stable to infinity, g = 1 - 1/sqrt(2), which takes T as it is: along the tangents, where
+    sticking nodes relax as fast as their bodies let them, the other one serves, with the fastest pace there may be.
+    How depths change what creeps is left out: of second order the method is with any T.
+
+    Args:
+        rig: The bodies and what is done to them.
+        now: The cycle that the jump begins with.
+        cycles: N.
+
+    Raises:
+        ConvergenceError: T is beyond all numbers.
+    """
+
+    def __init__(self, rig: Rig, now: FrettingCycle, cycles: int) -> None:
+        self.rig, self.now, self.cycles = rig, now, cycles
+        derivative, self.groups = _derivative(rig, now)
+        self._size = len(derivative)
+        matrix = np.eye(self._size) - GAMMA * cycles * derivative
+        if not np.isfinite(matrix).all():
+            raise ConvergenceError(TOO_LARGE)
+        self._factor = scipy.linalg.lu_factor(matrix)
+        creep = rig.interface.creep
+        self._creep = None if creep is None else CreepStep(creep, rig.interface, rig.program.period, cycles)
+        if self._creep is not None:
+            self._creep.answering(self._answer())
+
+    def _answer(self) -> Array:
+        """Return how pressures fall by a depth that stays all through the cycle (n, n), on the mean of its steps."""
+        found = np.zeros((len(self.rig.weights),) * 2)
+        for group in self.groups:
+            found[np.ix_(group.closed, group.closed)] += group.share * group.answer
+        return found
+
+    def solve(self, right: Array) -> Array:
+        """Return z."""
+        rest = right[: self._size]
+        if self._creep is None:
+            return np.asarray(scipy.linalg.lu_solve(self._factor, rest))
+        crept = self._creep.solve(right[self._size :])
+        rest = rest + ACCURATE * self.cycles * self._by_creep(crept)
+        return np.concatenate([scipy.linalg.lu_solve(self._factor, rest), crept])
+
+    def _by_creep(self, crept: Array) -> Array:
+        """Return how a cycle's wear, and what lies between, change by what creeps (n + n_s + rows n)."""
+        creep, found = self.rig.interface.creep, np.zeros(self._size)
+        if creep is None:
+            return found
+        for group in self.groups:
+            opened = opened_by_creep(group.position, creep, crept)[group.closed]
+            found -= group.left @ (group.answer @ opened)
+        return found
 
 
 def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
@@ -206,17 +280,37 @@ def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
     return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slid.sum(axis=0))
 
 
-def _derivative(rig: Rig, now: FrettingCycle) -> Array:
+@dataclass(frozen=True)
+class _Group:
+    """Time steps of a cycle in one place of the strip, with the same nodes closed.
+
+    Attributes:
+        position: The place.
+        closed: The nodes (k,).
+        answer: How their pressures fall by a depth at each (k, k), MPa/mm.
+        left: What their pressures add to a cycle's wear and to what lies between (total, k).
+        share: Of the cycle's time.
+    """
+
+    position: Position
+    closed: NDArray[np.int64]
+    answer: Array
+    left: Array
+    share: float
+
+
+def _derivative(rig: Rig, now: FrettingCycle) -> tuple[Array, list[_Group]]:
     """Return A, the derivative of a cycle's wear to depths and what lies between, at the contact zone and slip of now.
 
-    Square, of the depths (n + n_s), the state of what lies between (rows n) and of the strip's material (rows n_s).
+    Square, of the depths (n + n_s), the state of what lies between (rows n) and of the strip's material (rows n_s); and
+    the time steps that it is made of.
     """
     records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
     depths, layers = n + len(now.worn.strip), rig.interface.layers
     debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
     remembered = _Remembered.of(rig, now, depths)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
-    A = np.zeros((total, total))
+    A, found = np.zeros((total, total)), list[_Group]()
     slid, groups = records.slid, dict[tuple[float, bytes], list[int]]()
     fed = None if debris is None else debris.over(slid).fed
     for k in range(len(records)):
@@ -250,11 +344,13 @@ def _derivative(rig: Rig, now: FrettingCycle) -> Array:
                 between[:, rows.start - depths : rows.stop - depths] = -fills * np.eye(n)[closed]
         right.append(between)
         A -= left @ (answer @ np.concatenate(right, axis=1))
+        share = float(records.duration[members].sum() / records.duration.sum())
+        found.append(_Group(position, closed, answer, left, share))
     if debris is not None:
         lost, at = debris.over(slid).loss, np.arange(n)
         A[stored + at, stored + at] -= lost
         A[ejected + at, stored + at] += lost
-    return A if remembered is None else A + remembered.slopes(total)
+    return (A if remembered is None else A + remembered.slopes(total)), found
 
 
 @dataclass(frozen=True)

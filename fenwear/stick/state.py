@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
+from fenwear.sliding.wear import STIFF
 from fenwear.stick.interface import Loaded, OppositeBodies
 
 
@@ -22,6 +23,7 @@ class Imposed:
         displacement: delta of the strip's supports along the motion, mm or rad; None where the force is imposed.
         force: Tangential force on the strip along the motion, N/mm or N; None where the displacement is.
         strain: Bulk strain eps_xx of the strip's surface.
+        duration: Of the step, s: what creeps does so over it.
     """
 
     loaded: Loaded
@@ -29,6 +31,7 @@ class Imposed:
     displacement: float | None = 0.0
     force: float | None = None
     strain: float = 0.0
+    duration: float = 0.0
 
     def towards(self, other: Imposed, share: float) -> Imposed:
         """Return what is imposed a share of the way to the other."""
@@ -36,14 +39,13 @@ class Imposed:
         def between(a: float | None, b: float | None) -> float | None:
             return b if a is None or b is None else a + share * (b - a)
 
-        one, two = self.loaded.times(1 - share), other.loaded.times(share)
-        loaded = Loaded(one.resultant + two.resultant, one.on_punch + two.on_punch, one.on_strip + two.on_strip)
         return Imposed(
-            loaded,
+            self.loaded.times(1 - share).plus(other.loaded.times(share)),
             self.opening + share * (other.opening - self.opening),
             between(self.displacement, other.displacement),
             between(self.force, other.force),
             self.strain + share * (other.strain - self.strain),
+            share * other.duration,
         )
 
 
@@ -60,12 +62,13 @@ class StickState:
         rigid: a (r,).
         displacement: delta.
         force: Q, the tangential force on the strip along the motion, N/mm, in a solid N.
-        on_punch: Displacement of the punch's contact nodes but for rigid modes (n, d), mm.
+        on_punch: Displacement of the punch's contact nodes but for rigid modes and creep (n, d), mm.
         on_strip: Of what the strip was condensed onto (q, d), mm.
         trial: t - c s (n, m), MPa: where Newton starts from in the next step.
         iterations: Newton steps.
         unique: Whether Newton's method met pieces of one orientation only; else there may be other answers.
         parts: Of the step: more than one where it did not converge as a whole; `slip` and `approach` are their sums.
+        crept: State of what creeps, see `fenwear.stick.creep`; empty where nothing does.
     """
 
     pressure: Array
@@ -82,6 +85,7 @@ class StickState:
     iterations: int = 0
     unique: bool = True
     parts: int = 1
+    crept: Array = field(default_factory=lambda: STIFF)
 
     @property
     def heat(self) -> NDArray[Any]:
@@ -120,4 +124,5 @@ def untouched(interface: OppositeBodies) -> StickState:
         np.zeros((n, d)),
         np.zeros(interface.strip.by_load.shape),
         none,
+        crept=STIFF if interface.creep is None else interface.creep.beginning(),
     )

@@ -1,0 +1,243 @@
+"""Creep with stick: what bodies and layer have crept, from time step to time step, and over whole cycles.
+
+As in gross sliding (`fenwear.bodies.creep`), with displacements along all axes: at the end of a time step a body is
+displaced by (1 + sum of c (1 - e)) v + sum of c e y, v by the forces of that time. So its compliance is grown, and its
+state y moves the surfaces against each other along the normal and along the tangents. Where they stick, what they were
+moved by when they stuck stays; tractions relax.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg
+
+from fenwear.arrays import Array
+from fenwear.bodies.creep import Retardation, RetardedCycle
+from fenwear.bodies.scaled import scaled
+
+if TYPE_CHECKING:
+    from fenwear.stick.interface import OppositeBodies, Position
+    from fenwear.stick.state import StickState
+
+PARTS = ("punch", "strip", "layer")
+ACCURATE, ROBUST = 1 - np.sqrt(0.5), 1 + np.sqrt(0.5)  # g of the two methods that are stable to infinity
+Displaced = tuple[Array, Array, Array]  # the punch (n, d), the strip at its operator's nodes (q, d), the layer (n,), mm
+
+
+@dataclass(frozen=True)
+class StickCreep:
+    """What creeps, of `PARTS` in this order; its state is one vector, of each its y (terms, ...) in turn.
+
+    Attributes:
+        laws: Of each part; None where it does not creep.
+        shapes: Of the displacement of each.
+        moved: Displacement of punch and strip by moved supports alone, mm.
+        closure: Of the layer by unit pressures at once (n,), mm/MPa.
+    """
+
+    laws: tuple[Retardation | None, Retardation | None, Retardation | None]
+    shapes: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]]
+    moved: tuple[Array, Array]
+    closure: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_kept", {})
+
+    @property
+    def endless(self) -> str:
+        """The key of what creeps without an end; "" where nothing does."""
+        keys = ("punch.creep", "strip.creep", "contact.layer.creep")
+        return next((key for key, law in zip(keys, self.laws, strict=True) if law is not None and law.endless), "")
+
+    def beginning(self) -> Array:
+        """Return the state at the start: nothing has crept."""
+        return np.zeros(sum(self._sizes()))
+
+    def _sizes(self) -> list[int]:
+        return [
+            0 if law is None else len(law.times) * int(np.prod(shape))
+            for law, shape in zip(self.laws, self.shapes, strict=True)
+        ]
+
+    def parted(self, state: Array) -> list[Array]:
+        """Return the y of each part (terms, size); without terms where it does not creep."""
+        parts = np.split(state, np.cumsum(self._sizes())[:-1])
+        return [part.reshape(-1, int(np.prod(shape))) for part, shape in zip(parts, self.shapes, strict=True)]
+
+    def displaced(self, state: Array, duration: float = 0.0) -> Displaced:
+        """Return what a state moves, at the end of a step of this duration that it is the beginning of."""
+        found = []
+        for law, y, shape in zip(self.laws, self.parted(state), self.shapes, strict=True):
+            left = np.zeros(0) if law is None else law.compliances * np.exp(-duration / law.times)
+            found.append((left @ y).reshape(shape))
+        return found[0], found[1], found[2]
+
+    def after(self, state: Array, elastic: Displaced, duration: float) -> Array:
+        """Return the state after a step, in which forces displace elastically by v."""
+        found = []
+        for law, y, v in zip(self.laws, self.parted(state), elastic, strict=True):
+            taken = np.zeros(0) if law is None else -np.expm1(-duration / law.times)
+            found.append((y + taken[:, None] * (v.ravel() - y)).ravel())
+        return np.concatenate(found)
+
+    def factors(self, duration: float) -> list[float]:
+        """Return the compliance of each part in a step, over that at once; in the end for an infinite duration."""
+        return [1.0 if law is None else float(law.growth(duration)) for law in self.laws]
+
+    def grown(self, position: Position, duration: float) -> Position:
+        """Return a place of the strip with compliances as they are at the end of a step; the last ones are kept."""
+        kept: dict[tuple[int, float], tuple[Position, Position]] = self.__dict__["_kept"]
+        key = id(position), duration
+        if key not in kept:
+            own, times = position.interface, self.factors(duration)
+            if times == [1.0] * len(times):
+                kept[key] = position, position
+            else:
+                punch, strip = (
+                    scaled(body, factor, moved)
+                    for body, factor, moved in zip((own.punch, own.strip), times[:2], self.moved, strict=True)
+                )
+                layer = None if own.layer is None else times[2] * own.layer
+                other = replace(own, punch=punch, strip=strip, layer=layer, like=None)
+                kept[key] = position, replace(position, interface=other)
+        return kept[key][1]
+
+    def cycle(self, durations: Sequence[float] | Array) -> list[RetardedCycle | None]:
+        """Return what a cycle of time steps does to each part."""
+        return [None if law is None else law.over(np.asarray(durations)) for law in self.laws]
+
+    def lasting(self, begin: Array, end: Array, period: float) -> Array:
+        """Return the state that cycles end with which repeat, if each does to its state what one cycle did: E y + g."""
+        found = []
+        for law, one, other in zip(self.laws, self.parted(begin), self.parted(end), strict=True):
+            x = np.zeros((0, 1)) if law is None else period / law.times[:, None]
+            found.append((one + (other - one) / -np.expm1(-x)).ravel())
+        return np.concatenate(found)
+
+    def rate(self, begin: Array, end: Array, period: float) -> Array:
+        """Return the rate by which the state changes with the cycles, from what one cycle did to it."""
+        paces = [
+            np.repeat(period / law.times, int(np.prod(shape)))
+            for law, shape in zip(self.laws, self.shapes, strict=True)
+            if law is not None
+        ]
+        return np.concatenate(paces) * (self.lasting(begin, end, period) - begin)
+
+    def at(self, contact: StickState, state: Array) -> StickState:
+        """Return a contact whose bodies have crept to another state, their surfaces where they were."""
+        before, now = self.displaced(contact.crept), self.displaced(state)
+        on_punch, on_strip = (
+            own + one - other
+            for own, one, other in zip((contact.on_punch, contact.on_strip), before, now, strict=False)
+        )
+        return replace(contact, on_punch=on_punch, on_strip=on_strip, crept=state)
+
+
+def opened_by_creep(position: Position, creep: StickCreep, state: Array) -> Array:
+    """Return the gap (n,) that a state opens in a place of the strip, mm."""
+    punch, strip, layer = creep.displaced(state)
+    apart = punch - position.pair.placement.vectors(position.reading @ strip)
+    return np.einsum("nd,nd->n", position.frame[:, 0], apart) + layer
+
+
+class CreepStep:
+    """(1 - T) y = r of what creeps in a jump over N cycles, T near N times the derivative of its rate.
+
+    y goes by X = period / tau in a cycle to v, and what has crept along the normal, q = sum of c y, takes pressure
+    away, and so v. With M the pressures' answer to a depth that stays, U what pressures displace and S what that opens,
+
+        y = (r - h X U M q) / (1 + h X),    (1 + a S M) q = sum of c r / (1 + h X),    a = sum of c h X / (1 + h X),
+
+    h = (1 - 1/sqrt(2)) N. Along the tangents all of v may be taken away: there y = r / (1 + h X (1 + sum of c)) with
+    h = (1 + 1/sqrt(2)) N.
+
+    Args:
+        creep: What creeps.
+        interface: The bodies.
+        period: Of a cycle, s.
+        cycles: N.
+    """
+
+    def __init__(self, creep: StickCreep, interface: OppositeBodies, period: float, cycles: float) -> None:
+        self._creep, self._position, self._interface = creep, interface.middle, interface
+        self._paces = [np.zeros(0) if law is None else cycles * period / law.times for law in creep.laws]
+        self._normals = self._position.frame[:, 0], _normals_of_strip(self._position)
+        self._answer: Array | None = None
+
+    def answering(self, answer: Array) -> None:
+        """Take M (n, n), MPa/mm."""
+        n = len(answer)
+        closed = np.zeros_like(answer)
+        for part, shares in enumerate(self._shares):
+            if shares is not None:
+                opened = [self._opened(part, self._displaced(part, unit)) for unit in np.eye(n)]
+                closed += shares * np.array(opened).T
+        self._answer = answer
+        self._factor = scipy.linalg.lu_factor(np.eye(n) + closed @ answer)
+
+    @property
+    def _shares(self) -> list[float | None]:
+        """Return a of each part that creeps."""
+        return [
+            None if law is None else float(law.compliances @ (ACCURATE * pace / (1 + ACCURATE * pace)))
+            for law, pace in zip(self._creep.laws, self._paces, strict=True)
+        ]
+
+    def _displaced(self, part: int, pressure: Array) -> Array:
+        """Return what pressures (n,) displace of a part."""
+        if part == 2:
+            return self._creep.closure * pressure
+        position, interface = self._position, self._interface
+        force = position.pair.normal * (position.pair.weights * pressure)[:, None]
+        if part == 0:
+            return interface.punch.apply(force)
+        return -interface.strip.apply(position.reading.T @ position.pair.placement.back(force))
+
+    def _opened(self, part: int, displacement: Array) -> Array:
+        """Return the gap (n,) that a displacement of a part opens."""
+        if part == 2:
+            return displacement
+        if part == 1:
+            displacement = -self._position.pair.placement.vectors(self._position.reading @ displacement)
+        return np.einsum("nd,nd->n", self._normals[0], displacement)
+
+    def solve(self, right: Array) -> Array:
+        """Return y."""
+        creep, first, q = self._creep, [], np.zeros(len(self._normals[0]))
+        for part, (law, r, pace) in enumerate(zip(creep.laws, creep.parted(right), self._paces, strict=True)):
+            if law is None:
+                first.append(r)
+                continue
+            along = r if part == 2 else self._along(part, r)
+            grown = 1 + law.compliances.sum()
+            y = along / (1 + ACCURATE * pace)[:, None] + (r - along) / (1 + ROBUST * grown * pace)[:, None]
+            first.append(y)
+            q += self._opened(part, (law.compliances @ y).reshape(creep.shapes[part]))
+        if self._answer is None:
+            return np.concatenate([y.ravel() for y in first])
+        taken = self._answer @ scipy.linalg.lu_solve(self._factor, q)
+        for part, (law, pace) in enumerate(zip(creep.laws, self._paces, strict=True)):
+            if law is not None:
+                share = ACCURATE * pace / (1 + ACCURATE * pace)
+                first[part] = first[part] - share[:, None] * self._displaced(part, taken).ravel()
+        return np.concatenate([y.ravel() for y in first])
+
+    def _along(self, part: int, values: Array) -> Array:
+        """Return what of displacements (terms, size) of a body is along the normals."""
+        shape, normals = self._creep.shapes[part], self._normals[part]
+        vectors = values.reshape(-1, *shape)
+        return np.einsum("knd,nd,ne->kne", vectors, normals, normals).reshape(values.shape)
+
+
+def _normals_of_strip(position: Position) -> Array:
+    """Return the normals at the nodes of the strip's operator (q, d): those of the contact nodes that read them."""
+    reading = position.reading
+    found = np.asarray(reading.T @ position.pair.placement.back(position.frame[:, 0]))
+    lengths = np.linalg.norm(found, axis=1)
+    mean = position.pair.placement.back(position.frame[:, 0]).mean(axis=0)
+    found[lengths == 0] = mean
+    return found / np.linalg.norm(found, axis=1)[:, None]

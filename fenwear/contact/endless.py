@@ -229,7 +229,7 @@ def _rows(waves: Waves) -> Waves:
     return waves if waves.ndim == 2 else waves[:, None]
 
 
-def _short(symbols: Sequence[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+def _short(symbols: Sequence[Waves]) -> Waves:
     """Return symbols (i, j, m), with one number where they do not change along j."""
     found = np.stack(symbols, axis=2)
     first = found[:, :1]

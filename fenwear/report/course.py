@@ -118,7 +118,7 @@ def creep_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
             if depth not in history:
                 continue
             deepest = history[depth].max([d for d in history[depth].dims if d != "half_cycle"])
-            style = {"color": colour, "linestyle": dashes, "label": f"{body}, {text}", **mark_few(x)}
+            style: dict[str, Any] = {"color": colour, "linestyle": dashes, "label": f"{body}, {text}", **mark_few(x)}
             axes[0].plot(x, 1e3 * deepest, **style)
             axes[1].plot(x, history[volume], **style)
     axes[0].set_ylabel("largest depth (µm)")

@@ -73,7 +73,7 @@ class StickCreep:
         found = []
         for law, y, shape in zip(self.laws, self.parted(state), self.shapes, strict=True):
             left = np.zeros(0) if law is None else law.compliances * np.exp(-duration / law.times)
-            found.append((left @ y).reshape(shape))
+            found.append(np.asarray((left @ y).reshape(shape), dtype=np.float64))
         return found[0], found[1], found[2]
 
     def after(self, state: Array, elastic: Displaced, duration: float) -> Array:
@@ -141,7 +141,7 @@ def opened_by_creep(position: Position, creep: StickCreep, state: Array) -> Arra
     """Return the gap (n,) that a state opens in a place of the strip, mm."""
     punch, strip, layer = creep.displaced(state)
     apart = punch - position.pair.placement.vectors(position.reading @ strip)
-    return np.einsum("nd,nd->n", position.frame[:, 0], apart) + layer
+    return np.asarray(np.einsum("nd,nd->n", position.frame[:, 0], apart) + layer)
 
 
 class CreepStep:

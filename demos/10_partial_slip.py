@@ -24,7 +24,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from fenwear import assemble, jump, load_case, march, steady, vary
-from fenwear.stick.cycle import Records
+from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.final import final_shape
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
@@ -53,7 +53,7 @@ a = np.sqrt(4 * load * radius / (np.pi * modulus))  # Hertz's half-width, mm
 
 def time_steps(blocks):
     """Return the time steps of all half-cycles of blocks, one after the other."""
-    return Records.joined([steps.records for block in blocks for steps in block.steps])
+    return TimeStepRecords.joined([steps.records for block in blocks for steps in block.steps])
 
 
 def first_cycle(system, amplitude):
@@ -226,7 +226,7 @@ rows = [
 ]
 ends = {
     "stick zone of the second cycle": steady(system),
-    "stick zone of the last cycle": final_shape(system.lawful.rig, rows[-1][0].steps[-1].stuck),
+    "stick zone of the last cycle": final_shape(system.law_state.rig, rows[-1][0].steps[-1].stuck),
 }
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.assembly.variants import with_case
-from fenwear.cycle import Steady, steady
+from fenwear.cycle import SteadyState, steady
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, InputError
 
@@ -45,7 +45,7 @@ class InitialShape:
     """
 
     depth: Array
-    states: tuple[Steady, ...]
+    states: tuple[SteadyState, ...]
     largest_pressure: tuple[float, ...]
     left_to_run_in: tuple[float, ...]
     tolerance: float
@@ -87,7 +87,7 @@ def _under(system: Tribosystem, factor: float) -> Tribosystem:
     return with_case(system, case.model_copy(update=of))
 
 
-def _mean_shape(states: Sequence[Steady], shares: Array) -> Array:
+def _mean_shape(states: Sequence[SteadyState], shares: Array) -> Array:
     """Return the mean of the shapes, from its highest point down (n,), mm."""
     shapes = np.array([state.shape for state in states])
     mean = shares @ shapes / shares.sum()  # NaN where the surfaces never touch under one of the loads
@@ -104,7 +104,7 @@ def _pressures(system: Tribosystem, depth: Array) -> Array:
     return np.array([system.phase_contact((k,)).solve(system.gap(k, worn)).pressure[0] for k in phases])
 
 
-def _tolerance(system: Tribosystem, state: Steady, depth: Array) -> float:
+def _tolerance(system: Tribosystem, state: SteadyState, depth: Array) -> float:
     """Return the amplitude of a wave over the contact that changes the pressure by a share of its scale, mm."""
     scale = pressure_scale(system, state.phase_pressure)
     small = PROBE * system.interface.elastic_length * scale

@@ -35,9 +35,18 @@ from fenwear.errors import (
     MeshQualityError,
     OutputError,
 )
-from fenwear.law import decided
-from fenwear.lookout import Lookout
+from fenwear.law_choice import resolve_law
 from fenwear.parallel import on_root
+from fenwear.plausibility import (
+    HeatMonitor,
+    StateMonitor,
+    law_warnings,
+    size_warnings,
+    sliding_text,
+    stroke_warnings,
+    unique_text,
+    uniques,
+)
 from fenwear.progress import How, Log, Progress
 from fenwear.results import checkpoint, steps
 from fenwear.results.degrees import degrees_of
@@ -51,17 +60,8 @@ from fenwear.results.history import (
     write_summary,
 )
 from fenwear.results.summary import HOTTEST, summarise
+from fenwear.run_monitor import RunMonitor
 from fenwear.signals import Signals
-from fenwear.watch import (
-    HeatWatch,
-    Watch,
-    law_warnings,
-    size_warnings,
-    sliding_text,
-    stroke_warnings,
-    unique_text,
-    uniques,
-)
 
 FAR_APART = 2.0  # contact nodes between neighbouring positions of a strip that wears: more leaves steps in its scar
 BLOCK_SECONDS = 2.0  # after which a block ends
@@ -110,7 +110,7 @@ def run_case(
     """
     begin = time.perf_counter()
     log = case.names.telling(log)
-    found = decided(case, log, comm, heat=preparation_of(case), fresh=fresh)
+    found = resolve_law(case, log, comm, heat=preparation_of(case), fresh=fresh)
     for line in found.system.bodies.solved_by:
         log(line)
     if not resume:
@@ -182,7 +182,7 @@ class _Run:
     def __init__(self, system: Tribosystem, directory: Path, log: Log, *, resume: bool) -> None:
         self.directory, self.log = directory, log
         self.comm, self.case = system.comm, system.case
-        self.watch = Watch(system)
+        self.watch = StateMonitor(system)
         start: RunState | None = None
         if resume:
             followed = checkpoint.followed(directory, system)
@@ -215,11 +215,11 @@ class _Run:
         self.warnings += [*law_warnings(system), *stroke_warnings(system)]
         for warning in self.warnings:
             log(f"warning: {warning}")
-        self._heat_watch = HeatWatch(self.extremes)
+        self._heat_watch = HeatMonitor(self.extremes)
         if self.case.program is None:  # else the motion and surroundings of its stages are what counts
             self._see_heat(system, start)
         self._fields_at = frozenset(self.case.output.fields_at or ())
-        self._lookout: Lookout | None = None  # while it marches
+        self._lookout: RunMonitor | None = None  # while it marches
 
     def _see_heat(self, system: Tribosystem, state: RunState | None = None) -> None:
         """Look at the heat of a system with the contact of a state, or else of unworn bodies; collective."""
@@ -254,7 +254,7 @@ class _Run:
         """
         with Progress("half-cycle", self.case.run.half_cycles, self.state.half_cycle, self.comm, progress) as told:
             every = self.case.output.checkpoint
-            self._lookout = Lookout(self.comm, signals, told, self._save, every=every, block=BLOCK_SECONDS)
+            self._lookout = RunMonitor(self.comm, signals, told, self._save, every=every, block=BLOCK_SECONDS)
             for block in self._blocks():
                 self._take(block)
                 told.reached(int(block.half_cycle[-1]), _in_short(block))

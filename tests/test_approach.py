@@ -62,12 +62,12 @@ def test_wear_relieves_it() -> None:
 
 def test_with_stick() -> None:
     """The same approach where the surfaces stick: the force is that of the bars."""
-    from fenwear.stick.setup import make_rig
+    from fenwear.stick.setup import partial_slip_problem
 
     found = blocks(contact={"friction": 0.3, "law": "coulomb"}, run={"half_cycles": 2, "integration": "explicit"})
     found["motion"]["amplitude"] = 1e-4
-    rig = make_rig(make_case(found))
-    assert rig.weights @ rig.beginning().contact.pressure == pytest.approx(E * APPROACH / 5.0, rel=1e-6)
+    problem = partial_slip_problem(make_case(found))
+    assert problem.weights @ problem.beginning().contact.pressure == pytest.approx(E * APPROACH / 5.0, rel=1e-6)
 
 
 def test_of_both_bodies() -> None:

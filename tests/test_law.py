@@ -9,10 +9,10 @@ import pytest
 
 from fenwear import CaseError, load_case
 from fenwear.assembly import assemble
-from fenwear.law import check_decided, decided
+from fenwear.law_choice import check_decided, resolve_law
+from fenwear.plausibility import stroke_warnings
 from fenwear.run import run_case
-from fenwear.sweeps.evaluate import Workshop
-from fenwear.watch import stroke_warnings
+from fenwear.sweeps.evaluate import VariantRunner
 
 SMALL = (
     "contact.law='auto'",
@@ -45,7 +45,7 @@ def test_the_stroke_decides(settings: tuple[str, ...], law: str, reason: str) ->
     """Against the way that the bodies follow friction; what does not go with stick slides, and is told."""
     told: list[str] = []
     case = load_case("fretting-partial-slip", [*SMALL, *settings])
-    found = decided(case, told.append)
+    found = resolve_law(case, told.append)
     assert found.case.contact.law == found.numbers["contact_law"] == law
     assert found.system.sticks == (law == "coulomb")
     assert found.case.folder == case.folder
@@ -61,7 +61,9 @@ def test_the_estimate_decides_where_it_says() -> None:
     """The way that is taken up is of the bodies alone, and the law changes where its share passes a tenth."""
     ways, laws = [], []
     for amplitude in (12.0, 60.0):
-        found = decided(load_case("fretting-partial-slip", [*SMALL, WIDE, f"motion.amplitude='{amplitude} um'"]), str)
+        found = resolve_law(
+            load_case("fretting-partial-slip", [*SMALL, WIDE, f"motion.amplitude='{amplitude} um'"]), str
+        )
         share = found.numbers["elastic_share_of_stroke"]
         ways.append(share * amplitude)
         laws.append(found.case.contact.law)
@@ -73,7 +75,7 @@ def test_the_estimate_decides_where_it_says() -> None:
 def test_a_law_that_is_given_stays() -> None:
     """Without a word; a table stick that does not go with the case is an error."""
     case = load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'", "stick={}"])
-    assert decided(case, pytest.fail).case is case
+    assert resolve_law(case, pytest.fail).case is case
     with pytest.raises(CaseError, match=r"contact\.transverse_friction: expected 0 with contact\.law = 'coulomb'"):
         load_case("fretting-partial-slip", [*SMALL, "stick.force='60 N'", "contact.transverse_friction=0.1"])
 
@@ -82,7 +84,7 @@ def test_what_follows_one_law_says_so() -> None:
     """Sweeps and lives are no results of a law that the case does not call for; the law given, they are."""
     case = load_case("fretting-partial-slip", [*SMALL, "motion.amplitude='3 um'"])
     with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken: .* or 'gross-sliding' to leave stick out"):
-        Workshop().values(case, "steady")
+        VariantRunner().values(case, "steady")
     with pytest.raises(CaseError, match=r"contact\.law: 'coulomb' is taken"):
         check_decided(assemble(case))
     check_decided(assemble(load_case("fretting-partial-slip", [*SMALL, "contact.law='gross-sliding'"])))

@@ -197,14 +197,14 @@ def test_stick_on_ranks_whose_arithmetic_differs(monkeypatch: pytest.MonkeyPatch
     """Time steps as fine as they need to be, cycles, jumps and the final shape; rank 0's error is that of all."""
     case = load_case("fretting-partial-slip", STICK)
     system = assemble(case)
-    given = with_steps(system.lawful.rig, case, case.stick.steps)
+    given = with_steps(system.law_state.problem, case, case.stick.steps)
     noisy(monkeypatch)
-    rig, fineness = fine_enough(given, case)
+    problem, fineness = fine_enough(given, case)
     check_same(fineness.change, fineness.steps)
-    system = replace(system, lawful=replace(system.lawful, rig=rig))
+    system = replace(system, law_state=replace(system.law_state, problem=problem))
     for block in (*march(system, 4), *jump(system, 60, tolerance=0.1, block=1)):
         check_same(block.half_cycle, block.wear, block.end.jump_length, *(steps.pressure for steps in block.steps))
-    found = final_shape(rig)
+    found = final_shape(problem)
     check_same(found.pressure, found.depth)
 
     def fail(*_: Any) -> None:

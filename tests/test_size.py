@@ -12,7 +12,7 @@ from fenwear import CaseError, load_case
 from fenwear.assembly import place_case
 from fenwear.bodies.mesh import meshes_folder
 from fenwear.case.templates import template_names, write_case_of
-from fenwear.watch import size_warnings
+from fenwear.plausibility import size_warnings
 
 
 def told(case: Path | str, *settings: str) -> list[str]:

@@ -13,7 +13,7 @@ from fenwear.accuracy.heat import of_heat, of_steady_heat
 from fenwear.accuracy.values import Contribution, Quantity, Value, Values, values_of, values_of_steady
 from fenwear.assembly import Tribosystem
 from fenwear.case import Case
-from fenwear.cycle import Block, Steady, steady
+from fenwear.cycle import Block, SteadyState, steady
 from fenwear.cycle.driver import Watch, unwatched
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import CaseError, ConvergenceError
@@ -122,7 +122,7 @@ def _steps(again: Again, before: Values, first: Block, last: Block) -> Iterator[
     else:
         yield "wear steps", _of_half_cycles(before, first, last)
     if last.system.sticks:
-        fineness = last.system.lawful.fineness
+        fineness = last.system.law_state.fineness
         if fineness is not None:
             yield "slip steps", {quantity: fineness.change * abs(value.number) for quantity, value in before.items()}
     fewer = max(2, 2 * (positions // 4) + positions % 2)
@@ -193,7 +193,7 @@ def foreseen(system: Tribosystem, watch: Watch = unwatched) -> Uncertainty:
     return replace(found, seconds=time.perf_counter() - begin)
 
 
-def uncertainty_of_steady(state: Steady) -> Uncertainty:
+def uncertainty_of_steady(state: SteadyState) -> Uncertainty:
     """Return the numerical uncertainty of a cyclic steady state's largest pressures and temperature; collective.
 
     Args:

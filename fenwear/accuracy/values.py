@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.cycle import Block, Steady
+from fenwear.cycle import Block, SteadyState
 from fenwear.results.surfaces import surface_cells
 
 BODIES = ("punch", "strip")
@@ -88,7 +88,7 @@ def values_of(last: Block) -> Values:
     return found
 
 
-def values_of_steady(state: Steady) -> Values:
+def values_of_steady(state: SteadyState) -> Values:
     """Return the numbers of a cyclic steady state: the largest pressure of each half-cycle, and the temperature."""
     surface, strokes = state.system.pair.punch, len(state.directions)
     found = {
@@ -101,7 +101,7 @@ def values_of_steady(state: Steady) -> Values:
     return found
 
 
-def _pressures(system: Placed, last: Block) -> Values:
+def _pressures(system: ContactSetup, last: Block) -> Values:
     surface, strokes = system.pair.punch, system.motion.half_cycles
     if last.steps:
         steps: Array = np.concatenate([one.pressure for one in last.steps[-strokes:]])

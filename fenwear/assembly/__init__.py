@@ -13,11 +13,12 @@ takes again what a changed case makes necessary, and keeps the rest.
 
 from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elastic_body
 from fenwear.assembly.contact_law import ContactLaw
+from fenwear.assembly.contact_setup import Clock, ContactSetup, place, place_at_rest
 from fenwear.assembly.creep import Creep, CreepStage
 from fenwear.assembly.laws import law_named, register_contact_law
-from fenwear.assembly.needs import Needs, body_needs
-from fenwear.assembly.placed import Clock, Placed, place, place_at_rest
-from fenwear.assembly.shares import body_lines, shares_text
+from fenwear.assembly.resource_report import body_lines, resources_text
+from fenwear.assembly.resources import Resources, body_resources
+from fenwear.assembly.solver_choice import choose_solvers
 from fenwear.assembly.strokes import Sliding, make_sliding
 from fenwear.assembly.tribosystem import (
     Condensed,
@@ -28,33 +29,33 @@ from fenwear.assembly.tribosystem import (
     friction_power,
     heating_friction,
     joined,
-    needs_of,
     preparation,
+    resources_of,
     steady_exchange,
     with_exchange,
     with_reduced_heat,
 )
 from fenwear.assembly.variants import assemble, in_parts, place_case, renewed, set_up_by, vary, with_case
 from fenwear.assembly.warmed import properties_outdated, property_change, taken_at, warmed_system, warming_key
-from fenwear.assembly.ways import settle
 
 __all__ = [
     "Bodies",
     "Clock",
     "Condensed",
     "ContactLaw",
+    "ContactSetup",
     "Creep",
     "CreepStage",
-    "Needs",
-    "Placed",
     "Preparation",
+    "Resources",
     "Sliding",
     "Tribosystem",
     "assemble",
     "body_lines",
-    "body_needs",
+    "body_resources",
     "build_bodies",
     "build_conduction",
+    "choose_solvers",
     "elastic",
     "elastic_body",
     "expansions",
@@ -64,7 +65,6 @@ __all__ = [
     "joined",
     "law_named",
     "make_sliding",
-    "needs_of",
     "place",
     "place_at_rest",
     "place_case",
@@ -73,9 +73,9 @@ __all__ = [
     "property_change",
     "register_contact_law",
     "renewed",
+    "resources_of",
+    "resources_text",
     "set_up_by",
-    "settle",
-    "shares_text",
     "steady_exchange",
     "taken_at",
     "vary",

@@ -25,7 +25,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
 from fenwear.interface import pair
 from fenwear.parallel import release
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 SWALLOWED = 0.2  # of a load: nodes at the end of its group that a support beside it holds may take less of it
 
@@ -48,8 +48,8 @@ class Bodies:
     punch: ElasticBody
     strip: ElasticBody
     heat: tuple[HeatBody, HeatBody] | None = None
-    followed: Worn | None = None
-    moved: Worn | None = None
+    followed: WornDepths | None = None
+    moved: WornDepths | None = None
     regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     densities: tuple[Array | None, Array | None] = (None, None)
     warmed: tuple[Array, Array] | None = None
@@ -124,7 +124,7 @@ class Bodies:
 def build_bodies(
     case: Case,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    followed: Worn | None = None,
+    followed: WornDepths | None = None,
     warmed: tuple[Array, Array] | None = None,
 ) -> Bodies:
     """Mesh both bodies and assemble them; collective.
@@ -220,7 +220,7 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
     return body
 
 
-def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Worn:
+def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: WornDepths) -> WornDepths:
     """Let the meshes follow the wear; return how far their contact nodes have moved into the bodies."""
     punch, strip = (movable_surface(mesh, case.geometry.degree, case.model.law) for mesh in meshes)
     facing = pair(punch.surface, strip.surface, axisymmetric=case.model.law == "axisymmetric")
@@ -232,4 +232,4 @@ def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: Worn) -> Wor
         pins = [np.array(support.at) for support in description.supports if support.at is not None]
         groups = [point for points in movable.body.points.values() for point in points]
         moved.append(follow_wear(movable, depth, into, [*pins, *groups]))
-    return Worn(moved[0], moved[1])
+    return WornDepths(moved[0], moved[1])

@@ -19,8 +19,8 @@ from functools import cached_property
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.creeping import BODIES, LAYER, CreepingBody, CreepingLayer, Member, both
-from fenwear.assembly.placed import Placed
 from fenwear.bodies.creep import Retardation, RetardedCycle
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.bodies.scaled import scaled
@@ -268,7 +268,7 @@ class CreepStage:
 
 
 def creep_of(
-    placed: Placed,
+    placed: ContactSetup,
     operators: tuple[SurfaceOperator, SurfaceOperator],
     interfaces: tuple[Interface, ...],
     on_material: Callable[[int], Interface],

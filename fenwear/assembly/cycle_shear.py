@@ -11,10 +11,10 @@ from fenwear.case import Dependence
 from fenwear.sliding.cross_shear import CycleShear, SlidingTensor
 
 if TYPE_CHECKING:
-    from fenwear.assembly.placed import Placed
+    from fenwear.assembly.contact_setup import ContactSetup
 
 
-def sliding_tensor(placed: Placed, pressure: Array | None = None) -> SlidingTensor:
+def sliding_tensor(placed: ContactSetup, pressure: Array | None = None) -> SlidingTensor:
     """Return the tensor of a cycle's sliding at the punch's contact nodes.
 
     Args:
@@ -25,7 +25,7 @@ def sliding_tensor(placed: Placed, pressure: Array | None = None) -> SlidingTens
     return SlidingTensor(np.einsum("mi,mia,mib->iab", weights, along, along, optimize=True))
 
 
-def sliding_tensor_of_strip(placed: Placed, pressure: Array | None = None) -> SlidingTensor:
+def sliding_tensor_of_strip(placed: ContactSetup, pressure: Array | None = None) -> SlidingTensor:
     """Return the same at the strip's contact nodes, of its own material that moves under the punch."""
     weights = placed.path if pressure is None else placed.path * pressure
     directions, values = placed.sliding_directions, np.zeros((len(placed.pair.strip.weights), 9))
@@ -36,7 +36,7 @@ def sliding_tensor_of_strip(placed: Placed, pressure: Array | None = None) -> Sl
     return SlidingTensor(values.reshape(-1, 3, 3))
 
 
-def cycle_shear(placed: Placed, pressure: Array | None) -> CycleShear | None:
+def cycle_shear(placed: ContactSetup, pressure: Array | None) -> CycleShear | None:
     """Return what coefficients know of a whole cycle; None where none asks for it.
 
     Where nothing presses in the whole cycle the ways alone count, as where no pressures are known yet.
@@ -58,7 +58,7 @@ def cycle_shear(placed: Placed, pressure: Array | None) -> CycleShear | None:
     return CycleShear((ratio, strip), found.work / np.where(slid > 0, slid, 1.0))
 
 
-def asks_for_cycle(placed: Placed) -> bool:
+def asks_for_cycle(placed: ContactSetup) -> bool:
     """Return whether a coefficient depends on the cross-shear or the mean pressure of a cycle."""
     laws = [law.given_coefficient for law in placed.sliding.wear if law is not None]
     given = [placed.friction.contact.friction, *laws]

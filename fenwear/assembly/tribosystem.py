@@ -14,10 +14,10 @@ from scipy.sparse import csr_array, hstack
 
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.assembly.creep import Creep, creep_of
-from fenwear.assembly.needs import Needs, contact_memory, needs
-from fenwear.assembly.placed import Placed
-from fenwear.assembly.ways import chosen, free_on_ranks, settle
+from fenwear.assembly.resources import Resources, contact_memory, needs
+from fenwear.assembly.solver_choice import choose_solvers, chosen, free_on_ranks
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import Relocatable, SurfaceOperator, operators_for
@@ -34,7 +34,7 @@ from fenwear.heat.prepare import prepare_exchange, prepare_steady
 from fenwear.interface import Interface, RigidEquilibrium, join
 from fenwear.memory import GIB
 from fenwear.parallel import Rows, all_together, lasting
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 T = TypeVar("T")
 Preparation = Literal["as set", "reduced", "none"]  # of the heat
@@ -82,7 +82,7 @@ class Condensed:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Tribosystem(Placed):
+class Tribosystem(ContactSetup):
     """Punch and strip, condensed and joined in every phase of the motion: ready for contact, wear and cycles.
 
     Attributes:
@@ -90,7 +90,7 @@ class Tribosystem(Placed):
         interface: The condensed interface in the middle position, under the mean loads.
         interfaces: The same in each phase.
         exchange: The bodies' temperatures over the phases; None without heat, or where it was not asked for.
-        lawful: What the law of contact has prepared of it, where it needs more.
+        law_state: What the law of contact has prepared of it, where it needs more.
         creep: What bodies and layer creep; None where nothing does.
     """
 
@@ -98,7 +98,7 @@ class Tribosystem(Placed):
     interface: Interface
     interfaces: tuple[Interface, ...]
     exchange: HeatExchange | None = None
-    lawful: Any = None
+    law_state: Any = None
     creep: Creep | None = None
 
     @property
@@ -146,7 +146,7 @@ class Tribosystem(Placed):
             return self.phase_contact((phase,))
         return self._contact([SlidingContact(self.creep.grown[phase], self.friction_ratios()[phase])])
 
-    def gap(self, phase: int, worn: Worn, *, passing: bool = False) -> Array:
+    def gap(self, phase: int, worn: WornDepths, *, passing: bool = False) -> Array:
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm.
 
         Args:
@@ -157,7 +157,7 @@ class Tribosystem(Placed):
         found = super().gap(phase, worn)
         return found + self.creep.offset(phase, worn.crept) if passing and self.creep is not None else found
 
-    def unworn(self) -> Worn:
+    def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, what lies between then, and that nothing has crept."""
         found = super().unworn()
         return found if self.creep is None else replace(found, crept=self.creep.beginning())
@@ -196,7 +196,7 @@ class Tribosystem(Placed):
         )
 
 
-def needs_of(placed: Placed, free: float | None = None) -> Needs:
+def resources_of(placed: ContactSetup, free: float | None = None) -> Resources:
     """Return what the set-up of placed bodies will take, in the way that fits into the memory; collective.
 
     Args:
@@ -207,11 +207,11 @@ def needs_of(placed: Placed, free: float | None = None) -> Needs:
     return chosen(_needs_as_is(placed), placed.bodies.punch.setup, placed.comm, free)
 
 
-def _needs_as_is(placed: Placed) -> Needs:
+def _needs_as_is(placed: ContactSetup) -> Resources:
     return needs(placed, _frame(placed), shared=shared_rows(placed) is not None)
 
 
-def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
+def elastic(placed: ContactSetup, *, fresh: bool = False, free: float | None = None) -> Tribosystem:
     """Condense both bodies and join them in every phase; collective.
 
     Factors both stiffnesses, unless the bodies are kept on disk.
@@ -227,7 +227,7 @@ def elastic(placed: Placed, *, fresh: bool = False, free: float | None = None) -
     return joined(placed, condense_bodies(placed, fresh=fresh, free=free))
 
 
-def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None = None) -> Condensed:
+def condense_bodies(placed: ContactSetup, *, fresh: bool = False, free: float | None = None) -> Condensed:
     """Condense both bodies onto what the phases of the motion ask for, in the way that fits the memory; collective.
 
     They are kept on disk, but with properties of temperatures that no other run has.
@@ -241,7 +241,7 @@ def condense_bodies(placed: Placed, *, fresh: bool = False, free: float | None =
         CaseError: there is not memory enough.
     """
     loaded = {id(one): one for one in (placed.bodies, *placed.loaded)}
-    settle(list(loaded.values()), _needs_as_is(placed), free)
+    choose_solvers(list(loaded.values()), _needs_as_is(placed), free)
     bodies, middle = placed.bodies, placed.pair
     couplings: list[PETSc.Mat | None] = [None, None]
     if bodies.heat is not None:
@@ -283,7 +283,7 @@ def _with_passage(request: Request, strip: ContactSurface, passage: Passage) -> 
     return replace(request, patterns=patterns, directions=np.vstack([request.along[:, :, 0], outward[nodes]]))
 
 
-def shared_rows(placed: Placed) -> Rows | None:
+def shared_rows(placed: ContactSetup) -> Rows | None:
     """Return the contact nodes whose rows of the compliance each rank has; None where every rank has all.
 
     Ranks share what takes much memory: half-cycles in which many nodes touch go faster with one factor on one rank.
@@ -300,7 +300,7 @@ def shared_rows(placed: Placed) -> Rows | None:
     return Rows.equal(lasting(comm), len(placed.pair.weights))
 
 
-def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np.int64] | None, ...]:
+def _kept(placed: ContactSetup, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np.int64] | None, ...]:
     """Return the patterns of punch and strip whose columns this rank's rows are made from; None for all."""
     if rows is None:
         return None, None
@@ -311,7 +311,7 @@ def _kept(placed: Placed, rows: Rows | None, *, moves: bool) -> tuple[NDArray[np
     return nodes, np.unique(np.concatenate(below)).astype(np.int64)
 
 
-def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
+def joined(placed: ContactSetup, condensed: Condensed, exchange: HeatExchange | None = None) -> Tribosystem:
     """Join the condensed bodies in every phase; what phases share is made once; collective."""
     interface = condensed.join(placed.rigid, placed.layers.winkler)
     under = _under_all(condensed, placed)
@@ -327,7 +327,7 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
             alike = rigid.pair.transfer is placed.pair.transfer and rigid.pair.normal is placed.pair.normal
             layer = placed.layers.winkler
             found.append(interface.under(rigid, own.punch, own.facing(rigid)[0]) if alike else own.join(rigid, layer))
-    parts = {name: getattr(placed, name) for name in Placed.__dataclass_fields__}
+    parts = {name: getattr(placed, name) for name in ContactSetup.__dataclass_fields__}
     interfaces = tuple(found)
 
     def on_material(phase: int) -> Interface:
@@ -340,7 +340,7 @@ def joined(placed: Placed, condensed: Condensed, exchange: HeatExchange | None =
     )
 
 
-def _under_all(condensed: Condensed, placed: Placed) -> dict[int, Condensed]:
+def _under_all(condensed: Condensed, placed: ContactSetup) -> dict[int, Condensed]:
     """Return the condensed bodies under the loads of each phase, by the id of its bodies; collective.
 
     Displacements are linear in the loads: solved are those that the others are made of.
@@ -395,7 +395,7 @@ def _spanning(comm: MPI.Comm, loads: Array) -> tuple[list[int], Array]:
     return chosen, np.linalg.lstsq(whole[:, chosen], whole, rcond=None)[0]
 
 
-def answers_for(condensed: Condensed, before: Placed, placed: Placed) -> bool:
+def answers_for(condensed: Condensed, before: ContactSetup, placed: ContactSetup) -> bool:
     """Return whether bodies condensed for one motion answer for another one, too; collective."""
     frame = _frame(placed)
     if _frame(before) != frame:
@@ -408,7 +408,7 @@ def answers_for(condensed: Condensed, before: Placed, placed: Placed) -> bool:
     return bool(placed.comm.allreduce(have is None or needed is None or np.isin(needed, have).all(), op=MPI.LAND))
 
 
-def _frame(placed: Placed) -> tuple[bool, bool, bool]:
+def _frame(placed: ContactSetup) -> tuple[bool, bool, bool]:
     """Return whether the strip moves as a whole, whether the frame stays, and whether the strip is flat."""
     middle = placed.pair
     moves = any(pair.transfer is not middle.transfer for pair in placed.pairs)
@@ -512,13 +512,13 @@ def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, 
     return punch, strip
 
 
-def friction_power(system: Placed) -> float:
+def friction_power(system: ContactSetup) -> float:
     """Return the mean power of friction at the mean pressure and speed, per thickness, mW/mm."""
     rate = float(system.pair.weights @ heating_friction(system))
     return rate * system.rigid.mean_pressure * system.motion.mean_speed
 
 
-def heating_friction(system: Placed, mu: Array | None = None) -> Array:
+def heating_friction(system: ContactSetup, mu: Array | None = None) -> Array:
     """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
 
     Args:

@@ -9,8 +9,8 @@ from mpi4py import MPI
 from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies
 from fenwear.assembly.contact_law import ContactLaw
+from fenwear.assembly.contact_setup import ContactSetup, place
 from fenwear.assembly.laws import law_named
-from fenwear.assembly.placed import Placed, place
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
     Preparation,
@@ -20,13 +20,13 @@ from fenwear.assembly.tribosystem import (
     with_exchange,
 )
 from fenwear.case import Case, Heat, changed_case
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 
 def assemble(
     case: Case,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    followed: Worn | None = None,
+    followed: WornDepths | None = None,
     *,
     heat: Preparation = "as set",
     fresh: bool = False,
@@ -53,7 +53,7 @@ def assemble(
 
 
 def renewed(
-    system: Tribosystem, followed: Worn | None = None, warmed: tuple[Array, Array] | None = None
+    system: Tribosystem, followed: WornDepths | None = None, warmed: tuple[Array, Array] | None = None
 ) -> Tribosystem:
     """Return the system of the same case on meshes and with properties of now; collective.
 
@@ -72,9 +72,9 @@ def renewed(
 def place_case(
     case: Case,
     comm: MPI.Comm = MPI.COMM_WORLD,
-    followed: Worn | None = None,
+    followed: WornDepths | None = None,
     warmed: tuple[Array, Array] | None = None,
-) -> Placed:
+) -> ContactSetup:
     """Return both bodies of a case opposite each other, without any elasticity; collective.
 
     Args:

@@ -88,19 +88,19 @@ def check_command(
     ] = False,
 ) -> None:
     """Validate a case with its geometry and print it with all defaults."""
-    from fenwear.assembly import elastic, law_named, needs_of, place_case, shares_text, with_reduced_heat
+    from fenwear.assembly import elastic, law_named, place_case, resources_of, resources_text, with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings, stability_number
-    from fenwear.law import choose_law, with_law
+    from fenwear.law_choice import choose_law, with_law
+    from fenwear.plausibility import fineness_text, fineness_warnings, initial_warnings
     from fenwear.run import position_warnings
-    from fenwear.watch import fineness_text, fineness_warnings, initial_warnings
 
     loaded = load(case, settings)
     if loaded.sticks:
         _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy)
         return
     placed = place_case(loaded)
-    wanted = needs_of(placed)
-    for line in (wanted.text(), *shares_text(placed, wanted)):
+    wanted = resources_of(placed)
+    for line in (wanted.text(), *resources_text(placed, wanted)):
         log(line)
     system = elastic(placed)
     if loaded.contact.law == "auto":

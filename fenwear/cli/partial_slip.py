@@ -10,17 +10,17 @@ from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, assemble, body_lines
 from fenwear.case import Case
 from fenwear.errors import CaseError, InputError
+from fenwear.plausibility.few import few_text
+from fenwear.plausibility.size import size_warnings
+from fenwear.plausibility.slip import law_warnings, unique_text
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
 from fenwear.results.summary import net_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.coulomb import touches
-from fenwear.stick.cycle import Records
+from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.interface import meshed
-from fenwear.stick.setup import make_rig
-from fenwear.watch.few import few_text
-from fenwear.watch.size import size_warnings
-from fenwear.watch.slip import law_warnings, unique_text
+from fenwear.stick.setup import partial_slip_problem
 
 
 def check_text(case: Case, system: Tribosystem | None = None) -> str:
@@ -36,12 +36,12 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     """
     system = system or assemble(case)
     system.check_touching()
-    rig = system.lawful.rig
-    both = meshed(rig.interface)
+    problem = system.law_state.problem
+    both = meshed(problem.interface)
     setup = "\n".join((both.needs.text(), *body_lines(both.bodies, both.needs)))
     sizes = size_warnings(case, system.bodies, system.rigid)
-    records = Records.joined(rig.cycle(rig.beginning())[1])
-    thick, weights = case.model.thickness, rig.weights
+    records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
+    thick, weights = case.model.thickness, problem.weights
     closed = weights @ (records.pressure > 0).any(axis=0)
     stuck = weights @ records.sticking.all(axis=0)
     regime = "gross sliding" if not records.sticking.any(axis=1).all() else "partial slip"
@@ -70,13 +70,13 @@ def final_of(case: Case, system: Tribosystem | None = None) -> tuple[FinalShape,
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: nothing sticks.
     """
-    rig = make_rig(case) if system is None else system.lawful.rig
-    if not touches(rig):
+    problem = partial_slip_problem(case) if system is None else system.law_state.problem
+    if not touches(problem):
         raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
-    found = final_shape(rig)
+    found = final_shape(problem)
     solid = case.model.kind == "solid"
-    pair, weights = rig.interface.middle.pair, rig.weights
-    x = sliding_chart(rig.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
+    pair, weights = problem.interface.middle.pair, problem.weights
+    x = sliding_chart(problem.interface.field, pair).coordinates(pair.punch.x)[:, 0] if solid else pair.x
     scar = x[found.depth > 0]
     names = ("stick_area_mm2", "worn_volume_mm3") if solid else ("stick_width_mm", "worn_area_mm2")
     places = {a: pair.punch.x[:, k].tolist() for k, a in enumerate("xyz")} if solid else {"x": pair.x.tolist()}

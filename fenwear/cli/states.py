@@ -16,7 +16,7 @@ from fenwear.errors import CaseError, InputError
 
 if TYPE_CHECKING:
     from fenwear.assembly import Tribosystem
-    from fenwear.cycle import Steady
+    from fenwear.cycle import SteadyState
 
 
 StepOption = Annotated[
@@ -43,15 +43,15 @@ def steady_command(
     """Solve for the cyclic steady state directly."""
     from fenwear.assembly import with_case, with_reduced_heat
     from fenwear.cycle import cycles_to_reach, growth_rate, heat_gain, heat_warnings, held, steady
-    from fenwear.law import decided
+    from fenwear.law_choice import resolve_law
+    from fenwear.plausibility import fineness_warnings, steady_warnings
     from fenwear.results.degrees import degrees_of
-    from fenwear.watch import fineness_warnings, steady_warnings
 
     begin = time.perf_counter()
     given = load(case, settings)
     held_at(given, _number(step))  # before anything is set up
-    lawful = decided(given, log, heat="reduced" if given.program is None else "none", fresh=fresh)
-    loaded, system = lawful.case, lawful.system
+    law_state = resolve_law(given, log, heat="reduced" if given.program is None else "none", fresh=fresh)
+    loaded, system = law_state.case, law_state.system
     of_step = held(system, _number(step))
     if of_step is not None:
         loaded = of_step[0]
@@ -112,7 +112,7 @@ def steady_command(
     )
 
 
-def _uncertain(state: Steady) -> dict[str, Any]:
+def _uncertain(state: SteadyState) -> dict[str, Any]:
     """Return how uncertain a state's numbers are, and say it."""
     from fenwear.accuracy import shown, uncertainty_of_steady
 
@@ -150,7 +150,7 @@ def coordinates(system: Tribosystem) -> dict[str, Any]:
     return {name: x[:, k].tolist() for k, name in enumerate(names)}
 
 
-def _print_steady(case: str, system: Tribosystem, state: Steady, step: str) -> None:
+def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str) -> None:
     """Print the state as soon as it is there: the way to it may take longer.
 
     The load over the whole surface is a pressure only where the surfaces lie on each other before they wear.

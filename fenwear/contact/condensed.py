@@ -27,7 +27,7 @@ from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import Inequality
 from fenwear.contact.operators import Operator, Phases, Solve
 from fenwear.contact.row_blocks import SpreadPhases
-from fenwear.contact.spread import OwnRows, SpreadBlock, SpreadCompliance
+from fenwear.contact.spread import DistributedBlock, OwnRows, SpreadCompliance
 from fenwear.contact.spread_nodes import SpreadNodes
 from fenwear.errors import ConvergenceError
 from fenwear.interface import Interface
@@ -203,7 +203,7 @@ class CondensedContact:
             return PhaseBlock(known, diagonal, modes, balance, iterated=alone)
         spread = SpreadCompliance(self._team, OwnRows(rows, compliance.columns))
         if alone:
-            return SpreadBlock(spread, diagonal, modes, balance)
+            return DistributedBlock(spread, diagonal, modes, balance)
         return PhaseBlock(spread, diagonal, modes, balance, iterated=False)
 
     def press(self, factor: float) -> None:

@@ -107,7 +107,7 @@ class SpreadCompliance:
         return found
 
 
-class SpreadBlock(PhaseBlock):
+class DistributedBlock(PhaseBlock):
     """[S, H; E, 0] of one phase whose compliance the ranks share."""
 
     def __init__(self, compliance: SpreadCompliance, diagonal: Array, modes: Array, balance: Array) -> None:
@@ -123,7 +123,7 @@ class _Spread(Updating):
     """Factors of sets of few unknowns on rank 0; of many, iterations of all ranks."""
 
     def __init__(
-        self, block: SpreadBlock, entries: Callable[[Indices, Indices], Array], diagonal: Array | None, wear: Array
+        self, block: DistributedBlock, entries: Callable[[Indices, Indices], Array], diagonal: Array | None, wear: Array
     ) -> None:
         super().__init__(entries, diagonal)
         self._block, self._wear = block, wear

@@ -20,14 +20,14 @@ from fenwear.cycle.stability import (
     stability_number,
     stationary_growth,
 )
-from fenwear.cycle.steady import Steady, cycles_to_reach, steady
+from fenwear.cycle.steady import SteadyState, cycles_to_reach, steady
 from fenwear.cycle.uniqueness import heat_gain, heat_warnings
 
 __all__ = [
     "Block",
     "Monotonic",
     "Span",
-    "Steady",
+    "SteadyState",
     "at_step",
     "critical_speed",
     "cycles_to_reach",

@@ -19,7 +19,7 @@ from fenwear.cycle.state import RunState, pressure_scales
 from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
 from fenwear.interface import RigidEquilibrium
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ class StepRecords(Protocol):
         """At the end of each step (k, n), mm."""
 
     @property
-    def wear(self) -> Worn:
+    def wear(self) -> WornDepths:
         """Depths worn off both bodies in all steps."""
 
 
@@ -245,7 +245,7 @@ class HalfCycle(NamedTuple):
 
     number: int
     phases: Sequence[PhaseRecord]
-    worn: Worn
+    worn: WornDepths
     totals: Totals
     heat: HalfCycleHeat | None
     load: float = 1.0

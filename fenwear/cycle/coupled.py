@@ -19,7 +19,7 @@ from fenwear.heat.periodic import CycleHeat, CycleJump
 from fenwear.layers.memory import Evolution, Held
 from fenwear.remedies import GRAZING
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 FLAT = 1e-9  # mm: depths below it count as none
 MANY = 300  # contact nodes above which heat is lagged
@@ -43,7 +43,7 @@ def cycle_heat(system: Tribosystem) -> CycleHeat | None:
 
 
 @dataclass(frozen=True)
-class Passing:
+class DepthEvolution:
     """How the worn depths of an implicit step follow from its pressures.
 
     Attributes:
@@ -53,9 +53,9 @@ class Passing:
         half_cycles: Done since the start of the run, at its end.
     """
 
-    before: Worn
+    before: WornDepths
     cycles: float
-    wear: Callable[[Array], Worn]
+    wear: Callable[[Array], WornDepths]
     half_cycles: float
 
     def depths(self, pressure: Array) -> list[Array]:
@@ -160,7 +160,7 @@ class Coupled:
         cycles: float,
         start: ContactState,
         solve: SolveContact,
-        passing: Passing | None = None,
+        passing: DepthEvolution | None = None,
         *,
         lagged: bool = False,
     ) -> Solved:
@@ -197,7 +197,7 @@ class Coupled:
         cycles: float,
         start: ContactState,
         solve: SolveContact,
-        passing: Passing | None,
+        passing: DepthEvolution | None,
         conducting: Callable[[NDArray[Any]], Array],
         *,
         lagged: bool,
@@ -296,7 +296,7 @@ class Coupled:
         return [state, *self.heat.cycle(conductances).states(state, self.mu * pressure)]
 
     def _update(
-        self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: Worn | None, passing: Passing | None
+        self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: WornDepths | None, passing: DepthEvolution | None
     ) -> None:
         """Take the coefficients at these pressures and, where there are any, temperatures of the phases and depths."""
         system = self.system
@@ -314,7 +314,7 @@ class Coupled:
         if not system.friction.constant:
             self.mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
 
-    def _remembering(self, evolution: Evolution, passing: Passing | None) -> Sequence[ContactConditions]:
+    def _remembering(self, evolution: Evolution, passing: DepthEvolution | None) -> Sequence[ContactConditions]:
         """Return the conditions of the phases with the states of laws: at the end of a step, or at rest."""
         layers = self.system.layers
         if passing is None:

@@ -87,7 +87,7 @@ class Jumps(Step, Protocol):
 
 
 @dataclass(frozen=True)
-class Course:
+class RunLimits:
     """How far to go, and where to stop on the way.
 
     Attributes:
@@ -108,7 +108,7 @@ class Course:
     watch: Watch = unwatched
 
 
-def drive(system: Tribosystem, step: Step, state: RunState, course: Course) -> Iterator[Block]:
+def run_steps(system: Tribosystem, step: Step, state: RunState, course: RunLimits) -> Iterator[Block]:
     """Yield the half-cycles that the steps record, in blocks; collective.
 
     Rank 0 computes a block for all, wherever no step of it needs them. A failure comes after all that was done before
@@ -143,7 +143,7 @@ class _Stretch(NamedTuple):
 class _Stretches:
     """Goes on block by block."""
 
-    def __init__(self, system: Tribosystem, step: Step, begin: int, course: Course) -> None:
+    def __init__(self, system: Tribosystem, step: Step, begin: int, course: RunLimits) -> None:
         self.system, self.step, self.course = system, step, course
         self._recorder = Recorder(system, course.block)
         self._ends = sorted({stop for stop in course.stops if stop > begin} | {course.half_cycles})

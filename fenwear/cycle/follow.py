@@ -74,7 +74,7 @@ class _Leaving:
     def __init__(self, system: Tribosystem) -> None:
         self.system = system
         system.team.serve(self)
-        system.outworn(system.unworn())  # before rank 0 leads: the elements' heights take all ranks
+        system.mesh_update_due(system.unworn())  # before rank 0 leads: the elements' heights take all ranks
 
     def __call__(self, state: RunState) -> bool:
         """Return whether wear or warmth is large; collective, or for rank 0 that leads."""
@@ -83,7 +83,7 @@ class _Leaving:
 
     def is_worn(self, state: RunState) -> bool:
         """Return whether the meshes are to follow the wear; collective, or for rank 0 that leads."""
-        return self.system.team.lead(partial(self.system.outworn, state.worn))
+        return self.system.team.lead(partial(self.system.mesh_update_due, state.worn))
 
     def is_warm(self, state: RunState) -> bool:
         """Return whether a whole cycle ends at temperatures for which properties are to be taken anew; collective."""

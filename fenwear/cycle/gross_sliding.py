@@ -15,7 +15,7 @@ import numpy as np
 from fenwear.assembly import (
     Bodies,
     ContactLaw,
-    Placed,
+    ContactSetup,
     Preparation,
     Sliding,
     Tribosystem,
@@ -42,7 +42,7 @@ from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
 from fenwear.cycle.state import RunState, known_pressures
-from fenwear.cycle.steady import Steady, steady_state
+from fenwear.cycle.steady import SteadyState, steady_state
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.remedies import SHORTER_JUMPS
@@ -190,7 +190,7 @@ class GrossSliding:
         friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
         return joined(placed, condensed, system.exchange.varied(case.heat, friction))
 
-    def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> Placed:
+    def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> ContactSetup:
         placed = place(bodies, sliding or make_sliding(case), case.heat, solver=case.contact.solver, case=case)
         return placed if placed.law == self.name else replace(placed, law=self.name)
 
@@ -224,7 +224,7 @@ class GrossSliding:
             )
         )
 
-    def end(self, system: Tribosystem, properties_within: float | None = None) -> Steady:
+    def end(self, system: Tribosystem, properties_within: float | None = None) -> SteadyState:
         """Return the cyclic steady state; collective."""
         return steady_state(system, properties_within)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block
-from fenwear.cycle.driver import BLOCK, Course, Jumps, Loading, Watch, Watching, as_given, drive, unwatched
+from fenwear.cycle.driver import BLOCK, Jumps, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
 from fenwear.cycle.state import RunState
 from fenwear.errors import CaseError, InputError
 
@@ -31,7 +31,7 @@ def jump(
         system: The assembled problem.
         half_cycles: Where to end, a whole number of cycles.
         tolerance: Largest estimated error of one jump, see `fenwear.cycle.jump_error.Estimate`.
-        periodic_within, block, leave, watch: As of `fenwear.cycle.driver.Course`; the change per cycle counts.
+        periodic_within, block, leave, watch: As of `fenwear.cycle.driver.RunLimits`; the change per cycle counts.
         start: Where to go on from, such as the end of a block; by default the beginning.
         stops: Half-cycles at which a jump and a block end in any case, or the cycle they are in.
         loading: Factor of all loads, continuous: a stage takes that of its own time, so that the error estimate
@@ -52,5 +52,5 @@ def jump(
     if exchange is not None and state.temperature is not None:
         state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads
     whole = frozenset(-(-stop // strokes) * strokes for stop in stops)
-    course = Course(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watching)
-    yield from drive(step.system, step, state, course)
+    course = RunLimits(half_cycles // strokes * strokes, periodic_within, block, whole, leave, watching)
+    yield from run_steps(step.system, step, state, course)

@@ -9,7 +9,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.state import RunState, present
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 ORDER = 2  # of the steps of a jump
 REST = 1e-2  # of all that has crept: where creep comes to its end it is no longer measured by what a jump adds
@@ -56,7 +56,7 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
     )
 
 
-def _creep_difference(system: Tribosystem, apart: Worn, step: Worn, end: Worn) -> float:
+def _creep_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, end: WornDepths) -> float:
     """Return the difference of what has crept over what the jump creeps; near the end of creep over a part of all."""
     creep, weights = system.creep, system.pair.weights
     if creep is None:
@@ -65,7 +65,7 @@ def _creep_difference(system: Tribosystem, apart: Worn, step: Worn, end: Worn) -
     return wrong / max(moved, REST * there, 1e-300)
 
 
-def area(system: Tribosystem, worn: Worn) -> float:
+def area(system: Tribosystem, worn: WornDepths) -> float:
     """Return the integral of the size of depths over both surfaces, and of what lies between."""
     pair = system.pair
     between = pair.weights @ np.broadcast_to(np.abs(system.layers.opening(worn.between)), pair.weights.shape)

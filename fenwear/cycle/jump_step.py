@@ -42,7 +42,7 @@ from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.inequality import CLOSE
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
-from fenwear.cycle.coupled import Coupled, Passing
+from fenwear.cycle.coupled import Coupled, DepthEvolution
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
 from fenwear.cycle.jump_error import Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
@@ -52,7 +52,7 @@ from fenwear.interface.pair import lagrange
 from fenwear.layers import Evolution
 from fenwear.remedies import SMALLER_STEPS
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import NOTHING, Worn
+from fenwear.sliding.wear import NOTHING, WornDepths
 
 GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
@@ -69,7 +69,7 @@ class _Stage:
 
     contact: ContactState
     heated: Array
-    worn: Worn
+    worn: WornDepths
     adds: Totals
     conductances: Array | None
 
@@ -78,7 +78,7 @@ class _Stage:
 class _Moment:
     """Depths, temperatures (dim,), None without heat, and totals."""
 
-    worn: Worn
+    worn: WornDepths
     temperature: Array | None
     totals: Totals
 
@@ -208,7 +208,7 @@ class Stepper:
         wrong, all_worn = (area(self.system, one) for one in (simpson - worn, worn))
         return wrong / max(all_worn, 1e-300)
 
-    def _rate(self, state: RunState, half_cycles: float) -> Worn:
+    def _rate(self, state: RunState, half_cycles: float) -> WornDepths:
         """Return what a cycle wears at the depths, temperatures and pressures of a state."""
         system, surfaces = self.system, None
         pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
@@ -278,13 +278,13 @@ class Stepper:
             self._heated, self._conductances = last.heated, last.conductances
         return RunState(state.half_cycle, worn, parted(last.contact), temperature, now.totals)
 
-    def _passing(self, worn: Worn, cycles: float) -> Passing | None:
+    def _passing(self, worn: WornDepths, cycles: float) -> DepthEvolution | None:
         """Return how depths follow in a stage where coefficients depend on them."""
         if not self._follows:
             return None
-        return Passing(worn, cycles, self._wear, self._done)
+        return DepthEvolution(worn, cycles, self._wear, self._done)
 
-    def _wear(self, pressure: Array) -> Worn:
+    def _wear(self, pressure: Array) -> WornDepths:
         return self.wear.worn(pressure)  # as last taken
 
     def _press(self, half_cycle: int, cycles: float) -> None:
@@ -330,7 +330,7 @@ class Stepper:
         return _Stage(contact, heated, worn, adds, solved.conductances)
 
     def _solve(
-        self, gap: Array, start: ContactState | None, begin: tuple[Worn, float], coupling: Array | None = None
+        self, gap: Array, start: ContactState | None, begin: tuple[WornDepths, float], coupling: Array | None = None
     ) -> ContactState:
         """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
@@ -348,7 +348,7 @@ class Stepper:
         found, self._flowed = self.system.layers.flowing(solve, lambda found: found.pressure)
         return found
 
-    def _creep(self, worn: Worn, cycles: float) -> CreepStage | None:
+    def _creep(self, worn: WornDepths, cycles: float) -> CreepStage | None:
         """Return what creeps in a stage; None where nothing does."""
         creep = self.system.creep
         return None if creep is None else creep.stage(worn.crept, cycles, self.ratios, self._load)
@@ -394,7 +394,7 @@ class Stepper:
             found.append(HalfCycle(number, records, depth, totals[stroke], heat, load))
         return found
 
-    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: Worn) -> Worn:
+    def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
         evolution = None if self.evolution is None else self.evolution.some(phases)
         return self.system.passing(self.wear.some(phases), phases, evolution).worn(pressures, now)

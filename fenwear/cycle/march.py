@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.block import Block
-from fenwear.cycle.driver import BLOCK, Course, Loading, Watch, Watching, as_given, drive, unwatched
+from fenwear.cycle.driver import BLOCK, Loading, RunLimits, Watch, Watching, as_given, run_steps, unwatched
 from fenwear.cycle.state import RunState, beginning
 
 
@@ -33,7 +33,7 @@ def march(
         system: The assembled problem.
         half_cycles: The last one at most.
         implicit: Which of the two steps.
-        periodic_within, block, stops, leave, watch: As of `fenwear.cycle.driver.Course`.
+        periodic_within, block, stops, leave, watch: As of `fenwear.cycle.driver.RunLimits`.
         start: Where to go on from, such as the end of a block; by default the beginning.
         loading: Factor of all loads; that in the middle of a half-cycle acts in it.
 
@@ -46,6 +46,6 @@ def march(
     if exchange is not None and state.temperature is not None:
         state = replace(state, temperature=exchange.own(state.temperature))  # before rank 0 leads
     watching = Watching(system.team, watch)
-    course = Course(half_cycles, periodic_within, block, stops, leave, watching)
+    course = RunLimits(half_cycles, periodic_within, block, stops, leave, watching)
     step = system.contact_law.half_cycles(system, watching, loading, implicit=implicit)
-    yield from drive(system, step, state, course)
+    yield from run_steps(system, step, state, course)

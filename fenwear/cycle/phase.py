@@ -16,15 +16,15 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.layers import Passing
-from fenwear.sliding.wear import Worn
+from fenwear.layers import LayerEvolution
+from fenwear.sliding.wear import WornDepths
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
 COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"
 )
-_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, Passing]
+_Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class PhaseEnd:
     record: PhaseRecord
     temperature: HeatState | None
     heat: HalfCycleHeat | None
-    worn: Worn
+    worn: WornDepths
 
 
 class PhaseStep:
@@ -64,7 +64,7 @@ class PhaseStep:
     def solve(
         self,
         temperature: HeatState | None,
-        worn: Worn,
+        worn: WornDepths,
         before: ContactState | None,
         load: float = 1.0,
         half_cycles: float = 0.0,
@@ -121,10 +121,10 @@ class PhaseStep:
         self,
         pressure: Array | None,
         temperature: HeatState | None,
-        worn: Worn,
+        worn: WornDepths,
         half_cycles: float,
         cycle: Array | None,
-    ) -> Passing:
+    ) -> LayerEvolution:
         """Take friction and wear at this pressure, and at temperature and depths at the start of the phase."""
         system = self.system
         surfaces = None
@@ -143,7 +143,12 @@ class PhaseStep:
         return system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
 
     def _solve(
-        self, temperature: HeatState | None, gap: Array, start: ContactState | None, passing: Passing, worn: Worn
+        self,
+        temperature: HeatState | None,
+        gap: Array,
+        start: ContactState | None,
+        passing: LayerEvolution,
+        worn: WornDepths,
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
         wearing, near = passing.step(worn, implicit=self.implicit), start
 
@@ -165,13 +170,13 @@ class PhaseStep:
         temperature: HeatState | None,
         heat: HalfCycleHeat | None,
         before: ContactState | None,
-        passing: Passing,
-        worn: Worn,
+        passing: LayerEvolution,
+        worn: WornDepths,
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
         meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, passing.wear)
 
-        def left() -> tuple[Totals, Worn]:
+        def left() -> tuple[Totals, WornDepths]:
             pressure = contact.pressure[0]
             lost, creep = passing.worn(contact.pressure, worn, flowed=self._flowed), self.system.creep
             if creep is not None:

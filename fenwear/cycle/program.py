@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from fenwear.assembly import Clock, Placed, Tribosystem, with_case
+from fenwear.assembly import Clock, ContactSetup, Tribosystem, with_case
 from fenwear.case import Case, Cycle
 from fenwear.case.program import Stage, held_at, stages_of
 from fenwear.cycle.block import Block
@@ -110,14 +110,14 @@ def loading_of(system: Tribosystem, stage: Stage) -> Loading:
     return loading
 
 
-def _nominal(placed: Placed, key: str) -> float:
+def _nominal(placed: ContactSetup, key: str) -> float:
     """Return the normal force of the loads of a case, N."""
     if placed.normal_force <= 0:
         raise CaseError(InputError(key, "expected load_factor: supports carry the loads, not the contact alone"))
     return placed.normal_force
 
 
-def held(placed: Placed, step: int | None = None) -> tuple[Case, str] | None:
+def held(placed: ContactSetup, step: int | None = None) -> tuple[Case, str] | None:
     """Return the case of what acts at the end of a step of a program, held for ever, and the step in words.
 
     Args:

@@ -17,7 +17,7 @@ from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.remedies import SMALLER_STEPS
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 PARTS = (5, 25)  # of each phase; odd, so that one is in the middle
 
@@ -92,5 +92,5 @@ def _joined(ends: list[PhaseEnd], phase: int, before: ContactState | None, tempe
         PhaseRecord(phase, middle.contact, previous, adds, middle.friction_ratio),
         temperature,
         reduce(HalfCycleHeat.then, heats) if heats else None,
-        reduce(Worn.__add__, [end.worn for end in ends]),
+        reduce(WornDepths.__add__, [end.worn for end in ends]),
     )

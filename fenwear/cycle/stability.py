@@ -24,7 +24,7 @@ from fenwear.heat.periodic import CycleHeat
 from fenwear.interface import PressureCompliance
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.pressure_law import PressureLaw
-from fenwear.sliding.wear import PhasesWear, Worn
+from fenwear.sliding.wear import PhasesWear, WornDepths
 
 ROUNDING = 1e-12  # of a disturbance: what is left of it that is gone
 NEUTRAL = 1e-8  # distance of an eigenvalue from 1 that counts as none
@@ -93,8 +93,8 @@ def growth_rate(
     Args:
         system: The assembled problem.
         pressure: Of each phase (phases, n), MPa; positive where the nodes are in contact.
-        conductances: By which its temperatures have come about (phases, n), as `Steady.conductances`; by default those
-            of the nodes that these pressures close by more than rounding.
+        conductances: By which its temperatures have come about (phases, n), as `SteadyState.conductances`; by
+            default those of the nodes that these pressures close by more than rounding.
         implicit: Which of the two steps wears; explicit ones may grow where implicit ones do not.
 
     Raises:
@@ -277,7 +277,9 @@ class _Laws:
     worn_s: Array
 
 
-def _rested(system: Tribosystem, pressure: Array, heat: CycleHeat | None, states: Sequence[HeatState]) -> Worn | None:
+def _rested(
+    system: Tribosystem, pressure: Array, heat: CycleHeat | None, states: Sequence[HeatState]
+) -> WornDepths | None:
     """Return what laws remember at rest at pressures and temperatures of the phases; None without."""
     if system.layers.memory is None:
         return None
@@ -295,7 +297,7 @@ def _laws(
     pressure: Array,
     heat: CycleHeat | None,
     state: HeatState | None,
-    worn: Worn | None = None,
+    worn: WornDepths | None = None,
 ) -> _Laws:
     n, conditions = len(pressure), system.conditions(phase, pressure, worn=worn)
     surfaces = conditions.temperatures
@@ -333,7 +335,7 @@ def phase_tangent(
     conductance: Array | None = None,
     *,
     implicit: bool = True,
-    worn: Worn | None = None,
+    worn: WornDepths | None = None,
 ) -> Array:
     """Return what a phase makes of small changes of temperature and worn depth (dim + n, dim + n); collective.
 

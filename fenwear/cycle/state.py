@@ -13,7 +13,7 @@ from fenwear.contact import ContactState
 from fenwear.cycle.totals import Totals, none_yet
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class RunState:
     """
 
     half_cycle: int
-    worn: Worn
+    worn: WornDepths
     contacts: tuple[ContactState | None, ...]
     temperature: HeatState | None
     totals: Totals

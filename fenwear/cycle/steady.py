@@ -76,7 +76,7 @@ class SteadyHeat:
 
 
 @dataclass(frozen=True, repr=False)
-class Steady:
+class SteadyState:
     """The cyclic steady state; for one-way sliding the steady state, equal to the optimum.
 
     Attributes:
@@ -138,7 +138,7 @@ class Steady:
 
 
 @told_by_name
-def steady(system: Tribosystem, *, properties_within: float | None = None) -> Steady:
+def steady(system: Tribosystem, *, properties_within: float | None = None) -> SteadyState:
     """Solve for the cyclic steady state; collective.
 
     With heat the temperatures are periodic too; their reduced form is used whatever heat.operator is. Of a case with a
@@ -157,11 +157,11 @@ def steady(system: Tribosystem, *, properties_within: float | None = None) -> St
             properties of the temperatures.
     """
     system = at_step(system)
-    found: Steady = system.contact_law.end(system, properties_within)
+    found: SteadyState = system.contact_law.end(system, properties_within)
     return found
 
 
-def steady_state(system: Tribosystem, properties_within: float | None = None) -> Steady:
+def steady_state(system: Tribosystem, properties_within: float | None = None) -> SteadyState:
     """Return the cyclic steady state of gross sliding, see `steady`; collective."""
     begin = time.perf_counter()
     state = _of_these_bodies(system)
@@ -171,14 +171,14 @@ def steady_state(system: Tribosystem, properties_within: float | None = None) ->
     return replace(state, seconds=time.perf_counter() - begin)
 
 
-def _of_these_bodies(system: Tribosystem) -> Steady:
+def _of_these_bodies(system: Tribosystem) -> SteadyState:
     """Return the state of the bodies as they are, whatever its temperatures; collective."""
     _check_exists(system)
     prepared = with_reduced_heat(system)
     _check_sinks(prepared)
     check_memory(system)
 
-    def found() -> Steady:
+    def found() -> SteadyState:
         problem = SteadyInequality(prepared)
         return _result(problem, *_solve(problem))
 
@@ -198,7 +198,7 @@ def _check_sinks(system: Tribosystem) -> None:
             raise CaseError(no_heat_sink(body.body.name, body.enough_convection(power)))
 
 
-def _warmed(state: Steady, share: float) -> Steady:
+def _warmed(state: SteadyState, share: float) -> SteadyState:
     """Return the state whose bodies have the properties of its own temperatures; collective.
 
     Where the change does not fall from pass to pass, half of it is followed, then a quarter, and so on.
@@ -312,7 +312,7 @@ def _no_state_under_cap(problem: SteadyInequality) -> str:
     )
 
 
-def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, held: Held | None) -> Steady:
+def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, held: Held | None) -> SteadyState:
     system, contact = problem.system, solved.contact
     hardness, peak = system.layers.hardness, float(contact.pressure.max())
     if peak > hardness:
@@ -328,7 +328,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
     depths = np.where(np.abs(depths) > ZERO * np.abs(depths).max(initial=0.0), depths, 0.0)
     velocity = depths / problem.lengths
     middle, crept = slice(motion.positions // 2, None, motion.positions), problem.crept(contact.pressure)
-    return Steady(
+    return SteadyState(
         motion.stroke_directions,
         contact.pressure[middle],
         contact.pressure,
@@ -388,7 +388,7 @@ def _rigid_part(system: Tribosystem, values: Array, where: Mask) -> Array:
     return modes @ np.linalg.lstsq(modes * root[:, None], values * root, rcond=None)[0]
 
 
-def cycles_to_reach(system: Tribosystem, state: Steady, fraction: float, limit: int = 10_000_000) -> int | None:
+def cycles_to_reach(system: Tribosystem, state: SteadyState, fraction: float, limit: int = 10_000_000) -> int | None:
     """Return after how many cycles from the initial shape the pressures come this near to the end.
 
     Found by a run of cycle jumps; within the jump that crosses the distance is taken to decay exponentially.

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import PhasesWear
@@ -71,7 +71,7 @@ class Totals:
         return found
 
 
-def none_yet(system: Placed) -> Totals:
+def none_yet(system: ContactSetup) -> Totals:
     """Return the totals at the start: zero."""
     nodes = len(system.pair.weights)
     return Totals(np.zeros(len(SUMS)), np.zeros(nodes), np.zeros(nodes))
@@ -87,8 +87,8 @@ class PhaseMeter:
         wear: Of this phase alone.
     """
 
-    def __init__(self, system: Placed, phase: int, mu: Array, wear: PhasesWear) -> None:
-        pair, slid = system.pairs[phase], system.slid[phase]
+    def __init__(self, system: ContactSetup, phase: int, mu: Array, wear: PhasesWear) -> None:
+        pair, slid = system.pairs[phase], system.sliding_ratio[phase]
         areas = system.bodies.punch.thickness * pair.weights
         path = system.motion.phases[phase].distance * slid
         self._energy = mu * path
@@ -130,7 +130,7 @@ class PhaseMeter:
         return Totals(sums, self._energy * pressure, self._share * pressure)
 
 
-def _along_approach(system: Placed, phase: int, mu: Array) -> Array:
+def _along_approach(system: ContactSetup, phase: int, mu: Array) -> Array:
     """Return what pressure and friction of each node give the load, over the pressure (n,)."""
     rigid = system.rigids[phase]
     traction = rigid.pair.normal + system.phase_friction(phase, mu)
@@ -156,7 +156,7 @@ def approach(rigid: RigidEquilibrium) -> Array:
     return found
 
 
-def cycle_totals(system: Placed, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
+def cycle_totals(system: ContactSetup, pressure: Array, conditions: Sequence[ContactConditions]) -> Totals:
     """Return what a cycle adds at pressures (m, n) of its phases, with coefficients at their conditions.
 
     Raises:
@@ -169,7 +169,7 @@ def cycle_totals(system: Placed, pressure: Array, conditions: Sequence[ContactCo
     return adds
 
 
-def opposite_densities(system: Placed, phase: int) -> tuple[Array | None, Array | None]:
+def opposite_densities(system: ContactSetup, phase: int) -> tuple[Array | None, Array | None]:
     """Return the densities of what is worn at the contact nodes in a phase, of punch and strip, N s²/mm⁴."""
     pair, (punch, strip) = system.pairs[phase], system.bodies.densities
     if strip is None:

@@ -36,7 +36,7 @@ from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Basis, HeatState, ReducedBasis
 from fenwear.heat.fluxes import Exchanged, Fluxes, FluxFactor, FluxMap
 from fenwear.heat.side import Fineness, Side, StepPlan
-from fenwear.heat.stage import Ledger, PreparedStage, Stage
+from fenwear.heat.stage import HeatBalance, PreparedStage, Stage
 from fenwear.heat.step_map import PreparedStep, StepMap
 from fenwear.parallel import Team
 
@@ -339,7 +339,7 @@ class HeatExchange:
         each = np.eye(len(self.weights))
         by_flux = self._made(np.zeros((len(each), 2 * len(each))), np.hstack([each, each]))
         constant = np.asarray(self._kept([(kinds, none[0], none[0])], sources=True) / sum(self._stages), dtype=float)
-        ledger = Ledger(by_start, by_end, by_flux, constant)
+        ledger = HeatBalance(by_start, by_end, by_flux, constant)
         return PreparedStage(motions, [side.contacts[kind] for side, kind in of_kinds], ledger, self.heat.ambient)
 
     @property

@@ -24,7 +24,7 @@ TRIES = 3  # of the basis, each ten times as sharp as the one before, and follow
 
 
 @dataclass(frozen=True)
-class Wish:
+class BasisRequest:
     """What a basis is to be made of, and how good.
 
     Attributes:
@@ -51,7 +51,7 @@ def fitted_field(
     steps: list[HeatStep],
     own: Sequence[float],
     trial: Trial,
-    wish: Wish,
+    wish: BasisRequest,
     lasting: csr_array | None = None,
 ) -> tuple[ReducedField, float]:
     """Return the field on a basis that is enlarged until it is good, and its difference from the whole mesh.
@@ -96,7 +96,7 @@ def fitted_field(
 
 
 def _on(
-    basis: ReducedBasis, steps: Sequence[HeatStep], wish: Wish, inflow: csc_array, exact: Sequence[Array] | None
+    basis: ReducedBasis, steps: Sequence[HeatStep], wish: BasisRequest, inflow: csc_array, exact: Sequence[Array] | None
 ) -> ReducedField:
     """Return the field on a basis, of material at rest on its modes; collective."""
     if len(steps) == 1 and not any(wish.velocities):

@@ -23,7 +23,7 @@ from fenwear.arrays import Array
 from fenwear.heat.field import FullField, Functional, Propagation, ReducedField
 
 
-class PassingField:
+class ReciprocatingField:
     """The temperature of a strip in its own frame, over the steps of a motion to and fro.
 
     Attributes:

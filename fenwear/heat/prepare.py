@@ -16,12 +16,12 @@ from fenwear.heat.certificate import Trial, pressures, rigid_gaps
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
 from fenwear.heat.exchange import STAGE, HeatExchange
 from fenwear.heat.field import FullField, Functional, ReducedField
-from fenwear.heat.fitted import Wish, fitted_field
+from fenwear.heat.fitted import BasisRequest, fitted_field
 from fenwear.heat.halving import STEPS, HeatedPassage, chosen
 from fenwear.heat.kept_basis import Way, kept_basis, made
 from fenwear.heat.modal import ModalField
 from fenwear.heat.passage import Passage
-from fenwear.heat.passing import PassingField
+from fenwear.heat.passing import ReciprocatingField
 from fenwear.heat.passing_strip import MANY, PassingStrip
 from fenwear.heat.section import section_modes
 from fenwear.heat.side import Fineness, Reading, Side, StepPlan
@@ -107,7 +107,9 @@ def prepare_exchange(
             if reduced:
                 cycle = [step.of(body) for row in plans for step in row]
                 moving = [own[step] for step in cycle] + [v for v in others if body.body.name == "strip"]
-                wish = Wish(moving, duration, heat.reduction_tolerance, heat.reduction_difference, around, cycle, way)
+                wish = BasisRequest(
+                    moving, duration, heat.reduction_tolerance, heat.reduction_difference, around, cycle, way
+                )
                 rated = wish, _trial(body, pair, inflow, opened_gap(body, pair, rows, by), friction, plans)
             side, difference = _in_place(heat, body, steps, own, pair, inflow, rows, plans, around, rated, thickness)
         sides.append(side)
@@ -127,7 +129,7 @@ def _in_place(
     rows: Array,
     plans: Sequence[Sequence[StepPlan]],
     around: Surroundings,
-    rated: tuple[Wish, Trial] | None,
+    rated: tuple[BasisRequest, Trial] | None,
     thickness: float,
 ) -> tuple[Side, float | None]:
     """Return the side of a body whose contact stays in its place, and its difference from its whole mesh; collective.
@@ -309,7 +311,7 @@ def _passing(
         inner, difference = strip.fitted(step, duration, transfers, plans, opened, heat.reduction_difference)
     else:
         inner = FullField(body, [step], strip.loads)
-    field = PassingField(inner, strip.nodes, transfers, passage.middle.weights, heat.convection, heat.ambient)
+    field = ReciprocatingField(inner, strip.nodes, transfers, passage.middle.weights, heat.convection, heat.ambient)
     initial = total(body.body.mesh.comm, expansion @ np.full(body.owned, heat.initial))
     expanded = field.observe(expansion).less(initial).times(-1.0)
     readings = [
@@ -329,7 +331,7 @@ def _on_track(
     body: HeatBody,
     steps: list[HeatStep],
     own: Sequence[float],
-    wish: Wish,
+    wish: BasisRequest,
     trial: Trial,
     thickness: float,
 ) -> tuple[TrackField, float]:
@@ -442,7 +444,7 @@ def _side(
 
 
 def _on_balance(
-    field: FullField | ReducedField | TrackField | PassingField,
+    field: FullField | ReducedField | TrackField | ReciprocatingField,
     steps: Sequence[HeatStep],
     surroundings: Surroundings,
     contacts: Sequence[Functional],

@@ -22,7 +22,7 @@ from fenwear.heat.fluxes import FluxMap
 
 
 @dataclass(frozen=True)
-class Ledger:
+class HeatBalance:
     """The heat terms of a stage, per thickness.
 
     Attributes:
@@ -52,7 +52,7 @@ class PreparedStage:
     """
 
     def __init__(
-        self, motions: Sequence[Propagation], contacts: Sequence[Functional], ledger: Ledger, ambient: float
+        self, motions: Sequence[Propagation], contacts: Sequence[Functional], ledger: HeatBalance, ambient: float
     ) -> None:
         self.motions, self._ambient = motions, ambient
         self._split, n = len(motions[0].source), contacts[0].rows.shape[0]

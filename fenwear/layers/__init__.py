@@ -2,6 +2,6 @@
 
 from fenwear.layers.between import Layers, common_modulus, layers_of
 from fenwear.layers.memory import Evolution
-from fenwear.layers.step import LayerStep, Passing
+from fenwear.layers.step import LayerEvolution, LayerStep
 
-__all__ = ["Evolution", "LayerStep", "Layers", "Passing", "common_modulus", "layers_of"]
+__all__ = ["Evolution", "LayerEvolution", "LayerStep", "Layers", "common_modulus", "layers_of"]

@@ -33,7 +33,7 @@ from fenwear.interface.placement import in_space
 from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
 from fenwear.layers.debris import Debris
 from fenwear.layers.memory import Held, Memory
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
 DEBRIS = ("debris_thickness", "debris_ejected")
@@ -86,15 +86,15 @@ class Layers:
         """Whether something gives way by a law that is not linear."""
         return self.closure is not None or self.hardness < np.inf
 
-    def unworn(self, strip: int) -> Worn:
+    def unworn(self, strip: int) -> WornDepths:
         """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""
         state = np.zeros((len(self.rows), self.nodes))
         if self.debris is not None:
             state[self.row(DEBRIS[0])] = self.debris.initial
-        found = Worn(np.zeros(self.nodes), np.zeros(strip), state)
+        found = WornDepths(np.zeros(self.nodes), np.zeros(strip), state)
         return found if self.begun is None else self.with_held(found, self.begun)
 
-    def held(self, worn: Worn) -> Held:
+    def held(self, worn: WornDepths) -> Held:
         """Return what laws remember at these depths; what they do at the start where that is not told."""
         if self.begun is None:
             return Held(worn.between[len(self.rows) :], worn.carried)
@@ -103,7 +103,7 @@ class Layers:
         return Held(contact, worn.carried if len(worn.carried) else self.begun.strip)
 
     def known(
-        self, pair: ContactPair, worn: Worn | None, held: Held | None = None
+        self, pair: ContactPair, worn: WornDepths | None, held: Held | None = None
     ) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Return the states of laws at the contact's nodes, as those of punch and strip know them.
 
@@ -117,7 +117,7 @@ class Layers:
         held = held or (self.begun if worn is None else self.held(worn))
         return self.memory.known(np.vstack([held.contact, held.strip @ pair.wear_interpolation.T]))
 
-    def with_held(self, worn: Worn, held: Held) -> Worn:
+    def with_held(self, worn: WornDepths, held: Held) -> WornDepths:
         """Return the depths with other states of laws."""
         first = len(self.rows) - len(held.contact)
         return replace(worn, between=np.concatenate([worn.between[:first], held.contact]), carried=held.strip)
@@ -173,7 +173,7 @@ class Layers:
             "the mean pressure, so that nothing holds the punch"
         )
 
-    def settled(self, worn: Worn) -> Worn:
+    def settled(self, worn: WornDepths) -> WornDepths:
         """Return depths after a step that may have overshot: no thickness below zero, nothing lost, states bounded."""
         found = worn
         if self.memory is not None:

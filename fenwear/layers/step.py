@@ -10,13 +10,13 @@ from fenwear.arrays import Array
 from fenwear.layers.between import DEBRIS, PLASTIC, Layers
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Evolution, Held
-from fenwear.sliding.wear import PhasesWear, StepWear, Worn
+from fenwear.sliding.wear import PhasesWear, StepWear, WornDepths
 
 NUDGE = 1e-6  # of the largest pressure, for differences
 
 
 @dataclass(frozen=True)
-class Passing:
+class LayerEvolution:
     """What phases of the motion, one after the other, wear and do to what lies between.
 
     Attributes:
@@ -32,11 +32,13 @@ class Passing:
     evolution: Evolution | None = None
 
     @classmethod
-    def over(cls, layers: Layers, wear: PhasesWear, slid: Array, evolution: Evolution | None = None) -> Passing:
+    def over(cls, layers: Layers, wear: PhasesWear, slid: Array, evolution: Evolution | None = None) -> LayerEvolution:
         """Return what phases do that slide by these distances (m, n), mm."""
         return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid), evolution)
 
-    def worn(self, pressure: Array, before: Worn, cycles: float | None = None, flowed: Array | None = None) -> Worn:
+    def worn(
+        self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | None = None
+    ) -> WornDepths:
         """Return what the phases wear, and how the state of what lies between changes.
 
         Args:
@@ -54,12 +56,12 @@ class Passing:
             changes[rows] = self.debris_changes(pressure, before, cycles)
         if flowed is not None:
             changes[self.layers.row(PLASTIC)] = flowed
-        found = Worn(worn.punch, worn.strip, changes)
+        found = WornDepths(worn.punch, worn.strip, changes)
         return (
             found if self.evolution is None else self.layers.with_held(found, self._evolved(pressure, before, cycles))
         )
 
-    def _evolved(self, pressure: Array, before: Worn, cycles: float | None) -> Held:
+    def _evolved(self, pressure: Array, before: WornDepths, cycles: float | None) -> Held:
         """Return by how much the states of laws change, as `worn`."""
         assert self.evolution is not None
         evolution, held = self.evolution.at(pressure), self.layers.held(before)
@@ -67,14 +69,14 @@ class Passing:
             return evolution.after(held) - held
         return (evolution.implicit(held, cycles) - held).times(1 / cycles)
 
-    def filled(self, pressure: Array, before: Worn, cycles: float | None) -> Array | None:
+    def filled(self, pressure: Array, before: WornDepths, cycles: float | None) -> Array | None:
         """Return the gap that the states of laws fill more (n,), mm, as `worn`; None where they fill none."""
         memory = self.layers.memory
         if self.evolution is None or memory is None or not memory.fills.any():
             return None
         return memory.fills @ self._evolved(pressure, before, cycles).contact
 
-    def debris_changes(self, pressure: Array, before: Worn, cycles: float | None) -> tuple[Array, Array]:
+    def debris_changes(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
         """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
         if self.debris is None:
             return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
@@ -89,7 +91,7 @@ class Passing:
             return None
         return (self.debris.fed * self.wear.taken(pressure)).sum(axis=0) / self.debris.loss
 
-    def step(self, before: Worn, cycles: float | None = None, *, implicit: bool = True) -> LayerStep | None:
+    def step(self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True) -> LayerStep | None:
         """Return what the pressures of a step open in it; explicitly what gives way alone, None where nothing does.
 
         Args:
@@ -115,8 +117,8 @@ class LayerStep:
         implicit: Whether wear opens the gaps of the step itself; else what gives way alone.
     """
 
-    passing: Passing
-    before: Worn
+    passing: LayerEvolution
+    before: WornDepths
     cycles: float | None
     implicit: bool = True
 

@@ -22,12 +22,12 @@ from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.cycle.state import RunState, beginning, joined
 from fenwear.cycle.totals import SUMS, Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
-from fenwear.law import check_decided
+from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
+from fenwear.plausibility.stroke import stroke_warnings
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.final import FinalShape
-from fenwear.watch.stroke import stroke_warnings
 
 BODIES = ("punch", "strip")
 RECENT = 8  # systems kept, as a run and its measures ask for the same one
@@ -116,7 +116,7 @@ class Snapshot:
 
 
 @dataclass(frozen=True)
-class Course:
+class RunSamples:
     """A run: its first and last snapshots, and the cycles at the ends of its jumps."""
 
     first: Snapshot
@@ -139,7 +139,7 @@ class Model:
     evaluations: int = 0
     _bases: dict[tuple[str, ...], Tribosystem] = field(default_factory=dict, repr=False)
     _recent: dict[tuple[object, ...], Tribosystem] = field(default_factory=dict, repr=False)
-    _courses: dict[tuple[object, ...], Course] = field(default_factory=dict, repr=False)
+    _courses: dict[tuple[object, ...], RunSamples] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse a test program.
@@ -269,7 +269,7 @@ class Model:
         base = self._base(tuple(settings))
         watch = base if base.case.geometry == case.geometry else system
         reached: RunState | None = None
-        for block in integrate(system, None, lambda now: watch.outworn(now.worn)):
+        for block in integrate(system, None, lambda now: watch.mesh_update_due(now.worn)):
             reached = block.end
             snapshot = _of_block(block)
             yield snapshot
@@ -289,14 +289,14 @@ class Model:
         cycles: int,
         settings: Sequence[str] = (),
         sequence: Sequence[int] | None = None,
-    ) -> Course:
+    ) -> RunSamples:
         """Return a run to its end, as `run`; kept, so that several quantities of it cost one."""
         key = (tuple(sorted(values.items())), cycles, tuple(settings), None if sequence is None else tuple(sequence))
         if key not in self._courses:
             while len(self._courses) >= KEPT:
                 self._courses.pop(next(iter(self._courses)))
             taken = list(self.run(values, cycles, settings=settings, sequence=sequence))
-            self._courses[key] = Course(taken[0], taken[-1], tuple(int(one.cycle) for one in taken))
+            self._courses[key] = RunSamples(taken[0], taken[-1], tuple(int(one.cycle) for one in taken))
         return self._courses[key]
 
     def steady(self, values: Mapping[str, float], settings: Sequence[str] = ()) -> Snapshot:
@@ -370,7 +370,7 @@ def _stroke(system: Tribosystem) -> float:
     """Return how far the strip is moved in a cycle, mm, mean over the contact."""
     weights = system.pair.weights
     each = np.array([phase.distance for phase in system.motion.phases])
-    return float(each @ (system.slid @ weights)) / float(weights.sum())
+    return float(each @ (system.sliding_ratio @ weights)) / float(weights.sum())
 
 
 def _of_steps(block: Block) -> Snapshot:
@@ -378,7 +378,7 @@ def _of_steps(block: Block) -> Snapshot:
     system, strokes = block.system, block.system.motion.half_cycles
     steps: tuple[Any, ...] = block.steps[-strokes:]
     adds = Totals(block.adds.sums[-strokes:].sum(axis=0), np.zeros(0), np.zeros(0))
-    worn = reduce(Worn.__add__, [one.wear for one in steps])
+    worn = reduce(WornDepths.__add__, [one.wear for one in steps])
     surfaces = _worn_surfaces(system, block.end.worn, worn, adds, block.end.totals)
     records = [one.records for one in steps]
     warm = np.concatenate([one.temperature for one in records]) if records[0].heat.size else None
@@ -398,7 +398,7 @@ def _of_steps(block: Block) -> Snapshot:
 
 
 def _worn_surfaces(
-    system: Tribosystem, depth: Worn | None, rate: Worn, adds: Totals, totals: Totals | None = None
+    system: Tribosystem, depth: WornDepths | None, rate: WornDepths, adds: Totals, totals: Totals | None = None
 ) -> dict[str, WornSurface]:
     """Return both bodies' worn surfaces, nodes ascending along x.
 

@@ -9,7 +9,7 @@ import xarray
 from numpy.typing import NDArray
 
 from fenwear.report.course import shown_unit
-from fenwear.report.style import BLUE, GREY, RED, STANDARD, Look, panels
+from fenwear.report.style import BLUE, GREY, RED, STANDARD, Style, panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +37,7 @@ def outline(cells: NDArray[np.int64]) -> NDArray[np.int64]:
         path.append(following)
 
 
-def boundary_figure(fields: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def boundary_figure(fields: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the temperature round the punch from the middle of its contact on, and along the strip's upper surface."""
     figure, (around, along) = panels(2, 3.2, share_x=False, look=look)
     points = outline(fields.punch_cells.values)

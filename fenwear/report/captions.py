@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray
 
 from fenwear.report.lies_between import lies_between
-from fenwear.report.style import Look, direction_words, strip_moves
+from fenwear.report.style import Style, direction_words, strip_moves
 from fenwear.report.surface import cut_places, model_of
 from fenwear.results.sheet import BODIES
 
@@ -73,7 +73,7 @@ def _each(history: xarray.Dataset) -> str:
     return "Each contact through the middle of its own wear." if len(places) > 1 else ""
 
 
-def caption(name: str, history: xarray.Dataset, look: Look) -> str:
+def caption(name: str, history: xarray.Dataset, look: Style) -> str:
     """Return the caption of a figure of a run."""
     bodies = [body for body, end in BODIES.items() if f"wear{end}" in history]
     words, moves = direction_words(history), strip_moves(history)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-from fenwear.report.style import AXES, Look
+from fenwear.report.style import AXES, Style
 
 FORMATS = ("png", "pdf", "svg")
 LEAST, MOST = 50.0, 500.0  # mm
@@ -24,7 +24,7 @@ def chosen_formats(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def chosen_look(width: str, axis: str) -> Look:
+def chosen_look(width: str, axis: str) -> Style:
     """Return the look of figures of a width, such as "85 mm", over cycles, distance or time.
 
     Raises:
@@ -38,4 +38,4 @@ def chosen_look(width: str, axis: str) -> Look:
         raise CaseError(InputError("--width", f"expected {LEAST:g} to {MOST:g} mm, got {width!r}"))
     if axis not in AXES:
         raise CaseError(InputError("--axis", f"expected one of {', '.join(AXES)}, got {axis!r}"))
-    return Look(size / INCH, axis)
+    return Style(size / INCH, axis)

@@ -16,7 +16,7 @@ from fenwear.report.style import (
     DIRECTIONS,
     RED,
     STANDARD,
-    Look,
+    Style,
     direction_style,
     from_zero,
     legend_beside,
@@ -37,7 +37,7 @@ BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least
 
 
-def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def peak_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw largest pressure, width or area in contact and, with heat, largest temperature."""
     over = {
         "max_pressure": "largest pressure (MPa)",
@@ -66,7 +66,7 @@ def peak_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def convergence_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the change against one cycle ago and the distance to the optimal pressure."""
     over = {
         "periodicity": "change in a cycle, largest of a node (-)",
@@ -85,7 +85,7 @@ def convergence_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure
     return figure
 
 
-def volume_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def volume_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the worn volume and the specific wear rate of the bodies that wear."""
     figure, axes = panels(2, 2.7, look=look)
     x = look.course(history)
@@ -105,7 +105,7 @@ def volume_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def creep_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def creep_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw what is worn and what has crept, of each body and of a layer: largest depth and volume."""
     figure, axes = panels(2, 2.7, look=look)
     x = look.course(history)
@@ -130,7 +130,7 @@ def creep_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def scar_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the largest worn depths and the sizes of the scars, unless they are worn all the way round."""
     sizes = [n for n in ("scar_length", "scar_width") if any(f"{n}{end}" in history for end in BODIES.values())]
     figure, axes = panels(1 + len(sizes), 2.5, look=look)
@@ -155,7 +155,7 @@ def scar_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def place_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def place_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw a shaft's place in its bores over a run: the path of its middle, eccentricity and attitude angle."""
     figure, axes = panels(3, 2.7, share_x=False, look=look)
     x, bores = look.course(history), bores_of(history)
@@ -195,7 +195,7 @@ def bores_of(history: xarray.Dataset) -> dict[str, str]:
     return {name[len(start) + 1 :]: name[len(start) :] for name in map(str, history) if name.startswith(start)}
 
 
-def friction_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def friction_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw normal and friction force and the work of friction."""
     figure, axes = panels(2, 2.4, look=look)
     x = look.course(history)
@@ -221,7 +221,7 @@ WHERE_HEAT_GOES = {
 assert WHERE_HEAT_GOES.keys() == HEAT_TERMS.keys() - {"friction"}
 
 
-def heat_balance_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def heat_balance_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw where the friction heat of each half-cycle goes; ways that none goes are left out."""
     figure, (ax,) = panels(1, 3.8, look=look)
     friction, x = history.heat_friction, look.course(history)
@@ -298,7 +298,7 @@ def mark_few(points: Sized) -> dict[str, Any]:
     return {"marker": "o", "markersize": 3} if len(points) < 3 else {}
 
 
-def by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Look = STANDARD) -> None:
+def by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Style = STANDARD) -> None:
     """Draw a variable over the run, a line for each direction."""
     x = look.course(history)
     for d in directions_present(history):
@@ -307,7 +307,7 @@ def by_direction(ax: Axes, history: xarray.Dataset, name: str, look: Look = STAN
         ax.plot(x[rows], history[name][rows], dashes, color=colour, label=text, **mark_few(rows.nonzero()[0]))
 
 
-def run_axis(ax: Axes, history: xarray.Dataset, look: Look, *, logarithmic: bool = True) -> None:
+def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: bool = True) -> None:
     """Label the axis of the run: logarithmic where wear alone slows down, linear with heat's own pace."""
     x = look.course(history)
     first, last = float(x[0]), float(x[-1])

@@ -15,7 +15,7 @@ from fenwear.report.figures import FOLDER, all_figures, read_history
 from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.key_numbers import names_in, read_case
 from fenwear.report.sections import geometry_figure, stress_figure
-from fenwear.report.style import STANDARD, Look, name_bodies, wrapped
+from fenwear.report.style import STANDARD, Style, name_bodies, wrapped
 from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text
 
@@ -26,7 +26,7 @@ CAPTIONS = "captions.txt"
 DPI = 200
 
 
-def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDARD) -> dict[str, Figure]:
+def field_figures(directory: Path, case: Mapping[str, Any], look: Style = STANDARD) -> dict[str, Figure]:
     """Draw what the fields of the last half-cycle that has them show, by its name."""
     files = sorted((directory / "fields").glob("half_cycle_*.nc"))
     if not files:
@@ -42,7 +42,7 @@ def field_figures(directory: Path, case: Mapping[str, Any], look: Look = STANDAR
 
 
 def draw_figures(
-    directory: Path, half_cycles: Sequence[int] = (), look: Look = STANDARD, formats: Sequence[str] = ("png",)
+    directory: Path, half_cycles: Sequence[int] = (), look: Style = STANDARD, formats: Sequence[str] = ("png",)
 ) -> list[Path]:
     """Draw all figures of a run, and their captions, into its folder `figures`; return the paths."""
     folder = directory / FOLDER

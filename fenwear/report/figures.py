@@ -33,7 +33,7 @@ from fenwear.report.shown import chosen_half_cycles, cycle_means, early_half_cyc
 from fenwear.report.stick import stick_figures
 from fenwear.report.style import (
     STANDARD,
-    Look,
+    Style,
     contact_axis,
     from_zero,
     legend_beside,
@@ -78,7 +78,7 @@ def of_half_cycles(directory: Path, history: xarray.Dataset) -> xarray.Dataset:
     return history
 
 
-def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw the pressure in both directions, at each chosen half-cycle and the one beside it.
 
     What lies far beyond all later pressures has a panel of its own, so that nothing is cut off.
@@ -102,7 +102,7 @@ def pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: L
     return _along(history, figure, axes, "contact pressure p (MPa)", axes[: len(present)], look)
 
 
-def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw mean pressures of all directions up to some cycles: what is well posed where a contact's edge moves."""
     means = cycle_means(history, half_cycles)
     early = early_of(means)
@@ -114,7 +114,7 @@ def mean_pressure_figure(history: xarray.Dataset, half_cycles: Sequence[int], lo
     return _along(history, figure, axes, "mean pressure (MPa)", axes[:1], look)
 
 
-def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw the temperature along both contact surfaces at the chosen half-cycles."""
     figure, axes = panels(2, 3.0, look=look)
     x, label = along_contact(history)
@@ -129,7 +129,7 @@ def temperature_figure(history: xarray.Dataset, half_cycles: Sequence[int], look
 
 
 def _along(
-    history: xarray.Dataset, figure: Figure, axes: Sequence[Axes], name: str, with_mean: Sequence[Axes], look: Look
+    history: xarray.Dataset, figure: Figure, axes: Sequence[Axes], name: str, with_mean: Sequence[Axes], look: Style
 ) -> Figure:
     """Name the axes of pressures along a contact, some with their mean."""
     if is_conforming(history):
@@ -144,7 +144,7 @@ def _along(
     return figure
 
 
-def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look = STANDARD) -> dict[str, Figure]:
+def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style = STANDARD) -> dict[str, Figure]:
     """Draw every figure that the history has data for, by its name."""
     chosen = chosen_half_cycles(history, wanted)
     drawn: dict[str, Figure] = {}
@@ -170,11 +170,11 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Look 
     if bores_of(history):
         drawn["place"] = place_figure(history, look)
     if "sliding_distance" in history:
-        drawn["volume"] = volume_figure(history, Look(look.width, "distance"))
+        drawn["volume"] = volume_figure(history, Style(look.width, "distance"))
         drawn["scar"] = scar_figure(history, look)
         drawn["friction"] = friction_figure(history, look)
     if any(str(name).startswith("creep_volume") for name in history.data_vars):
-        drawn["creep"] = creep_figure(history, Look(look.width, "time"))
+        drawn["creep"] = creep_figure(history, Style(look.width, "time"))
     if "load_factor" in history:
         drawn["program"] = program_figure(history, look)
     drawn["convergence"] = convergence_figure(history, look)

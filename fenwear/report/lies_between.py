@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import xarray
 
-from fenwear.report.style import STANDARD, Look, contact_axis, from_zero, legend_beside, panels, shades
+from fenwear.report.style import STANDARD, Style, contact_axis, from_zero, legend_beside, panels, shades
 from fenwear.report.surface import along_contact
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def lies_between(history: xarray.Dataset) -> dict[str, str]:
     return found
 
 
-def between_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+def between_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw what lies between along the contact at the chosen half-cycles."""
     shown = lies_between(history)
     figure, axes = panels(len(shown), 2.4, look=look)

@@ -16,7 +16,7 @@ from fenwear.report.style import (
     GREY,
     NARROW,
     STANDARD,
-    Look,
+    Style,
     bar_place,
     colour_bar,
     from_zero,
@@ -95,7 +95,7 @@ def quantities_between(history: xarray.Dataset) -> dict[str, Quantity]:
 
 
 def map_figure(
-    history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int], look: Look = STANDARD
+    history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int], look: Style = STANDARD
 ) -> Figure:
     """Draw a quantity on its surface at each chosen half-cycle.
 
@@ -131,7 +131,7 @@ def map_figure(
     return figure
 
 
-def _map_panels(surface: Surface, count: int, look: Look) -> tuple[Figure, list[Axes]]:
+def _map_panels(surface: Surface, count: int, look: Style) -> tuple[Figure, list[Axes]]:
     """Return a figure of equal maps with the surface's border on each."""
     from matplotlib.collections import LineCollection
 
@@ -180,7 +180,7 @@ def _contact_edge(ax: Any, surface: Surface, pressure: Array) -> None:
         ax.tricontour(*surface.drawn(pressure), levels=[level], colors="black", linewidths=1.0)
 
 
-def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD, *, along: bool) -> Figure:
+def cuts_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD, *, along: bool) -> Figure:
     """Draw pressure, worn depths and temperatures along or across the sliding through the middle of the wear.
 
     Contacts with names stand beside each other, each cut through the middle of its own; below each other where the

@@ -19,7 +19,7 @@ from fenwear.report.html_page import Picture, picture, render
 from fenwear.report.key_numbers import flat, label_of, names_in, number_text, read_case, read_summary, unit_of
 from fenwear.report.pictures import DrawingError, draw_pictures
 from fenwear.report.shown import chosen_half_cycles
-from fenwear.report.style import STANDARD, Look
+from fenwear.report.style import STANDARD, Style
 from fenwear.report.surface import model_of
 from fenwear.report.turned import Turned, turned_map
 from fenwear.report.uncertainty import uncertainty_rows
@@ -42,7 +42,7 @@ def write_report(
     log: Callable[[str], None] = lambda message: None,
     *,
     complete: bool = False,
-    look: Look = STANDARD,
+    look: Style = STANDARD,
     formats: Sequence[str] = ("png",),
 ) -> list[Path]:
     """Draw a run's figures and write its report.html; return the files.
@@ -63,7 +63,7 @@ def write_report(
 
 
 def _write_report(
-    directory: Path, log: Callable[[str], None], complete: bool, look: Look, formats: Sequence[str]
+    directory: Path, log: Callable[[str], None], complete: bool, look: Style, formats: Sequence[str]
 ) -> list[Path]:
     paths = draw_figures(directory, read_case(directory).get("output", {}).get("figures_at", ()), look, formats)
     if complete:
@@ -124,7 +124,7 @@ class Places:
     rows: list[Row]
 
 
-def page(directory: Path, look: Look = STANDARD) -> str:
+def page(directory: Path, look: Style = STANDARD) -> str:
     """Return report.html of a run whose figures are drawn."""
     history, summary = read_history(directory), read_summary(directory)
     images, turned = _images(directory), _turned(history)

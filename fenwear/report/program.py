@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import xarray
 
-from fenwear.report.style import STANDARD, Look, panels
+from fenwear.report.style import STANDARD, Style, panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,7 +19,7 @@ ACTED = {
 }
 
 
-def program_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def program_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw over the run what acted: the load, the speed and the ambient temperature, where they change."""
     shown = [name for name in ACTED if name in history and _changes(history[name])]
     if "load" in shown and "load_factor" in shown:  # the same twice

@@ -18,7 +18,7 @@ from fenwear.report.style import (
     NARROW,
     RED,
     STANDARD,
-    Look,
+    Style,
     contact_axis,
     legend_beside,
     panels,
@@ -42,7 +42,7 @@ PLATE: Any = {"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1
 FILLS = {"punch": "#d6e4f0", "strip": "#f3e3d6"}
 
 
-def stress_figure(fields: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def stress_figure(fields: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the components of the stress and von Mises' stress along the contact surfaces of both bodies."""
     figure, axes = panels(2, 3.0, look=look)
     contact = _along(fields.punch_contact_x.values, fields.punch_contact_z.values)
@@ -82,7 +82,7 @@ def _contact_nodes(fields: xarray.Dataset, body: str) -> NDArray[np.int64]:
     return KDTree(points).query(np.column_stack([fields[f"{body}_contact_{a}"].values for a in "xz"]))[1]
 
 
-def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Look = STANDARD) -> Figure:
+def geometry_figure(fields: xarray.Dataset, case: Mapping[str, Any], look: Style = STANDARD) -> Figure:
     """Draw both bodies with their elements, supports, loads and coordinates: whole, and near the contact."""
     from matplotlib.lines import Line2D
 

@@ -13,7 +13,7 @@ from fenwear.arrays import Array
 from fenwear.report.gaps import gaps_of, parted
 from fenwear.report.style import (
     STANDARD,
-    Look,
+    Style,
     colour_bar,
     contact_axis,
     from_zero,
@@ -44,7 +44,7 @@ def surfaces_of(history: xarray.Dataset) -> dict[str, tuple[Any, Any, Any]]:
     return found
 
 
-def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw the surfaces as a profilometer sees them, the height over x: unworn, and worn at the chosen half-cycles.
 
     Depths are drawn along z: right where slopes are small, as those of worn surfaces are.
@@ -68,7 +68,7 @@ def profile_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Lo
     return figure
 
 
-def _outline_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look) -> Figure:
+def _outline_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style) -> Figure:
     """Draw round contacts as a tester of roundness sees them: their outlines, depths magnified."""
     worn = [end for body, end in BODIES.items() if f"wear{end}" in history and f"place{end}" in history]
     figure, axes = panels(len(worn), 5.0, look=look)
@@ -111,7 +111,7 @@ def worn_range(history: xarray.Dataset) -> tuple[float, float]:
     return float(x.min()), float(x.max())
 
 
-def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look = STANDARD) -> Figure:
+def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Style = STANDARD) -> Figure:
     """Draw what is worn off the bodies at the chosen half-cycles; the strip's depth downwards."""
     surfaces = surfaces_of(history)
     figure, axes = panels(len(surfaces), 3.0, look=look)
@@ -129,7 +129,7 @@ def shape_figure(history: xarray.Dataset, half_cycles: Sequence[int], look: Look
     return figure
 
 
-def wear_map_figure(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def wear_map_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the worn depth over place and run, a panel for each body that wears."""
     surfaces = surfaces_of(history)
     figure, axes = panels(len(surfaces), 3.0, look=look)

@@ -19,7 +19,7 @@ from fenwear.report.stick_course import (
     title,
     to_contact,
 )
-from fenwear.report.style import BLUE, RED, STANDARD, Look, from_zero, legend_beside, level_line, panels, shades
+from fenwear.report.style import BLUE, RED, STANDARD, Style, from_zero, legend_beside, level_line, panels, shades
 from fenwear.report.surface import model_of
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def chosen(history: xarray.Dataset, count: int = 5) -> list[int]:
     return sorted({int(np.abs(course - target).argmin()) for target in np.linspace(course[0], course[-1], count)})
 
 
-def loops(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def loops(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the fretting loops: tangential force over displacement, and over what is more than full stick's."""
     figure, (whole, beyond) = panels(2, 3.0, share_x=False, look=look)
     turns = history.displacement.units == "rad"
@@ -59,7 +59,7 @@ def loops(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def energy(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def energy(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw friction's work and the energy ratio over the cycles."""
     figure, (upper, lower) = panels(2, 2.2, look=look)
     x = course_axis(lower, history, look)
@@ -74,7 +74,7 @@ def energy(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw where the surfaces stick, slip and are open over the first and the last cycle."""
     from matplotlib.colors import ListedColormap
 
@@ -95,7 +95,7 @@ def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def tractions(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the tangential traction along the sliding between its bounds in the first and the last cycle."""
     places, line = first_and_last(history), line_along(history)
     figure, axes = panels(len(places), 2.8, look=look)
@@ -113,7 +113,7 @@ def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def stresses(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the stress along x in the strip's surface, its range over the cycle."""
     figure, (ax,) = panels(1, 3.0, look=look)
     for colour, place in shades(chosen(history, 3)):
@@ -127,7 +127,7 @@ def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def sliding_map(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw where each node slips: its slip in a cycle and its share of friction's work."""
     figure, (slip, work) = panels(2, 2.2, look=look)
     for colour, place in shades(chosen(history, 3)):
@@ -144,7 +144,7 @@ def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def stick_figures(history: xarray.Dataset, look: Look = STANDARD) -> dict[str, Figure]:
+def stick_figures(history: xarray.Dataset, look: Style = STANDARD) -> dict[str, Figure]:
     """Draw the figures of the time steps, by their names.
 
     Args:
@@ -155,7 +155,7 @@ def stick_figures(history: xarray.Dataset, look: Look = STANDARD) -> dict[str, F
         CaseError: the run has no such axis.
     """
     common = {"loops": loops, "tractions": tractions, "energy": energy}
-    own: dict[str, Callable[[xarray.Dataset, Look], Figure]] = (
+    own: dict[str, Callable[[xarray.Dataset, Style], Figure]] = (
         {
             "zones": stick_maps.zones,
             "traction_map": stick_maps.tractions,

@@ -11,7 +11,7 @@ import xarray
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import CaseError, InputError
-from fenwear.report.style import Look, contact_axis
+from fenwear.report.style import Style, contact_axis
 from fenwear.report.surface import along_contact, model_of, surface_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ THROUGH_MIDDLE = "place along the sliding, through the middle (mm)"
 MANY = 20  # cycles from which on a logarithmic axis shows more
 
 
-def course(history: xarray.Dataset, look: Look) -> Array:
+def course(history: xarray.Dataset, look: Style) -> Array:
     """Return where each recorded cycle begins on the axis that was chosen (k,).
 
     Raises:
@@ -41,7 +41,7 @@ def course(history: xarray.Dataset, look: Look) -> Array:
     return cycles
 
 
-def course_axis(ax: Axes, history: xarray.Dataset, look: Look) -> Array:
+def course_axis(ax: Axes, history: xarray.Dataset, look: Style) -> Array:
     """Label the axis of the run, logarithmic over many cycles, and return the places of the cycles on it (k,)."""
     x = course(history, look)
     ax.set_xlabel(look.label)
@@ -52,13 +52,13 @@ def course_axis(ax: Axes, history: xarray.Dataset, look: Look) -> Array:
     return x
 
 
-def cycle_name(history: xarray.Dataset, place: int, look: Look) -> str:
+def cycle_name(history: xarray.Dataset, place: int, look: Style) -> str:
     """Return a recorded cycle in words of the axis."""
     value = float(course(history, look)[place])
     return f"{value:,.0f}" if look.axis == "cycles" or value >= 1000 else f"{value:.4g}"
 
 
-def title(history: xarray.Dataset, place: int, look: Look) -> str:
+def title(history: xarray.Dataset, place: int, look: Style) -> str:
     """Return what stands above a panel of one recorded cycle."""
     name = cycle_name(history, place, look)
     return {"cycles": f"cycle {name}", "distance": f"after {name} m", "time": f"after {name} s"}[look.axis]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.report.stick_course import first_and_last, shown_steps, title, touched
-from fenwear.report.style import BLUE, RED, STANDARD, Look, colour_bar, name_panel, panels_of_maps
+from fenwear.report.style import BLUE, RED, STANDARD, Style, colour_bar, name_panel, panels_of_maps
 from fenwear.report.surface import Surface, surface_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def node_cells(surface: Surface) -> tuple[Array, NDArray[np.int64]]:
     return parts.reshape(-1, 4, 2), surface.cells.ravel()
 
 
-def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def zones(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw where the surfaces stick and slip at four times of a half-cycle, in the first and the last cycle."""
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Patch
@@ -60,7 +60,7 @@ def zones(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def tractions(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw size and direction of the tangential traction at the same times."""
     surface, steps = surface_of(history), shown_steps(history)
     places = first_and_last(history)
@@ -85,7 +85,7 @@ def tractions(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def sliding_map(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the slip of each node in a cycle and its work of friction, in the first and the last cycle."""
     surface, places = surface_of(history), first_and_last(history)
     figure, axes = _contact_maps(history, surface, 2, len(places), look)
@@ -106,7 +106,7 @@ def sliding_map(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
     return figure
 
 
-def stresses(history: xarray.Dataset, look: Look = STANDARD) -> Figure:
+def stresses(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
     """Draw the largest stress along the sliding in the strip's surface over the first and the last cycle."""
     surface, places = surface_of(history), first_and_last(history)
     figure, axes = _contact_maps(history, surface, 1, len(places), look)
@@ -137,7 +137,7 @@ def _few(surface: Surface, history: xarray.Dataset) -> Array:
 
 
 def _maps(
-    history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int], look: Look
+    history: xarray.Dataset, surface: Surface, places: Sequence[int], steps: Sequence[int], look: Style
 ) -> tuple[Figure, Any]:
     """Return a figure with a row of maps for each cycle, one for each time step."""
     figure, axes = _contact_maps(history, surface, len(places), len(steps), look)
@@ -147,7 +147,9 @@ def _maps(
     return figure, axes
 
 
-def _contact_maps(history: xarray.Dataset, surface: Surface, rows: int, columns: int, look: Look) -> tuple[Figure, Any]:
+def _contact_maps(
+    history: xarray.Dataset, surface: Surface, rows: int, columns: int, look: Style
+) -> tuple[Figure, Any]:
     """Return a figure of equal maps of the contact and a little more."""
     seen = surface.map[touched(history)]
     low, high = seen.min(axis=0), seen.max(axis=0)

@@ -42,7 +42,7 @@ AXES = {"cycles": ("cycles", "cycle"), "distance": ("sliding distance (m)", "sli
 
 
 @dataclass(frozen=True)
-class Look:
+class Style:
     """What a user chooses of the figures.
 
     Attributes:
@@ -85,7 +85,7 @@ class Look:
         return f"{value:,.0f}" if value >= 1000 else f"{value:.4g}"
 
 
-STANDARD = Look()
+STANDARD = Style()
 
 
 def direction_style(history: xarray.Dataset, direction: int) -> tuple[str, str, str]:
@@ -112,7 +112,7 @@ def strip_moves(data: xarray.Dataset) -> str:
 
 
 def panels(
-    count: int, height: float, *, columns: int = 1, share_x: bool = True, share_y: bool = False, look: Look = STANDARD
+    count: int, height: float, *, columns: int = 1, share_x: bool = True, share_y: bool = False, look: Style = STANDARD
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure of lettered panels below each other, each as high as given for the full width, inches.
 
@@ -187,7 +187,7 @@ def colour_bar(figure: Figure, drawn: Any, axes: Any, label: str, **where: Any) 
     return bar
 
 
-def panels_of_maps(rows: int, columns: int, size: Array, look: Look = STANDARD) -> tuple[Figure, Any]:
+def panels_of_maps(rows: int, columns: int, size: Array, look: Style = STANDARD) -> tuple[Figure, Any]:
     """Return a figure of equal maps (rows, columns), each of an extent (2,) in mm, and room for a bar of colours.
 
     The bar stands beside the maps; below them where the figure is narrow.
@@ -209,7 +209,7 @@ def panels_of_maps(rows: int, columns: int, size: Array, look: Look = STANDARD) 
     return figure, axes
 
 
-def bar_place(look: Look) -> dict[str, Any]:
+def bar_place(look: Style) -> dict[str, Any]:
     """Return where the bar of colours of maps stands, and its shape."""
     return {"location": "bottom", "aspect": 30} if look.width < NARROW else {"location": "right", "aspect": 30}
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.cycle import Block
 from fenwear.layers.between import DEBRIS, PLASTIC
 
@@ -31,14 +31,14 @@ OF_FLOW: dict[str, Variable] = {
 STATE, STATES = "state_", "states"  # how variables of states begin; where summary.json has them
 
 
-def variables(placed: Placed) -> dict[str, Variable]:
+def variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of what lies between the surfaces."""
     rows = placed.layers.rows
     own = {**(OF_DEBRIS if DEBRIS[0] in rows else {}), **(OF_FLOW if PLASTIC in rows else {})}
     return {**own, **_of_states(placed)}
 
 
-def _of_states(placed: Placed) -> dict[str, Variable]:
+def _of_states(placed: ContactSetup) -> dict[str, Variable]:
     memory, found = placed.layers.memory, dict[str, Variable]()
     if memory is not None:
         for states, over, end, body in (

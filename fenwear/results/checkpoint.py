@@ -35,7 +35,7 @@ from fenwear.heat.field import HeatState
 from fenwear.parallel import on_root
 from fenwear.results import nodal
 from fenwear.results.disk import check_room, writing, writing_together
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 FOLDER, NEW, OLD = "checkpoint", "checkpoint.new", "checkpoint.old"
 CASE, ARRAYS, EXTREMES = "case.toml", "state.npz", "extremes.json"
@@ -205,22 +205,22 @@ def _totals(totals: Totals) -> dict[str, Any]:
     return dict(zip(TOTALS, (totals.sums, totals.energy, totals.pressure), strict=True))
 
 
-def _between(worn: Worn) -> dict[str, Any]:
+def _between(worn: WornDepths) -> dict[str, Any]:
     return {BETWEEN: worn.between, CREPT: worn.crept, CARRIED: worn.carried}
 
 
-def _depths(names: tuple[str, str], worn: Worn) -> dict[str, Any]:
+def _depths(names: tuple[str, str], worn: WornDepths) -> dict[str, Any]:
     return dict(zip(names, (worn.punch, worn.strip), strict=True))
 
 
-def followed(directory: Path, system: Tribosystem) -> Worn | None:
+def followed(directory: Path, system: Tribosystem) -> WornDepths | None:
     """Return the worn depths that the meshes of a checkpoint follow, None where they are as made; collective.
 
     Raises:
         CaseError: there is no checkpoint, or it is of another case.
     """
     arrays = on_root(system.comm, lambda: _read(find(directory), system))
-    return Worn(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
+    return WornDepths(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
 
 
 def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
@@ -273,7 +273,7 @@ def load(directory: Path, system: Tribosystem) -> RunState:
         for p, g, a in zip(arrays["pressure"], arrays["gap"], arrays["rigid"], strict=True)
     )
     length, periodic = (int(arrays[name]) for name in ("jump_length", "periodic_phases"))
-    worn = Worn(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
+    worn = WornDepths(*(arrays[name] for name in (*WEAR, BETWEEN, CREPT, CARRIED)))
     totals = Totals(*(arrays[name] for name in TOTALS))
     memory = _memory(folder, system, arrays)
     return RunState(int(arrays["half_cycle"]), worn, contacts, temperature, totals, length, periodic, memory)

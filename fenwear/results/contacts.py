@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.supports import axes
 from fenwear.case.names import Names
@@ -99,7 +99,7 @@ def _force(last: Block, own: Mask) -> dict[str, float]:
     return {f"force_{axis}_N": float(force[component]) for axis, component in along.items()}
 
 
-def _worn(placed: Placed, surface: ContactSurface, own: Mask, depth: Array, volume: float) -> dict[str, Any]:
+def _worn(placed: ContactSetup, surface: ContactSurface, own: Mask, depth: Array, volume: float) -> dict[str, Any]:
     """Return what is worn off the nodes (n,) of one contact of a body."""
     geometry = scar_geometry(placed, surface)
     whole, deepest = float(surface.weights @ depth), int(np.where(own, depth, -np.inf).argmax())

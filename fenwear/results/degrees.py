@@ -15,7 +15,7 @@ ICE = 273.15  # K, at 0 degrees Celsius
 
 
 @dataclass(frozen=True)
-class Degrees:
+class TemperatureScale:
     """A scale of temperature.
 
     Attributes:
@@ -36,15 +36,15 @@ class Degrees:
         return kelvin - self.zero
 
 
-KELVIN, CELSIUS = Degrees(), Degrees("degC", ICE)
+KELVIN, CELSIUS = TemperatureScale(), TemperatureScale("degC", ICE)
 
 
-def degrees_of(case: Case) -> Degrees:
+def degrees_of(case: Case) -> TemperatureScale:
     """Return the scale that a case gives its temperatures in."""
     return CELSIUS if case.in_degrees else KELVIN
 
 
-def degrees_in(unit: str) -> Degrees:
+def degrees_in(unit: str) -> TemperatureScale:
     """Return the scale of a unit of a file."""
     return CELSIUS if unit == CELSIUS.unit else KELVIN
 

@@ -33,7 +33,7 @@ from fenwear.results.degrees import KELVIN, degrees_of
 from fenwear.results.disk import check_room, writing
 from fenwear.results.series import step_of
 from fenwear.results.vtkhdf import append
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:
     import xarray
@@ -81,7 +81,7 @@ def body_fields(
     phase: int,
     temperatures: tuple[Array, Array] | None,
     friction_ratio: Array | None = None,
-    worn: Worn | None = None,
+    worn: WornDepths | None = None,
 ) -> tuple[BodyFields, BodyFields]:
     """Return the fields of the punch and the strip; collective.
 
@@ -118,7 +118,7 @@ def body_fields(
 
 
 def _traction(
-    system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None, worn: Worn | None
+    system: Tribosystem, phase: int, pressure: Array, temperatures: tuple[Array, Array] | None, worn: WornDepths | None
 ) -> Array:
     """Return the traction of friction on the punch over this pressure, in space (n, 3); collective."""
     friction, surfaces = system.friction, None
@@ -235,7 +235,7 @@ def write_fields(
     half_cycle: int,
     fields: tuple[BodyFields, BodyFields],
     direction: int,
-    worn: Worn,
+    worn: WornDepths,
     pressure: Array,
 ) -> None:
     """Write the fields of a half-cycle into `directory`/fields; collective.
@@ -301,7 +301,7 @@ def _frame(system: Tribosystem) -> dict[str, Any]:
     return {"model": kind, "along": velocity / size, "normal": normal}
 
 
-def _contact_surfaces(system: Tribosystem, worn: Worn, pressure: Array) -> dict[str, Any]:
+def _contact_surfaces(system: Tribosystem, worn: WornDepths, pressure: Array) -> dict[str, Any]:
     """Return where the contact nodes of both bodies are, their pressure and wear, and what no mesh follows of it."""
     rest = worn if system.bodies.moved is None else worn - system.bodies.moved
     pair = system.pair

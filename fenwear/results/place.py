@@ -17,13 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.cycle import Block
 from fenwear.interface.equilibrium import is_translation
 from fenwear.results.forces import node_forces
 from fenwear.results.sheet import Variable
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 TRUE = 1e-3  # of the radius: how far the points of a round surface may be from a circle
 ARC = 2.5  # radius over the chord of the contact, up to which it is round
@@ -63,7 +63,7 @@ class Bore(NamedTuple):
     nodes: Mask
 
 
-def motions(placed: Placed) -> list[str]:
+def motions(placed: ContactSetup) -> list[str]:
     """Return the names of the free motions of both bodies: moved_z, turned_y_left, moved_x_strip."""
     found = []
     for k, mode in enumerate(placed.rigid.mode_names):
@@ -73,7 +73,7 @@ def motions(placed: Placed) -> list[str]:
     return found
 
 
-def variables(placed: Placed) -> dict[str, Variable]:
+def variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of a history that tell the bodies' place."""
     found: dict[str, Variable] = {}
     for name, mode in zip(motions(placed), placed.rigid.mode_names, strict=True):
@@ -133,7 +133,7 @@ def _eccentricity(block: Block, bore: Bore, *, named: bool) -> dict[str, Array]:
     }
 
 
-def bores_of(placed: Placed) -> dict[str, Bore]:
+def bores_of(placed: ContactSetup) -> dict[str, Bore]:
     """Return the shaft and the bore of each contact, by its name or "" where it is one.
 
     Of those alone in which one body is around the other, where a body is free to move across the axis.
@@ -182,7 +182,7 @@ def _apart(block: Block, nodes: Mask) -> Array:
     """
     system, pair = block.system, block.system.pair
     depths = zip(block.wear, block.wear_strip, strict=True)
-    undeformed = np.array([system.gap(0, Worn(np.asarray(one), np.asarray(other))) for one, other in depths])
+    undeformed = np.array([system.gap(0, WornDepths(np.asarray(one), np.asarray(other))) for one, other in depths])
     fields = pair.normal[nodes][:, [0, -1]]
     if pair.punch.dim == 3:
         y = pair.punch.x[nodes, 1]

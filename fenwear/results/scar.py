@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.interface import ContactPair
 from fenwear.results.surfaces import surface_cells
@@ -88,7 +88,7 @@ def extents(
     return np.stack(found, axis=1)
 
 
-def scar_geometry(placed: Placed, surface: ContactSurface) -> ScarGeometry:
+def scar_geometry(placed: ContactSetup, surface: ContactSurface) -> ScarGeometry:
     """Return where the nodes of the punch's or the strip's surface lie along and across the sliding."""
     cells = surface_cells(surface)
     edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)

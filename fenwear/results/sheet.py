@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
@@ -87,7 +87,7 @@ OF_A_BODY: dict[str, Variable] = {
 }
 
 
-def variables(placed: Placed) -> dict[str, Variable]:
+def variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of the sheet: of the bodies that wear, masses where a density is known."""
     found, plane = {**SLIDING, **(TURNING if turns(placed) else {})}, _is_plane(placed)
     surfaces = (placed.pair.punch, placed.pair.strip)
@@ -119,7 +119,7 @@ def of_the_scar(along: tuple[str, ...], extents: tuple[str, ...]) -> dict[str, V
     return found
 
 
-def places(placed: Placed, surface: ContactSurface, geometry: ScarGeometry) -> dict[str, Array]:
+def places(placed: ContactSetup, surface: ContactSurface, geometry: ScarGeometry) -> dict[str, Array]:
     """Return what tells where on a surface a scar is deepest, by its name: coordinates of the nodes (n,), mm.
 
     Of what is worn all the way round in a solid that across the sliding alone, in the plane none.
@@ -130,14 +130,14 @@ def places(placed: Placed, surface: ContactSurface, geometry: ScarGeometry) -> d
     return {axis: x[:, k] for k, axis in enumerate(axes(placed))} if geometry.names else {}
 
 
-def axes(placed: Placed) -> tuple[str, ...]:
+def axes(placed: ContactSetup) -> tuple[str, ...]:
     """Return the names of coordinates on the contact surface: x in the plane, r of rings, x, y and z of solids."""
     if placed.pair.punch.dim == 3:
         return ("x", "y", "z")
     return ("x",) if _is_plane(placed) else ("r",)
 
 
-def _is_plane(placed: Placed) -> bool:
+def _is_plane(placed: ContactSetup) -> bool:
     return placed.bodies.punch.law.kind in ("stress", "strain")
 
 
@@ -182,7 +182,7 @@ def values(block: Block) -> dict[str, Array]:
     return found
 
 
-def turns(placed: Placed) -> bool:
+def turns(placed: ContactSetup) -> bool:
     """Return whether the strip turns, so that friction has a torque."""
     return any(placed.sliding.field.turn) and not placed.motion.steps
 

@@ -24,7 +24,7 @@ from fenwear.stick.strain import along_sliding, directions
 
 if TYPE_CHECKING:
     from fenwear.stick.coulomb import Steps
-    from fenwear.stick.cycle import Records
+    from fenwear.stick.cycle import TimeStepRecords
 
 S = TypeVar("S", Block, Tribosystem)
 T = TypeVar("T")
@@ -94,7 +94,7 @@ def of_solids() -> dict[str, Variable]:
 @of_time_steps
 def columns(system: Tribosystem) -> dict[str, Column]:
     """Return what of time steps does not change in a run."""
-    pair, position = system.pair, system.lawful.rig.interface.middle
+    pair, position = system.pair, system.law_state.problem.interface.middle
     none = Column((STEP,), np.arange(1, most(system) + 1), {"units": "1", "long_name": "time step of the half-cycle"})
     if pair.punch.dim == 3:
         ways = directions(position)
@@ -114,13 +114,13 @@ def columns(system: Tribosystem) -> dict[str, Column]:
 @of_time_steps
 def attributes(system: Tribosystem) -> dict[str, Any]:
     """Return what a history says of a law that resolves half-cycles."""
-    rig = system.lawful.rig
-    return {"law": system.law, "friction": float(rig.friction[0]), "period": rig.program.period}
+    problem = system.law_state.problem
+    return {"law": system.law, "friction": float(problem.friction[0]), "period": problem.program.period}
 
 
 def most(system: Tribosystem) -> int:
     """Return the largest number of time steps of a half-cycle."""
-    return int(np.bincount([step.half_cycle for step in system.lawful.rig.program.steps]).max())
+    return int(np.bincount([step.half_cycle for step in system.law_state.problem.program.steps]).max())
 
 
 @of_time_steps
@@ -147,9 +147,9 @@ def _padded(value: Any, size: int) -> Array:
 
 
 def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
-    records, thick, rig = steps.records, system.bodies.punch.thickness, system.lawful.rig
-    program, pair = rig.program.steps, system.pair
-    turn = along_sliding(rig.interface.middle)
+    records, thick, problem = steps.records, system.bodies.punch.thickness, system.law_state.problem
+    program, pair = problem.program.steps, system.pair
+    turn = along_sliding(problem.interface.middle)
     traction, slip = (np.einsum("nam,knm->akn", turn, v) for v in (records.traction, records.slip))
     stuck, within = stuck_size(pair, steps)
     found: dict[str, Any] = {
@@ -161,9 +161,9 @@ def _row(system: Tribosystem, steps: Steps) -> dict[str, Any]:
         "slip": slip[0],
         "stick": records.sticking.astype(float),
         "surface_stress": surface_stress(system.case, records),
-        "friction_work_increment": thick * records.energy(rig.weights),
+        "friction_work_increment": thick * records.energy(problem.weights),
         "energy_ratio": steps.energy_ratio,
-        "energy_balance_error": records.balance_error(rig.weights),
+        "energy_balance_error": records.balance_error(problem.weights),
         "stick_width": stuck,
         "stick_width_within": within,
         "stick_area": stuck,
@@ -187,10 +187,10 @@ def stuck_size(pair: ContactPair, steps: Steps) -> tuple[float, float]:
     if pair.punch.dim == 3:
         rim = beside(pair.punch, stuck) & records.touched
         return float(pair.weights @ stuck), float(pair.weights @ rim) / 2
-    return zone_width(stick_edges(pair.x, stuck, records.slid.sum(axis=0), records.touched))
+    return zone_width(stick_edges(pair.x, stuck, records.slip_magnitude.sum(axis=0), records.touched))
 
 
-def surface_stress(case: Case, records: Records) -> Array:
+def surface_stress(case: Case, records: TimeStepRecords) -> Array:
     """Return the stress along the sliding in the strip's surface (k, n), MPa, from its strains and the pressure on it.
 
     The law of the strip's material, with sigma_zz = -p: in a solid, and with eps_yy = 0 in plane strain,
@@ -233,14 +233,14 @@ def numbers(last: Block) -> dict[str, Any]:
         "energy_ratio": float(found["energy_ratio"][cycle].mean()),
         f"{size}_{unit}": float(found[size][-1]),
         f"{size}_within_{unit}": float(found[f"{size}_within"][-1]),
-        "steps_per_half_cycle": len(system.lawful.rig.program.steps) / system.motion.half_cycles,
+        "steps_per_half_cycle": len(system.law_state.problem.program.steps) / system.motion.half_cycles,
     }
 
 
 @of_time_steps
 def extremes(block: Block) -> dict[str, float]:
     """Return what is largest over the time steps of a block, by the names of a run's extremes; temperatures in K."""
-    weights = block.system.lawful.rig.weights
+    weights = block.system.law_state.problem.weights
     steps = steps_of(block)
     found = {
         "largest_energy_balance_error": max(one.records.balance_error(weights) for one in steps),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.assembly import Placed, Tribosystem
+from fenwear.assembly import ContactSetup, Tribosystem
 from fenwear.cycle import Block
 from fenwear.heat.exchange import TERMS
 from fenwear.results import between, creep, place, sheet, steps
@@ -51,7 +51,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
     }
 
 
-def net_of(placed: Placed) -> ContactNet:
+def net_of(placed: ContactSetup) -> ContactNet:
     """Return the nodes of a contact and the facets between them."""
     return contact_net(placed.pair, placed.sliding.field, sheet.axes(placed))
 

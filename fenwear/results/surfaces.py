@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.subcells import linear_cells
 from fenwear.interface import ContactPair
@@ -72,7 +72,7 @@ def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
     return cells[(cells >= 0).all(axis=1)]
 
 
-def surface_columns(placed: Placed) -> dict[str, Column]:
+def surface_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
     return columns_of_pair(placed.pair, placed.sliding.field, with_strip=placed.strip_wears)
 
@@ -84,7 +84,7 @@ def columns_of_pair(pair: ContactPair, field: SlidingField, *, with_strip: bool)
     return columns | _columns(chart, pair.strip, "_strip") if with_strip else columns
 
 
-def part_columns(placed: Placed, plane: bool) -> dict[str, Column]:
+def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:
     """Return the named contact that each node of the surfaces is of, and in the plane its part where there are more."""
     ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.strip_wears else {})
     found = {}

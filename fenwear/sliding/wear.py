@@ -26,7 +26,7 @@ STIFF: Array = np.zeros(0)  # what bodies have crept that do not creep
 
 
 @dataclass(frozen=True)
-class Worn:
+class WornDepths:
     """Worn depths, and the states of what lies between the surfaces and of what creeps.
 
     Attributes:
@@ -43,17 +43,17 @@ class Worn:
     crept: Array = field(default_factory=lambda: STIFF)
     carried: Array = field(default_factory=lambda: NOTHING)
 
-    def __add__(self, other: Worn) -> Worn:
+    def __add__(self, other: WornDepths) -> WornDepths:
         pairs = ((self.between, other.between), (self.crept, other.crept), (self.carried, other.carried))
-        return Worn(self.punch + other.punch, self.strip + other.strip, *(_added(*pair) for pair in pairs))
+        return WornDepths(self.punch + other.punch, self.strip + other.strip, *(_added(*pair) for pair in pairs))
 
-    def __sub__(self, other: Worn) -> Worn:
+    def __sub__(self, other: WornDepths) -> WornDepths:
         return self + other.times(-1.0)
 
-    def times(self, factor: float) -> Worn:
+    def times(self, factor: float) -> WornDepths:
         """Return all of it times a factor."""
         kept = (factor * state for state in (self.between, self.crept, self.carried))
-        return Worn(factor * self.punch, factor * self.strip, *kept)
+        return WornDepths(factor * self.punch, factor * self.strip, *kept)
 
 
 def _added(one: Array, other: Array) -> Array:
@@ -127,14 +127,14 @@ class PhasesWear:
         bodies = [body.slope(pressure) for body in (self.punch, self.strip) if body is not None]
         return np.asarray(sum(bodies, np.zeros_like(pressure)))
 
-    def worn(self, pressure: Array) -> Worn:
+    def worn(self, pressure: Array) -> WornDepths:
         """Return what all phases wear off both bodies at pressures (m, n)."""
         first = self.pairs[0]
         strip = np.zeros(len(first.strip.weights))
         if self.strip is not None:
             for pair, depth in zip(self.pairs, self.strip.depth(pressure), strict=True):
                 strip += pair.wear_projection @ depth
-        return Worn(self.depth(pressure).sum(axis=0), strip)
+        return WornDepths(self.depth(pressure).sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
         """Return the gap that the wear of all phases opens in each of them (m, n), mm."""

@@ -1,12 +1,12 @@
 """Coulomb's law with stick: partial slip, fretting.
 
 Which nodes stick, slip or open is decided in `equations`, a time step of it solved in `increment`, with heat in
-`heated`; `cycle.Rig` goes through the steps of a cycle, `jump` over many; `coulomb` is the law for the controller,
-`fenwear.cycle`.
+`heated`; `cycle.PartialSlipProblem` goes through the steps of a cycle, `jump` over many; `coulomb` is the law for the
+controller, `fenwear.cycle`.
 """
 
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import Loaded, Position, StickInterface
+from fenwear.stick.interface import LoadEffect, Position, StickInterface
 from fenwear.stick.state import Imposed, StickState, untouched
 
-__all__ = ["Imposed", "Loaded", "Position", "StickInterface", "StickState", "advance", "untouched"]
+__all__ = ["Imposed", "LoadEffect", "Position", "StickInterface", "StickState", "advance", "untouched"]

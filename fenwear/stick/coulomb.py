@@ -31,13 +31,13 @@ from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.field import HeatState
 from fenwear.sliding.motion import make_motion
-from fenwear.sliding.wear import Worn
-from fenwear.stick.cycle import Records, Rig, RigState
+from fenwear.sliding.wear import WornDepths
+from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
 from fenwear.stick.interface import meshed
 from fenwear.stick.jump import FrettingCycle, first_cycle, jumped
-from fenwear.stick.setup import heated, unheated_rig
+from fenwear.stick.setup import heated, unheated_problem
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Memory:
         meshes: What tells apart the bodies that it belongs to.
     """
 
-    at: RigState
+    at: PartialSlipState
     cycle: FrettingCycle | None = None
     warm: tuple[HeatState, ...] = ()
     stuck: Array | None = None
@@ -73,13 +73,13 @@ class Steps:
         wear: Depths worn off both bodies in all of them.
     """
 
-    records: Records
+    records: TimeStepRecords
     before: Array
     stuck: Mask
     energy_ratio: float
     jump_error: float
     first: int
-    wear: Worn
+    wear: WornDepths
 
     @property
     def pressure(self) -> Array:
@@ -97,21 +97,21 @@ class StickSetup:
     """What the law has of a system.
 
     Attributes:
-        rig: The bodies, and what is done to them in a cycle.
+        problem: The bodies, and what is done to them in a cycle.
         fineness: Of its time steps; None where they are taken as they are given.
         meshes: What tells these bodies apart from those on other meshes or with other properties.
         ends: Where its time steps end, as numbers of the finest ones; None where they are taken as they are given.
     """
 
-    rig: Rig
+    problem: PartialSlipProblem
     fineness: Fineness | None
     meshes: float
     ends: Ends | None = None
 
 
-def touches(rig: Rig) -> bool:
+def touches(problem: PartialSlipProblem) -> bool:
     """Return whether the load brings the surfaces together; collective."""
-    return rig.led(lambda: bool(rig.beginning().contact.closed.any()))
+    return problem.led(lambda: bool(problem.beginning().contact.closed.any()))
 
 
 class Coulomb:
@@ -129,7 +129,7 @@ class Coulomb:
         """Return the system of the same case with the meshes or properties that these bodies have; collective."""
         same = bodies.punch is system.bodies.punch
         condensed = (system.condensed.punch, system.condensed.strip) if same else None
-        return system_of(system.case, bodies, law=self.name, condensed=condensed, ends=system.lawful.ends)
+        return system_of(system.case, bodies, law=self.name, condensed=condensed, ends=system.law_state.ends)
 
     def varied(self, system: Tribosystem, case: Case) -> Tribosystem:
         """Return the system of another case that shares the bodies that the change leaves; collective."""
@@ -144,9 +144,9 @@ class Coulomb:
             case.strip.temperatures,
         ):
             bodies = replace(bodies, heat=build_conduction(case, bodies.punch, bodies.strip, bodies.warmed))
-        moves = unheated_rig(case, bodies, condensed=condensed).interface.moves
+        moves = unheated_problem(case, bodies, condensed=condensed).interface.moves
         same = condensed if moves == system.condensed.strip_moves else None
-        ends = system.lawful.ends if same_steps(before, case) else None
+        ends = system.law_state.ends if same_steps(before, case) else None
         return system_of(case, bodies, law=self.name, condensed=same, ends=ends)
 
     def replicated(self, system: Tribosystem) -> bool:
@@ -155,7 +155,7 @@ class Coulomb:
 
     def elastic_length(self, system: Tribosystem) -> float:
         """Return the gap that unit pressures open on average, mm/MPa."""
-        return float(system.lawful.rig.interface.middle.elastic_length)
+        return float(system.law_state.problem.interface.middle.elastic_length)
 
     def check_touching(self, system: Tribosystem) -> None:
         """Make sure that the load brings the surfaces together; collective.
@@ -163,12 +163,12 @@ class Coulomb:
         Raises:
             CaseError: it does not.
         """
-        if not touches(system.lawful.rig):
+        if not touches(system.law_state.problem):
             raise CaseError(InputError("geometry", "the surfaces never meet under the load"))
 
     def end(self, system: Tribosystem, properties_within: float | None = None) -> FinalShape:  # noqa: ARG002
         """Return the shape to which partial slip wears; collective."""
-        return final_shape(system.lawful.rig)
+        return final_shape(system.law_state.problem)
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:
         """Return the step of one half-cycle; implicitly, of one cycle."""
@@ -207,20 +207,20 @@ def system_of(
         CaseError: what only the geometry can tell is wrong.
         ConvergenceError: a time step of the first cycle did not converge.
     """
-    rig = unheated_rig(case, bodies, fresh=fresh, condensed=condensed)
-    interface, fineness = meshed(rig.interface), None
+    problem = unheated_problem(case, bodies, fresh=fresh, condensed=condensed)
+    interface, fineness = meshed(problem.interface), None
     sliding = replace(interface.sliding, motion=make_motion(case.motion.model_copy(update={"positions": 1})))
     placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case)
     system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))
     if ends is not None:
-        rig = with_ends(rig, case, ends)
+        problem = with_ends(problem, case, ends)
     elif heat != "none":
-        rig = heated(rig, case)
-        if touches(rig):
-            rig, fineness = fine_enough(rig, case)
+        problem = heated(problem, case)
+        if touches(problem):
+            problem, fineness = fine_enough(problem, case)
             ends = fineness.ends
-    exchange = None if rig.heat is None else rig.heat.exchange
-    return replace(system, exchange=exchange, lawful=StickSetup(rig, fineness, _told_apart(bodies), ends))
+    exchange = None if problem.heat is None else problem.heat.exchange
+    return replace(system, exchange=exchange, law_state=StickSetup(problem, fineness, _told_apart(bodies), ends))
 
 
 def _told_apart(bodies: Bodies) -> float:
@@ -234,11 +234,11 @@ class _Run:
     """What steps over half-cycles and over many cycles share."""
 
     def __init__(self, system: Tribosystem, watch: Watch, loading: Loading) -> None:
-        setup: StickSetup = system.lawful
+        setup: StickSetup = system.law_state
         self.system, self.setup, self.loading = system, setup, loading
-        self.rig = setup.rig.watching(watch)
+        self.problem = setup.problem.watching(watch)
         self.strokes = system.motion.half_cycles
-        self.meter = Meter(system, self.rig)
+        self.meter = Meter(system, self.problem)
 
     def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
@@ -250,30 +250,30 @@ class _Run:
         exchange = self.system.exchange
         return None if exchange is None or state.temperature is None else exchange.own(state.temperature).values
 
-    def at(self, state: RunState, load: float) -> RigState:
+    def at(self, state: RunState, load: float) -> PartialSlipState:
         """Return where the time steps of a state are, with its own depths and temperatures."""
         memory: Memory | None = state.memory
         warm = self.temperature(state)
         if memory is None:
-            at = self.rig.beginning(state.worn, load)
+            at = self.problem.beginning(state.worn, load)
             return replace(at, temperature=at.temperature if warm is None else warm)
-        at, steps = memory.at, self.rig.program.steps
+        at, steps = memory.at, self.problem.program.steps
         if at.pressures is not None and len(at.pressures) != len(steps):
             n, m = at.contact.trial.shape
             none = np.full((len(steps), n), np.nan), np.full((len(steps), n, m), np.nan)
             at = replace(at, next_step=0, pressures=none[0], trials=none[1])
-        heating = np.zeros(len(self.rig.weights)) if at.heating is None else at.heating
-        at = replace(self.rig.shaped(at, state.worn), load=load, temperature=warm)
+        heating = np.zeros(len(self.problem.weights)) if at.heating is None else at.heating
+        at = replace(self.problem.shaped(at, state.worn), load=load, temperature=warm)
         at = replace(at, heating=None if warm is None else heating)
         while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
-            at, _ = self.rig.half_cycle(at)
-        return replace(self.rig.shaped(at, state.worn), temperature=warm)
+            at, _ = self.problem.half_cycle(at)
+        return replace(self.problem.shaped(at, state.worn), temperature=warm)
 
     def half_cycle(
         self,
         number: int,
         steps: Steps,
-        states: tuple[Worn, Totals],
+        states: tuple[WornDepths, Totals],
         adds: Totals,
         load: float,
     ) -> HalfCycle:
@@ -289,18 +289,18 @@ class _Run:
         records, stroke = steps.records, (number - 1) % self.strokes
         middle = self.middle(steps)
         contact = _contact(records, middle)
-        rig, step = self.rig, self.rig.program.steps[steps.first + middle]
-        position = rig.interface.position(step.offset)
+        problem, step = self.problem, self.problem.program.steps[steps.first + middle]
+        position = problem.interface.position(step.offset)
         pressed = records.pressure[middle] > 0
         f = np.concatenate([records.pressure[middle], records.traction[middle].T.ravel()])
         force = position.in_space(f) - records.pressure[middle][:, None] * position.pair.normal
         ratio = np.where(pressed[:, None], force, 0.0) / np.where(pressed, records.pressure[middle], 1.0)[:, None]
-        loaded = rig.interface.loaded(step.fraction)
+        loaded = problem.interface.loaded(step.fraction)
         equilibrium = replace(position.rigid, resultant=loaded.resultant)
         before = None if np.isnan(steps.before[middle]).any() else steps.before[middle]
         phase = PhaseRecord(stroke, contact, before, adds, ratio, equilibrium)
         heat = None
-        if rig.heat is not None:
+        if problem.heat is not None:
             punch, strip = records.temperature[-1]
             heat = HalfCycleHeat(punch, strip, records.heat.sum(axis=0), int(records.coupling.max()))
         return HalfCycle(number, [phase], states[0], states[1], heat, load, steps)
@@ -316,20 +316,20 @@ class HalfCycles(_Run):
 
     def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next half-cycle, and its record."""
-        rig, load = self.rig, self.loading(state.half_cycle + 0.5)
+        problem, load = self.problem, self.loading(state.half_cycle + 0.5)
         begin = self.at(state, load)
-        at, records = rig.half_cycle(begin)
+        at, records = problem.half_cycle(begin)
         first, number = begin.next_step, state.half_cycle + 1
         own = slice(first, first + len(records))
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
-        lost = rig.worn_in(records, first, begin)
+        lost = problem.worn_in(records, first, begin)
         worn = replace(state.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first)
         totals = state.totals + adds
-        stroke, n = state.half_cycle % self.strokes, len(rig.weights)
+        stroke, n = state.half_cycle % self.strokes, len(problem.weights)
         stuck = _known_stuck(state.memory, self.strokes, n)
         stuck[stroke] = records.stuck
-        ratio = _energy_ratio(records, rig.weights)
+        ratio = _energy_ratio(records, problem.weights)
         steps = Steps(records, before, np.asarray(stuck.all(axis=0)), ratio, 0.0, first, lost)
         record = self.half_cycle(number, steps, (worn, totals), adds, load)
         contacts = list(state.contacts)
@@ -367,28 +367,28 @@ class Jumps(_Run):
 
     def __call__(self, state: RunState, until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next jump that is accurate enough, and its last cycle."""
-        rig, strokes, exchange = self.rig, self.strokes, self.system.exchange
+        problem, strokes, exchange = self.problem, self.strokes, self.system.exchange
         now = self._cycle(state)
         load = self.loading(float(state.half_cycle))
         ends = replace(now, length=state.jump_length, end=replace(now.end, load=load))
-        then = jumped(rig, ends, until // strokes, self.tolerance)
+        then = jumped(problem, ends, until // strokes, self.tolerance)
         cycles = then.number - now.number
         number = then.number * strokes
         totals = state.totals + self._adds(now, then, cycles)
-        parts, old = _in_order(rig, then), _in_order(rig, now)
+        parts, old = _in_order(problem, then), _in_order(problem, now)
         stuck = np.array([part[1].stuck for part in parts])
         at_all = np.asarray(stuck.all(axis=0))
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
         adds = [self.meter(records, first) for first, records in parts]
         ended = replace(then.end, worn=then.worn, held=None)
-        lost = [rig.worn_in(records, first, ended) for first, records in parts]
+        lost = [problem.worn_in(records, first, ended) for first, records in parts]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])
             sums.insert(0, sums[0] - adds[k])
         for k, ((first, records), (_, earlier)) in enumerate(zip(parts, old, strict=True)):
             before = records.pressure - (records.pressure - earlier.pressure) / cycles
-            steps = Steps(records, before, at_all, _energy_ratio(records, rig.weights), then.error, first, lost[k])
+            steps = Steps(records, before, at_all, _energy_ratio(records, problem.weights), then.error, first, lost[k])
             record = self.half_cycle(number - strokes + 1 + k, steps, (depths[k], sums[k]), adds[k], then.end.load)
             contacts.append(record.phases[0].contact)
             made.append(record)
@@ -405,7 +405,7 @@ class Jumps(_Run):
         memory, exchange = state.memory, self.system.exchange
         if memory is None or memory.cycle is None or memory.meshes != self.setup.meshes:
             at = self.at(state, self.loading(float(state.half_cycle)))
-            return first_cycle(self.rig, at, state.worn, state.half_cycle // self.strokes, self.temperature(state))
+            return first_cycle(self.problem, at, state.worn, state.half_cycle // self.strokes, self.temperature(state))
         cycle: FrettingCycle = memory.cycle
         if exchange is None:
             return cycle
@@ -420,7 +420,7 @@ class Jumps(_Run):
         return self.meter.with_wear(found, then.worn - now.worn)
 
 
-def _contact(records: Records, step: int) -> ContactState:
+def _contact(records: TimeStepRecords, step: int) -> ContactState:
     own = slice(step, step + 1)
     return ContactState(records.pressure[own], records.gap[own], records.rigid[own], int(records.iterations[step]))
 
@@ -432,15 +432,15 @@ def _known_stuck(memory: Memory | None, strokes: int, nodes: int) -> Mask:
     return memory.stuck > 0
 
 
-def _energy_ratio(records: Records, weights: Array) -> float:
+def _energy_ratio(records: TimeStepRecords, weights: Array) -> float:
     """Return friction's work of a half-cycle over twice its largest force times half the stroke."""
     stroke, most = float(np.ptp(records.displacement)), float(np.abs(records.force).max())
     return records.energy(weights) / max(most * stroke, 1e-300)
 
 
-def _in_order(rig: Rig, cycle: FrettingCycle) -> list[tuple[int, Records]]:
+def _in_order(problem: PartialSlipProblem, cycle: FrettingCycle) -> list[tuple[int, TimeStepRecords]]:
     """Return the first steps and the records of a cycle's half-cycles in the order of the motion."""
-    steps, first, found = rig.program.steps, cycle.first_step, []
+    steps, first, found = problem.program.steps, cycle.first_step, []
     for records in cycle.half_cycles:
         found.append((first, records))
         first = (first + len(records)) % len(steps)
@@ -452,38 +452,38 @@ class Meter:
 
     Args:
         system: The bodies.
-        rig: What is done to them.
+        problem: What is done to them.
     """
 
-    def __init__(self, system: Tribosystem, rig: Rig) -> None:
-        self.system, self.rig = system, rig
+    def __init__(self, system: Tribosystem, problem: PartialSlipProblem) -> None:
+        self.system, self.problem = system, problem
         self.thickness = system.bodies.punch.thickness
 
-    def __call__(self, records: Records, first: int) -> Totals:
+    def __call__(self, records: TimeStepRecords, first: int) -> Totals:
         """Return what time steps add, the first of them that of this number in the cycle."""
-        rig, thick = self.rig, self.thickness
-        slid, pressure = records.slid, records.pressure
-        forces = pressure @ rig.weights
+        problem, thick = self.problem, self.thickness
+        slid, pressure = records.slip_magnitude, records.pressure
+        forces = pressure @ problem.weights
         carried = np.where(forces > 0, forces, 1.0)
-        distance = (pressure * slid) @ rig.weights / carried
+        distance = (pressure * slid) @ problem.weights / carried
         sums = dict.fromkeys(SUMS, 0.0)
         sums["distance"] = float(distance.sum())
-        sums["load_path"] = thick * float(((pressure * slid) @ rig.weights).sum())
-        steps = rig.program.steps
+        sums["load_path"] = thick * float(((pressure * slid) @ problem.weights).sum())
+        steps = problem.program.steps
         for k, way in enumerate(distance):
-            position = rig.interface.position(steps[(first + k) % len(steps)].offset)
+            position = problem.interface.position(steps[(first + k) % len(steps)].offset)
             f = np.concatenate([pressure[k], records.traction[k].T.ravel()])
             force = thick * position.in_space(f * position.weights)
             normal = thick * (pressure[k] * position.pair.weights)[:, None] * position.pair.normal
             sums["load_distance"] += float((force * approach(position.rigid)).sum()) * float(way)
             sums["drag_distance"] += float(np.linalg.norm((force - normal).sum(axis=0))) * float(way)
-        sums["work"] = thick * records.energy(rig.weights)
+        sums["work"] = thick * records.energy(problem.weights)
         energy = records.dissipated.sum(axis=0)
         share = records.duration / records.duration.sum()
         found = Totals(np.array([sums[name] for name in SUMS]), energy, share @ pressure)
-        return self.with_wear(found, rig.worn_in(records, first))
+        return self.with_wear(found, problem.worn_in(records, first))
 
-    def with_wear(self, totals: Totals, worn: Worn) -> Totals:
+    def with_wear(self, totals: Totals, worn: WornDepths) -> Totals:
         """Return the totals with the volumes and masses of these depths."""
         sums, pair = totals.sums.copy(), self.system.pair
         for body, depth, weights, density in zip(

@@ -16,11 +16,11 @@ from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS
 from fenwear.layers.memory import Held
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import Loaded, OppositeBodies, Position
+from fenwear.stick.interface import LoadEffect, OppositeBodies, Position
 from fenwear.stick.program import Program, TimeStep
 from fenwear.stick.state import Imposed, StickState, untouched
 from fenwear.stick.strain import surface_gradient, surface_strain
@@ -31,7 +31,7 @@ MOST_FRICTIONS, SAME_FRICTION = 50, 1e-9  # of a time step whose friction depend
 
 
 @dataclass(frozen=True)
-class Records:
+class TimeStepRecords:
     """k time steps of n contact nodes, m = d - 1 tangential directions; forces and work per thickness in the plane.
 
     Attributes:
@@ -84,14 +84,14 @@ class Records:
         return len(self.force)
 
     @property
-    def slid(self) -> Array:
+    def slip_magnitude(self) -> Array:
         """abs(slip) (k, n), mm."""
         return np.linalg.norm(self.slip, axis=2)
 
     @property
     def sticking(self) -> Mask:
         """Which nodes carry pressure and have not slipped (k, n)."""
-        return (self.pressure > 0) & (self.slid == 0)
+        return (self.pressure > 0) & (self.slip_magnitude == 0)
 
     @property
     def stuck(self) -> Mask:
@@ -114,13 +114,13 @@ class Records:
         return float(abs(terms[0] - terms[1] - terms[2] + terms[3]) / largest)
 
     @staticmethod
-    def joined(parts: Sequence[Records]) -> Records:
+    def joined(parts: Sequence[TimeStepRecords]) -> TimeStepRecords:
         """Return records one after the other."""
-        return Records(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Records)))
+        return TimeStepRecords(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(TimeStepRecords)))
 
 
 @dataclass(frozen=True)
-class RigState:
+class PartialSlipState:
     """Where a run is.
 
     Attributes:
@@ -143,7 +143,7 @@ class RigState:
 
     contact: StickState
     imposed: Imposed
-    worn: Worn
+    worn: WornDepths
     next_step: int = 0
     temperature: Array | None = None
     heating: Array | None = None
@@ -181,7 +181,7 @@ class _Slips(NamedTuple):
     temperature: Array | None
 
 
-class Rig:
+class PartialSlipProblem:
     """Two bodies, what is done to them, and their wear.
 
     Args:
@@ -203,7 +203,7 @@ class Rig:
         friction: Array,
         watch: Callable[[], object] = lambda: None,
         heat: StickHeat | None = None,
-        expanded: Callable[[Loaded, float], Loaded] = lambda loaded, _: loaded,
+        expanded: Callable[[LoadEffect, float], LoadEffect] = lambda loaded, _: loaded,
         laws: LocalLaws | None = None,
     ) -> None:
         self.expanded, self.laws = expanded, laws
@@ -211,14 +211,14 @@ class Rig:
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
 
-    def watching(self, watch: Callable[[], object]) -> Rig:
+    def watching(self, watch: Callable[[], object]) -> PartialSlipProblem:
         """Return the same with what is called before every time step."""
         return self._with(watch=watch)
 
-    def _with(self, **changed: Any) -> Rig:
+    def _with(self, **changed: Any) -> PartialSlipProblem:
         """Return the same with other arguments."""
         names = ("interface", "program", "wear", "friction", "watch", "heat", "expanded", "laws")
-        return Rig(**{**{name: getattr(self, name) for name in names}, **changed})
+        return PartialSlipProblem(**{**{name: getattr(self, name) for name in names}, **changed})
 
     def led(self, function: Callable[[], T]) -> T:
         """Call what goes on from condensed bodies, on rank 0 for all; collective.
@@ -228,19 +228,19 @@ class Rig:
         """
         return self.interface.team.lead(function)
 
-    def kept_at(self, heat: StickHeat, temperature: Array) -> Rig:
+    def kept_at(self, heat: StickHeat, temperature: Array) -> PartialSlipProblem:
         """Return the same at a temperature (dim,) that stays as it is."""
 
-        def expanded(loaded: Loaded, offset: float) -> Loaded:
+        def expanded(loaded: LoadEffect, offset: float) -> LoadEffect:
             return heat.expanded(loaded, temperature, offset)
 
         return self._with(heat=None, expanded=expanded)
 
-    def with_heat(self, heat: StickHeat | None) -> Rig:
+    def with_heat(self, heat: StickHeat | None) -> PartialSlipProblem:
         """Return the same with the heat of friction."""
         return self._with(heat=heat)
 
-    def driven(self, program: Program) -> Rig:
+    def driven(self, program: Program) -> PartialSlipProblem:
         """Return the same in other time steps, without heat."""
         return self._with(program=program, heat=None)
 
@@ -250,19 +250,19 @@ class Rig:
         ways = [abs(step.displacement) for step in self.program.steps if step.displacement is not None]
         return max(ways, default=0.0) or 1e-3 * float(self.weights.sum())
 
-    def unworn(self) -> Worn:
+    def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, and what lies between then."""
         found = self.interface.layers.unworn(len(self.interface.middle.pair.strip.weights))
         return found if self.interface.creep is None else replace(found, crept=self.interface.creep.beginning())
 
-    def shaped(self, at: RigState, worn: Worn) -> RigState:
+    def shaped(self, at: PartialSlipState, worn: WornDepths) -> PartialSlipState:
         """Return a state on another shape, whose bodies have crept as it says; what sticks stays where it stuck."""
         creep, contact = self.interface.creep, at.contact
         if creep is not None and contact.crept is not worn.crept:
             contact = creep.at(contact, worn.crept)
         return replace(at, worn=worn, held=None, contact=contact)
 
-    def beginning(self, shape: Worn | None = None, load: float = 1.0) -> RigState:
+    def beginning(self, shape: WornDepths | None = None, load: float = 1.0) -> PartialSlipState:
         """Return the state in which the first cycle begins: pressed, and moved to its start; collective.
 
         Args:
@@ -274,7 +274,7 @@ class Rig:
         """
         return self.led(partial(self._begun, shape, load))
 
-    def _begun(self, shape: Worn | None, load: float) -> RigState:
+    def _begun(self, shape: WornDepths | None, load: float) -> PartialSlipState:
         interface, program, worn = self.interface, self.program, shape or self.unworn()
         given = interface.loaded(None if program.steps[-1].fraction is None else 0.0).times(load)
         loaded = self.expanded(given, 0.0)
@@ -287,7 +287,7 @@ class Rig:
             state, before = advance(interface, state, before, imposed, self.friction), imposed
         if program.steps[0].force is not None:
             before = replace(before, displacement=None, force=state.force)
-        at = RigState(state, before, worn, load=load)
+        at = PartialSlipState(state, before, worn, load=load)
         for step in program.lead_in:
             at = self._stepped(at, step)
         steps, (n, m) = len(program.steps), state.trial.shape
@@ -296,14 +296,14 @@ class Rig:
             return at
         return replace(at, temperature=self.heat.initial(), heating=np.zeros_like(state.pressure))
 
-    def opening(self, position: Position, worn: Worn) -> Array:
+    def opening(self, position: Position, worn: WornDepths) -> Array:
         """Return the gap of the unloaded, worn bodies (n,), mm."""
         moved = self.interface.moved
         rest = worn if moved is None else worn - moved
         between = self.interface.layers.opening(worn.between)
         return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
 
-    def imposed(self, step: TimeStep, worn: Worn, load: float = 1.0) -> tuple[Position, Imposed]:
+    def imposed(self, step: TimeStep, worn: WornDepths, load: float = 1.0) -> tuple[Position, Imposed]:
         """Return the place of the strip in a time step, and what is imposed at its end; collective."""
         interface = self.interface
         position = interface.position(step.offset)
@@ -312,16 +312,16 @@ class Rig:
         duration = 0.0 if step.fraction is None else step.duration  # before the cycle begins nothing creeps
         return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration)
 
-    def step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
+    def step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state after a time step, and its record; the shape stays; collective."""
         return self.led(partial(self._step, at, step))
 
-    def _step(self, at: RigState, step: TimeStep) -> tuple[RigState, Records]:
+    def _step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         after = self._stepped(at, step)
         wear, held = self._passed(at, after, step)
         return replace(after, held=held), self._record(at, after, step, wear)
 
-    def _passed(self, at: RigState, after: RigState, step: TimeStep) -> tuple[LocalWear, Held | None]:
+    def _passed(self, at: PartialSlipState, after: PartialSlipState, step: TimeStep) -> tuple[LocalWear, Held | None]:
         """Return by what law a time step wears, and what laws remember at its end."""
         laws, layers, slipped = self.laws, self.interface.layers, np.linalg.norm(after.contact.slip, axis=1)
         if laws is None:
@@ -333,7 +333,7 @@ class Rig:
         (conditions,), end, _ = evolution.through(at.held or layers.held(at.worn))
         return laws.wear_at(conditions), evolution.memory.bounded(end)
 
-    def _stepped(self, at: RigState, step: TimeStep) -> RigState:
+    def _stepped(self, at: PartialSlipState, step: TimeStep) -> PartialSlipState:
         if self.laws is None or not self.laws.changes():
             return self._advanced(at, step, self.friction)
         laws, position = self.laws, self.interface.position(step.offset)
@@ -350,7 +350,7 @@ class Rig:
             "on p, or a smoother table may help"
         )
 
-    def _known(self, at: RigState) -> dict[str, Any]:
+    def _known(self, at: PartialSlipState) -> dict[str, Any]:
         """Return what is known of the nodes at the start of a time step, by the names of `LocalLaws.conditions`."""
         warm = None
         if self.heat is not None and at.temperature is not None:
@@ -358,7 +358,7 @@ class Rig:
             warm = punch, strip
         return {"temperatures": warm, "worn": at.worn, "slid": at.slid, "speed": 0.0 if at.speed is None else at.speed}
 
-    def _advanced(self, at: RigState, step: TimeStep, friction: Array) -> RigState:
+    def _advanced(self, at: PartialSlipState, step: TimeStep, friction: Array) -> PartialSlipState:
         """Return the state after a time step with friction mu (n,)."""
         self.watch()
         position, imposed = self.imposed(step, at.worn, at.load)
@@ -366,7 +366,7 @@ class Rig:
             state = advance(self.interface, at.contact, at.imposed, imposed, friction, position, at.near)
             return self._after(at, state, imposed, step)
 
-        def solved(loaded: Loaded, near: tuple[Array, Array] | None) -> StickState:
+        def solved(loaded: LoadEffect, near: tuple[Array, Array] | None) -> StickState:
             end = replace(imposed, loaded=loaded)
             return advance(self.interface, at.contact, at.imposed, end, friction, position, near or at.near)
 
@@ -382,21 +382,21 @@ class Rig:
             coupling=found.iterations,
         )
 
-    def _after(self, at: RigState, state: StickState, imposed: Imposed, step: TimeStep) -> RigState:
+    def _after(self, at: PartialSlipState, state: StickState, imposed: Imposed, step: TimeStep) -> PartialSlipState:
         pressures, trials = at.then(state)
         following = (at.next_step + 1) % len(self.program.steps)
-        after = RigState(state, imposed, at.worn, following, pressures=pressures, trials=trials, load=at.load)
+        after = PartialSlipState(state, imposed, at.worn, following, pressures=pressures, trials=trials, load=at.load)
         if self.laws is None:
             return after
         slipped = np.linalg.norm(state.slip, axis=1)
         before = np.zeros_like(slipped) if at.slid is None else at.slid
         return replace(after, slid=before + slipped, speed=slipped / step.duration)
 
-    def half_cycle(self, at: RigState) -> tuple[RigState, Records]:
+    def half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state at the end of the next half-cycle, and its records; the shape stays; collective."""
         return self.led(partial(self._half_cycle, at))
 
-    def _half_cycle(self, at: RigState) -> tuple[RigState, Records]:
+    def _half_cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, TimeStepRecords]:
         steps, parts, begin = self.program.steps, [], at
         number = steps[at.next_step].half_cycle
         while steps[at.next_step].half_cycle == number:
@@ -404,23 +404,25 @@ class Rig:
             parts.append(record)
             if at.next_step == 0:
                 break
-        records = Records.joined(parts)
+        records = TimeStepRecords.joined(parts)
         if self.heat is not None and begin.temperature is not None and at.temperature is not None:
             self.heat.check_bounds(begin.temperature, at.temperature, records.heat)
         return at, records
 
-    def cycle(self, at: RigState) -> tuple[RigState, list[Records]]:
+    def cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, list[TimeStepRecords]]:
         """Return the state a cycle later and the records of its half-cycles; the shape stays; collective."""
         return self.led(partial(self._cycle, at))
 
-    def _cycle(self, at: RigState) -> tuple[RigState, list[Records]]:
+    def _cycle(self, at: PartialSlipState) -> tuple[PartialSlipState, list[TimeStepRecords]]:
         found = []
         for _ in range(self.program.half_cycles):
             at, records = self.half_cycle(at)
             found.append(records)
         return at, found
 
-    def worn_in(self, records: Records, first: int, before: RigState | None = None, *, rate: bool = False) -> Worn:
+    def worn_in(
+        self, records: TimeStepRecords, first: int, before: PartialSlipState | None = None, *, rate: bool = False
+    ) -> WornDepths:
         """Return what the steps of a record wear off both bodies, and what becomes of what lies between.
 
         Args:
@@ -436,15 +438,17 @@ class Rig:
             for place in sorted(set(places)):
                 depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.interface.position(place).pair.wear_projection @ depth
-        worn = Worn(records.punch_depth.sum(axis=0), strip)
+        worn = WornDepths(records.punch_depth.sum(axis=0), strip)
         return worn if before is None else self._with_between(worn, records, first, before, rate=rate)
 
-    def _with_between(self, worn: Worn, records: Records, first: int, before: RigState, *, rate: bool) -> Worn:
+    def _with_between(
+        self, worn: WornDepths, records: TimeStepRecords, first: int, before: PartialSlipState, *, rate: bool
+    ) -> WornDepths:
         """Return what is worn with what steps do to what lies between; arguments as of `worn_in`."""
         layers, now = self.interface.layers, before.worn
         changes = np.zeros_like(now.between)
         if layers.debris is not None:
-            over, taken = layers.debris.over(records.slid), records.punch_depth + records.strip_depth
+            over, taken = layers.debris.over(records.slip_magnitude), records.punch_depth + records.strip_depth
             rows = [layers.row(name) for name in DEBRIS]
             thickness = now.between[rows[0]]
             changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
@@ -455,12 +459,12 @@ class Rig:
         held = layers.held(now)
         return layers.with_held(found, evolution.rate(held)[0] if rate else evolution.after(held) - held)
 
-    def evolution(self, records: Records, before: RigState) -> Evolution | None:
+    def evolution(self, records: TimeStepRecords, before: PartialSlipState) -> Evolution | None:
         """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""
-        slips = _Slips(records.pressure, records.slid, records.duration, records.temperature)
+        slips = _Slips(records.pressure, records.slip_magnitude, records.duration, records.temperature)
         return self._evolution(slips, before)
 
-    def _evolution(self, slips: _Slips, before: RigState) -> Evolution | None:
+    def _evolution(self, slips: _Slips, before: PartialSlipState) -> Evolution | None:
         """Return what steps that begin at a state do to the states that laws remember; None without."""
         memory, laws = self.interface.layers.memory, self.laws
         if memory is None or laws is None:
@@ -474,7 +478,7 @@ class Rig:
         conditions, pairs = self._conditions(slips, before), self._pairs(slips, before)
         return Evolution(memory, conditions, slips.duration, pairs, wearing, before.worn.strip)
 
-    def _conditions(self, slips: _Slips, before: RigState) -> list[ContactConditions]:
+    def _conditions(self, slips: _Slips, before: PartialSlipState) -> list[ContactConditions]:
         """Return the conditions of laws in steps that begin at a state: temperatures are those at the start of each."""
         laws, known = self.laws, self._known(before)
         assert laws is not None
@@ -495,12 +499,14 @@ class Rig:
             for k, pair in enumerate(self._pairs(slips, before))
         ]
 
-    def _pairs(self, slips: _Slips, before: RigState) -> list[ContactPair]:
+    def _pairs(self, slips: _Slips, before: PartialSlipState) -> list[ContactPair]:
         steps = self.program.steps
         places = [steps[(before.next_step + k) % len(steps)].offset for k in range(len(slips.slid))]
         return [self.interface.position(place).pair for place in places]
 
-    def _record(self, at: RigState, after: RigState, step: TimeStep, wear: LocalWear) -> Records:
+    def _record(
+        self, at: PartialSlipState, after: PartialSlipState, step: TimeStep, wear: LocalWear
+    ) -> TimeStepRecords:
         before, state, position = at.contact, after.contact, self.interface.position(step.offset)
         weights = position.pair.weights
         f = np.concatenate([state.pressure, state.traction.T.ravel()])
@@ -540,9 +546,9 @@ class Rig:
             float(after.coupling),
             state.rigid,
         )
-        return Records(*(np.asarray(value)[None] for value in values))
+        return TimeStepRecords(*(np.asarray(value)[None] for value in values))
 
-    def _heat_record(self, at: RigState, after: RigState) -> tuple[Array, Array, Array]:
+    def _heat_record(self, at: PartialSlipState, after: PartialSlipState) -> tuple[Array, Array, Array]:
         """Return the terms of the heat, the contact temperatures, and the conductances; empty without heat."""
         heat, none = self.heat, np.zeros(0)
         conductance = after.conductance

@@ -42,7 +42,7 @@ class ContactStatus(NamedTuple):
     pressure: Array
 
 
-class Moved(NamedTuple):
+class SurfaceDisplacement(NamedTuple):
     """What tractions alone move: the surfaces against each other (d n,), the punch's (n, d), the strip's (q, d)."""
 
     jump: Array
@@ -50,14 +50,14 @@ class Moved(NamedTuple):
     on_strip: Array
 
 
-class Found(NamedTuple):
+class StatusSolution(NamedTuple):
     """What solves the equations of a contact status: f (d n,), a, delta, the sign of the determinant, what moves."""
 
     f: Array
     rigid: Array
     displacement: float
     sign: int
-    moved: Moved | None = None
+    moved: SurfaceDisplacement | None = None
 
 
 class Step:
@@ -120,7 +120,7 @@ class Step:
             strip = strip + grown[1] * self.imposed.loaded.by_force[1]
         return (punch, strip, layer), creep.displaced(state)
 
-    def jumps(self, found: Found) -> tuple[Array, Array]:
+    def jumps(self, found: StatusSolution) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
         position = self.position
         j = position.compliance.apply(found.f) if found.moved is None else found.moved.jump
@@ -129,7 +129,7 @@ class Step:
             j[: self.n] += self.closure.closure(found.f[: self.n])
         return j[: self.n], j[self.n :].reshape(self.m, self.n).T
 
-    def solve(self, status: ContactStatus) -> Found:
+    def solve(self, status: ContactStatus) -> StatusSolution:
         """Return the solution of a contact status.
 
         Raises:
@@ -171,7 +171,7 @@ class Step:
         f[columns] = x[:k]
         f[n + closed[tied]] = ratio * f[closed[tied]]
         moved = float(x[-1] * self.length) if loose else float(self.imposed.displacement or 0.0)
-        return Found(f, x[k : k + r] * self.units, moved, sign * (-1) ** r)
+        return StatusSolution(f, x[k : k + r] * self.units, moved, sign * (-1) ** r)
 
     def _give_way(self, A: Array, b: Array, status: ContactStatus, closed: NDArray[np.int64]) -> None:
         """Add what gives way beside the bodies to the rows c g = 0, linearised at the pressure of the status.
@@ -200,7 +200,7 @@ class Step:
         pressures = np.searchsorted(np.flatnonzero(status.closed), nodes)
         A[rows, pressures[:, None]] -= self.mu[nodes, None] * direction
 
-    def status_of(self, found: Found) -> tuple[ContactStatus, float]:
+    def status_of(self, found: StatusSolution) -> tuple[ContactStatus, float]:
         """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
         n = self.n
         gap, slip = self.jumps(found)
@@ -214,7 +214,7 @@ class Step:
         status = ContactStatus(pushed > 0, slipping, trial, radius, np.maximum(pressure, 0.0))
         return status, float(wrong / max(pressure.max(), 1e-300))
 
-    def state(self, found: Found, iterations: int, *, unique: bool) -> StickState:
+    def state(self, found: StatusSolution, iterations: int, *, unique: bool) -> StickState:
         """Return the state at the end of the step, free of what rounding leaves in the laws."""
         n, position = self.n, self.position
         status, _ = self.status_of(found)
@@ -249,12 +249,12 @@ class Step:
             crept=crept,
         )
 
-    def _moved(self, f: Array) -> Moved:
+    def _moved(self, f: Array) -> SurfaceDisplacement:
         """Return what tractions (d n,) move; the jump, which is known then, is left out."""
         position, interface = self.position, self.interface
         force = position.in_space(f * position.weights)
         back = position.reading.T @ position.pair.placement.back(force)
-        return Moved(np.zeros(0), interface.punch.apply(force), -interface.strip.apply(back))
+        return SurfaceDisplacement(np.zeros(0), interface.punch.apply(force), -interface.strip.apply(back))
 
 
 def _solved(A: Array, b: Array) -> tuple[Array, int]:

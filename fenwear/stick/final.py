@@ -32,10 +32,10 @@ import scipy.optimize
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.errors import ConvergenceError
-from fenwear.sliding.wear import Worn
-from fenwear.stick.cycle import Records, Rig
+from fenwear.sliding.wear import WornDepths
+from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
 from fenwear.stick.edge import Edge, beside, stick_edges, zone_width
-from fenwear.stick.heat import Course
+from fenwear.stick.heat import HeatHistory
 
 FAR = 1e3  # times the largest gap: never closes
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
@@ -63,7 +63,7 @@ class FinalShape:
     pressure: Array
     depth: Array
     gap: Array
-    worn: Worn
+    worn: WornDepths
     pressures: Array
     size: float
     deepest: tuple[float, float] | None = None
@@ -72,7 +72,7 @@ class FinalShape:
     temperature: Array | None = None
 
 
-def stick_zone(rig: Rig) -> Mask:
+def stick_zone(problem: PartialSlipProblem) -> Mask:
     """Return the nodes that stick all through the second cycle without wear (n,); collective.
 
     What slips in the first cycle only, until it has settled, does not wear on. Finite bodies rock, and give way along
@@ -81,10 +81,10 @@ def stick_zone(rig: Rig) -> Mask:
     Raises:
         ConvergenceError: a time step did not converge.
     """
-    return rig.led(lambda: _second_cycle(rig).stuck)
+    return problem.led(lambda: _second_cycle(problem).stuck)
 
 
-def stick_zone_edges(rig: Rig) -> list[Edge]:
+def stick_zone_edges(problem: PartialSlipProblem) -> list[Edge]:
     """Return the ends of the stick zones of a plane contact in the second cycle without wear; collective.
 
     Raises:
@@ -92,24 +92,26 @@ def stick_zone_edges(rig: Rig) -> list[Edge]:
     """
 
     def found() -> list[Edge]:
-        records = _second_cycle(rig)
-        return stick_edges(rig.interface.middle.pair.x, records.stuck, records.slid.sum(axis=0), records.touched)
+        records = _second_cycle(problem)
+        return stick_edges(
+            problem.interface.middle.pair.x, records.stuck, records.slip_magnitude.sum(axis=0), records.touched
+        )
 
-    return rig.led(found)
-
-
-def _second_cycle(rig: Rig) -> Records:
-    settled, _ = rig.cycle(rig.beginning(_crept(rig, rig.unworn())))
-    return Records.joined(rig.cycle(settled)[1])
+    return problem.led(found)
 
 
-def _crept(rig: Rig, shape: Worn) -> Worn:
+def _second_cycle(problem: PartialSlipProblem) -> TimeStepRecords:
+    settled, _ = problem.cycle(problem.beginning(_crept(problem, problem.unworn())))
+    return TimeStepRecords.joined(problem.cycle(settled)[1])
+
+
+def _crept(problem: PartialSlipProblem, shape: WornDepths) -> WornDepths:
     """Return a shape whose bodies have crept as far as its cycles let them.
 
     Raises:
         ConvergenceError: something creeps without an end, or cycle and creep do not come together.
     """
-    creep = rig.interface.creep
+    creep = problem.interface.creep
     if creep is None:
         return shape
     if creep.endless:
@@ -118,10 +120,10 @@ def _crept(rig: Rig, shape: Worn) -> Worn:
             "or give it terms alone"
         )
 
-    def advance(crept: Array) -> tuple[Array, Worn, bool]:
+    def advance(crept: Array) -> tuple[Array, WornDepths, bool]:
         own = replace(shape, crept=crept)
-        at, _ = rig.cycle(rig.beginning(own))
-        return creep.lasting(crept, at.contact.crept, rig.program.period), own, False
+        at, _ = problem.cycle(problem.beginning(own))
+        return creep.lasting(crept, at.contact.crept, problem.program.period), own, False
 
     def close(change: Array, crept: Array) -> bool:
         return float(np.abs(change).max()) <= SAME * max(float(np.abs(crept).max()), 1e-300)
@@ -130,11 +132,11 @@ def _crept(rig: Rig, shape: Worn) -> Worn:
     return fixed_point(advance, first, close, "what creeps, and the cycle that it belongs to, did not come together")
 
 
-def final_shape(rig: Rig, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
+def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None = None) -> FinalShape:
     """Return the shape to which partial slip wears; collective. With heat it and its temperatures go together.
 
     Args:
-        rig: The bodies and what is done to them.
+        problem: The bodies and what is done to them.
         stick: The zone that never slips, as nodes (n,) or, in the plane, by its two ends; by default that of the second
             cycle, see `stick_zone`.
 
@@ -142,66 +144,66 @@ def final_shape(rig: Rig, stick: Mask | Sequence[Edge] | None = None) -> FinalSh
         ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
         CaseError: the bodies lose no heat.
     """
-    return rig.led(partial(_with_heat, rig, stick))
+    return problem.led(partial(_with_heat, problem, stick))
 
 
-def _with_heat(rig: Rig, stick: Mask | Sequence[Edge] | None) -> FinalShape:
-    heat = rig.heat
+def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
+    heat = problem.heat
     if heat is None:
-        return _final_shape(rig, stick)
-    pressures = rig.beginning().contact.pressure[None].repeat(len(rig.program.steps), axis=0)
-    before: Array = np.zeros((2, len(rig.weights)))
+        return _final_shape(problem, stick)
+    pressures = problem.beginning().contact.pressure[None].repeat(len(problem.program.steps), axis=0)
+    before: Array = np.zeros((2, len(problem.weights)))
     for _ in range(MOST_TIMES):
         conductance = np.array([heat.conductance(pressure) for pressure in pressures])
-        course = Course(list(range(len(pressures))), np.zeros_like(pressures), conductance)
+        course = HeatHistory(list(range(len(pressures))), np.zeros_like(pressures), conductance)
         warm = heat.through(course).at_rest()
-        found, now = _final_shape(rig.kept_at(heat, warm), stick), heat.surfaces(warm)
+        found, now = _final_shape(problem.kept_at(heat, warm), stick), heat.surfaces(warm)
         if np.abs(now - before).max() <= SAME * max(float(np.abs(now).max()), 1e-300):
             return replace(found, temperature=now)
         pressures, before = found.pressures, now
     raise ConvergenceError(f"contact and temperatures of the end did not come together in {MOST_TIMES} times")
 
 
-def _final_shape(rig: Rig, stick: Mask | Sequence[Edge] | None) -> FinalShape:
+def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
     """Return the shape of bodies whose temperatures stay."""
     if isinstance(stick, np.ndarray):
-        return _of_nodes(rig, stick)
-    if stick is None and rig.interface.middle.pair.punch.dim == 3:
-        return _of_surface(rig, stick_zone(rig))
-    edges = stick_zone_edges(rig) if stick is None else stick
-    found = _of_edges(rig, edges) if len(edges) == 2 else None
+        return _of_nodes(problem, stick)
+    if stick is None and problem.interface.middle.pair.punch.dim == 3:
+        return _of_surface(problem, stick_zone(problem))
+    edges = stick_zone_edges(problem) if stick is None else stick
+    found = _of_edges(problem, edges) if len(edges) == 2 else None
     if found is not None:
         return found
-    zone = np.zeros(len(rig.weights), dtype=bool)
+    zone = np.zeros(len(problem.weights), dtype=bool)
     for left, right in zip(edges[::2], edges[1::2], strict=True):
         zone[left.node : right.node + 1] = True
-    return _of_surface(rig, zone)
+    return _of_surface(problem, zone)
 
 
-def _of_nodes(rig: Rig, zone: Mask) -> FinalShape:
+def _of_nodes(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
     """Return the shape with a zone of whole nodes."""
-    return _shape(rig, zone, _carried(rig, zone), float(rig.weights @ zone))
+    return _shape(problem, zone, _carried(problem, zone), float(problem.weights @ zone))
 
 
-def _of_surface(rig: Rig, zone: Mask) -> FinalShape:
+def _of_surface(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
     """Return the shape with a zone of whole nodes, and what it is with those beside its edge and without its own."""
-    found, surface = _of_nodes(rig, zone), rig.interface.middle.pair.punch
+    found, surface = _of_nodes(problem, zone), problem.interface.middle.pair.punch
     wider, rim = beside(surface, zone), beside(surface, ~zone)
     inner = zone & ~rim
-    other = [_of_nodes(rig, one) if one.any() else found for one in (zone | wider, inner)]
-    deepest, volume = _ranges(rig, [one.depth for one in other])
-    return replace(found, deepest=deepest, volume=volume, within=float(rig.weights @ wider) / 2)
+    other = [_of_nodes(problem, one) if one.any() else found for one in (zone | wider, inner)]
+    deepest, volume = _ranges(problem, [one.depth for one in other])
+    return replace(found, deepest=deepest, volume=volume, within=float(problem.weights @ wider) / 2)
 
 
-def _of_edges(rig: Rig, edges: Sequence[Edge]) -> FinalShape | None:
+def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape | None:
     """Return the shape with a zone between two located ends; None where what is beside it does not tell them."""
-    x = rig.interface.middle.pair.x
+    x = problem.interface.middle.pair.x
 
     @lru_cache
     def between(left: int, right: int) -> tuple[Array, Array]:
         zone = np.zeros(len(x), dtype=bool)
         zone[left : right + 1] = True
-        return _carried(rig, zone)
+        return _carried(problem, zone)
 
     nodes = [edge.node for edge in edges]
     pairs, ends = list[tuple[int, int]](), list[tuple[float, float]]()
@@ -211,7 +213,7 @@ def _of_edges(rig: Rig, edges: Sequence[Edge]) -> FinalShape | None:
             own = [*nodes[:k], node, *nodes[k + 1 :]]
             if own[0] >= own[1] or not 0 <= node < len(x):
                 return None
-            return _end_of_nodes(rig, own[0], own[1], edge.side)
+            return _end_of_nodes(problem, own[0], own[1], edge.side)
 
         here = end(edge.node)
         if here is None:
@@ -238,12 +240,12 @@ def _of_edges(rig: Rig, edges: Sequence[Edge]) -> FinalShape | None:
 
     width, within = zone_width(edges)
     zone = np.asarray((x > edges[0].x) & (x < edges[1].x))
-    found = _shape(rig, zone, blended(0.0), width)
-    deepest, volume = _ranges(rig, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)])
+    found = _shape(problem, zone, blended(0.0), width)
+    deepest, volume = _ranges(problem, [np.maximum(-blended(shift)[1], 0.0) for shift in (1.0, -1.0)])
     return replace(found, deepest=deepest, volume=volume, within=within)
 
 
-def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
+def _end_of_nodes(problem: PartialSlipProblem, first: int, last: int, side: int) -> float | None:
     """Return where the contact of a zone of nodes ends, mm; None where too few nodes are beside it.
 
     None, too, where what lies between gives way by a law that is not linear.
@@ -251,21 +253,21 @@ def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
     Beside a flat punch of this zone the surface goes down by kappa arcosh(x / c), x from the middle; kappa and the
     edge c follow from the second and third node. The first one carries what the discrete edge makes of it.
     """
-    position, creep = rig.interface.middle, rig.interface.creep
+    position, creep = problem.interface.middle, problem.interface.creep
     if creep is not None:
         position = creep.grown(position, np.inf)
-    x, n, zone = position.pair.x, len(rig.weights), np.arange(first, last + 1)
+    x, n, zone = position.pair.x, len(problem.weights), np.arange(first, last + 1)
     places = (last if side > 0 else first) + side * np.array([2, 3])
     if places.min() < 0 or places.max() >= n:
         return None
-    if rig.interface.layers.closure is not None:
+    if problem.interface.layers.closure is not None:
         return None
     r, k = position.modes.shape[1], len(zone)
     scale = float(np.median(position.compliance.diagonal()[:n]))
     system, load = np.zeros((k + r, k + r)), np.zeros(k + r)
     system[:k, :k] = position.compliance.entries(zone, zone) / scale
     system[:k, k:], system[k:, :k] = position.modes[zone], position.balance[:, zone]
-    load[k:] = -rig.interface.loaded(None).resultant
+    load[k:] = -problem.interface.loaded(None).resultant
     if not load.any():
         return None
     found = np.linalg.solve(system, load)
@@ -286,14 +288,14 @@ def _end_of_nodes(rig: Rig, first: int, last: int, side: int) -> float | None:
     return float(middle + side * edge)
 
 
-def _ranges(rig: Rig, depths: Sequence[Array]) -> tuple[tuple[float, float], tuple[float, float]]:
+def _ranges(problem: PartialSlipProblem, depths: Sequence[Array]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the largest depths and the worn volumes of two shapes, the smaller first."""
     deepest = sorted(float(depth.max()) for depth in depths)
-    volume = sorted(float(rig.weights @ depth) for depth in depths)
+    volume = sorted(float(problem.weights @ depth) for depth in depths)
     return (deepest[0], deepest[1]), (volume[0], volume[1])
 
 
-def _carried(rig: Rig, zone: Mask) -> tuple[Array, Array]:
+def _carried(problem: PartialSlipProblem, zone: Mask) -> tuple[Array, Array]:
     """Return pressures (k, n) and least gap (n,) of a cycle with contact in a zone only; negative where they overlap.
 
     Raises:
@@ -304,21 +306,21 @@ def _carried(rig: Rig, zone: Mask) -> tuple[Array, Array]:
             "no final shape exists: every node slips in a cycle, so that wear goes on for ever; expected a smaller "
             "stroke or force, or contact.law = 'gross-sliding'"
         )
-    unworn = rig.unworn()
-    gap = rig.opening(rig.interface.middle, unworn)
-    far = FAR * (np.abs(gap).max() + float(np.abs(rig.interface.middle.compliance.diagonal()).max()))
+    unworn = problem.unworn()
+    gap = problem.opening(problem.interface.middle, unworn)
+    far = FAR * (np.abs(gap).max() + float(np.abs(problem.interface.middle.compliance.diagonal()).max()))
     opened = np.where(zone, 0.0, far)
-    carried = _crept(rig, Worn(opened, unworn.strip, crept=unworn.crept))
-    records = Records.joined(rig.cycle(rig.beginning(carried))[1])
+    carried = _crept(problem, WornDepths(opened, unworn.strip, crept=unworn.crept))
+    records = TimeStepRecords.joined(problem.cycle(problem.beginning(carried))[1])
     return records.pressure, np.asarray(records.gap.min(axis=0) - opened)
 
 
-def _shape(rig: Rig, zone: Mask, carried: tuple[Array, Array], size: float) -> FinalShape:
+def _shape(problem: PartialSlipProblem, zone: Mask, carried: tuple[Array, Array], size: float) -> FinalShape:
     """Return the shape of a zone, from the pressures and the least gap of a cycle."""
     pressures, gap = carried
     depth = np.maximum(-gap, 0.0)
-    rates = [0.0 if law is None else float(law.rate.mean()) for law in (rig.wear.punch, rig.wear.strip)]
+    rates = [0.0 if law is None else float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
-    strip = rig.interface.middle.pair.wear_projection @ ((1 - share) * depth)
-    worn = Worn(share * depth, strip)
+    strip = problem.interface.middle.pair.wear_projection @ ((1 - share) * depth)
+    worn = WornDepths(share * depth, strip)
     return FinalShape(zone, pressures[-1], depth, np.maximum(gap, 0.0), worn, pressures, size)

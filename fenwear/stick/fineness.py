@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
-from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
 from fenwear.stick.program import Program, make_program
 from fenwear.stick.setup import with_steps
 
@@ -52,11 +52,11 @@ class Fineness:
         )
 
 
-def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
+def fine_enough(problem: PartialSlipProblem, case: Case) -> tuple[PartialSlipProblem, Fineness]:
     """Return the rig with steps that are halved until the first cycle changes little; collective.
 
     Args:
-        rig: With the case's steps.
+        problem: With the case's steps.
         case: Gives their number and the tolerance.
 
     Raises:
@@ -66,21 +66,21 @@ def fine_enough(rig: Rig, case: Case) -> tuple[Rig, Fineness]:
     ends = np.arange(whole - 1, len(finest.steps), whole)
     while True:
         halves, of = _halved(ends)
-        fine = _driven(rig, case, finest, halves)
+        fine = _driven(problem, case, finest, halves)
         splits = np.diff(ends, prepend=-1) > 2
-        change, marked = rig.led(partial(_judged, rig, fine, of, splits, case.stick.step_tolerance))
+        change, marked = problem.led(partial(_judged, problem, fine, of, splits, case.stick.step_tolerance))
         if marked is None:
             enough = change <= case.stick.step_tolerance
-            return rig, Fineness(round(len(ends) / finest.half_cycles), change, enough, ends)
+            return problem, Fineness(round(len(ends) / finest.half_cycles), change, enough, ends)
         if case.heat is not None:
             marked[:] = True
         ends = halves[marked[of] | _last(of)]
-        rig = _driven(rig, case, finest, ends)
+        problem = _driven(problem, case, finest, ends)
 
 
-def with_ends(rig: Rig, case: Case, ends: Ends) -> Rig:
+def with_ends(problem: PartialSlipProblem, case: Case, ends: Ends) -> PartialSlipProblem:
     """Return the rig with steps that end at these of the finest ones; collective."""
-    return _driven(rig, case, _finest(case), ends)
+    return _driven(problem, case, _finest(case), ends)
 
 
 def same_steps(one: Case, other: Case) -> bool:
@@ -93,10 +93,10 @@ def _finest(case: Case) -> Program:
 
 
 def _judged(
-    rig: Rig, fine: Rig, of: Ends, splits: NDArray[np.bool_], tolerance: float
+    problem: PartialSlipProblem, fine: PartialSlipProblem, of: Ends, splits: NDArray[np.bool_], tolerance: float
 ) -> tuple[float, NDArray[np.bool_] | None]:
     """Return what halving all steps changes, and which are to be halved; None where that is to end."""
-    local, change = _compare(_first_cycle(rig), _first_cycle(fine), of, rig.weights)
+    local, change = _compare(_first_cycle(problem), _first_cycle(fine), of, problem.weights)
     if change <= tolerance or local[~splits].sum() > tolerance:  # the finest steps alone are too coarse
         return change, None
     return change, _marked(local, splits)
@@ -116,11 +116,11 @@ def merged(finest: Program, ends: Ends) -> Program:
     return replace(finest, steps=tuple(found))
 
 
-def _driven(rig: Rig, case: Case, finest: Program, ends: Ends) -> Rig:
+def _driven(problem: PartialSlipProblem, case: Case, finest: Program, ends: Ends) -> PartialSlipProblem:
     """Return the rig with the steps that end there; the way to the beginning stays."""
     if case.heat is not None:
-        return with_steps(rig, case, len(ends) // finest.half_cycles)
-    return rig.driven(replace(merged(finest, ends), lead_in=rig.program.lead_in))
+        return with_steps(problem, case, len(ends) // finest.half_cycles)
+    return problem.driven(replace(merged(finest, ends), lead_in=problem.program.lead_in))
 
 
 def _halved(ends: Ends) -> tuple[Ends, Ends]:
@@ -134,11 +134,11 @@ def _last(of: Ends) -> NDArray[np.bool_]:
     return np.append(of[1:] != of[:-1], True)
 
 
-def _first_cycle(rig: Rig) -> Records:
-    return Records.joined(rig.cycle(rig.beginning())[1])
+def _first_cycle(problem: PartialSlipProblem) -> TimeStepRecords:
+    return TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
 
 
-def _compare(coarse: Records, fine: Records, of: Ends, weights: Array) -> tuple[Array, float]:
+def _compare(coarse: TimeStepRecords, fine: TimeStepRecords, of: Ends, weights: Array) -> tuple[Array, float]:
     """Return what the halves change in each step, and what they change in the cycle, as shares."""
     force = max(float(np.abs(fine.force).max()), 1e-300)
     full_stick = 1e-6 * force * float(np.ptp(fine.displacement))  # no work but rounding

@@ -22,7 +22,7 @@ from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.parallel import on_root
 from fenwear.stick.cone import derivative
-from fenwear.stick.equations import ContactStatus, Found, Moved, Step
+from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
 from fenwear.stick.interface import meshed
 from fenwear.stick.whole import WholeBodies
 
@@ -30,7 +30,7 @@ from fenwear.stick.whole import WholeBodies
 class FullStep(Step):
     """The equations of one time step on all displacements; arguments as of `Step`."""
 
-    def solve(self, status: ContactStatus) -> Found:
+    def solve(self, status: ContactStatus) -> StatusSolution:
         """Return the solution of a contact status; collective.
 
         Raises:
@@ -40,7 +40,7 @@ class FullStep(Step):
         whole = bodies.whole(self.position)
         return on_root(bodies.bodies.comm, lambda: self._solve(whole, status))
 
-    def _solve(self, whole: WholeBodies, status: ContactStatus) -> Found:
+    def _solve(self, whole: WholeBodies, status: ContactStatus) -> StatusSolution:
         position, r, loose = self.position, self.position.modes.shape[1], self.imposed.force is not None
         count, size = self.d * self.n, whole.stiffness.shape[0]
         A, B = self._laws_of(status)
@@ -63,11 +63,11 @@ class FullStep(Step):
         if not r:
             rows = [[part for k, part in enumerate(row) if k != 2] for row in (*rows[:2], *rows[3:])]
         x, sign = _solved(csc_array(block_array(rows)), np.concatenate(right))
-        u, f, a, rig = np.split(x, np.cumsum([size, count, r]))
-        displacement = float(rig[0] * self.length) if loose else float(self.imposed.displacement or 0.0)
+        u, f, a, problem = np.split(x, np.cumsum([size, count, r]))
+        displacement = float(problem[0] * self.length) if loose else float(self.imposed.displacement or 0.0)
         on_punch, on_strip = ((trace @ u).reshape(self.d, -1).T for trace in whole.trace)
-        moved = Moved(whole.seen @ u, on_punch, on_strip)
-        return Found(f, a * self.units, displacement, sign * (-1) ** r, moved)
+        moved = SurfaceDisplacement(whole.seen @ u, on_punch, on_strip)
+        return StatusSolution(f, a * self.units, displacement, sign * (-1) ** r, moved)
 
     def _laws_of(self, status: ContactStatus) -> tuple[csr_array, csr_array]:
         """Return A and B (d n, d n) of the laws A f + B j = 0 of a contact status."""

@@ -28,7 +28,7 @@ from fenwear.heat.field import ReducedBasis
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.sliding.motion import make_motion
-from fenwear.stick.interface import Loaded, StickInterface
+from fenwear.stick.interface import LoadEffect, StickInterface
 from fenwear.stick.program import far_enough
 
 NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die out
@@ -116,7 +116,7 @@ class StickHeat:
         friction, debris = terms.sum(axis=0)[:2]
         self.exchange.check_bounds(self.exchange.at(before), self.exchange.at(after), float(friction - debris))
 
-    def expanded(self, loaded: Loaded, temperature: Array, offset: float) -> Loaded:
+    def expanded(self, loaded: LoadEffect, temperature: Array, offset: float) -> LoadEffect:
         """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset."""
         punch, strip = (
             expansion(part)
@@ -137,7 +137,7 @@ class StickHeat:
         """Return the changes of both contact temperatures (2, n) by changes of the temperatures (dim,), K."""
         return np.array(self.exchange.contact_changes(changes))
 
-    def through(self, course: Course) -> CycleMap:
+    def through(self, course: HeatHistory) -> CycleMap:
         """Return what a cycle of this heat makes of the temperatures at its start."""
         exchange, dim = self.exchange, sum(len(basis) for basis in self.exchange.bases)
         through: Array = np.eye(dim)
@@ -188,7 +188,7 @@ class CycleMap:
 
 
 @dataclass(frozen=True)
-class Course:
+class HeatHistory:
     """The heat of a cycle: numbers of its k time steps, heat (k, n), mW/mm², conductance (k, n), N/(mm s K)."""
 
     numbers: list[int]

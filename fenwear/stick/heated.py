@@ -14,7 +14,7 @@ import numpy as np
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.stick.heat import StickHeat
-from fenwear.stick.interface import Loaded
+from fenwear.stick.interface import LoadEffect
 from fenwear.stick.state import StickState
 
 CLOSE = 1e-9  # change of heat and pressure over their largest that ends the iterations of a step
@@ -46,7 +46,7 @@ class CoupledStep:
     """The contact at the end, loads with the expansion, temperatures (dim,), heat and conductance of the nodes (n,)."""
 
     state: StickState
-    loaded: Loaded
+    loaded: LoadEffect
     temperature: Array
     heating: Array
     conductance: Array
@@ -55,8 +55,8 @@ class CoupledStep:
 
 def coupled_step(
     heat: StickHeat,
-    solved: Callable[[Loaded, tuple[Array, Array] | None], StickState],
-    loaded: Loaded,
+    solved: Callable[[LoadEffect, tuple[Array, Array] | None], StickState],
+    loaded: LoadEffect,
     before: StickState,
     start: StepStart,
     flux: float,
@@ -82,7 +82,7 @@ def coupled_step(
     def conductance(pressure: Array, closed: Mask) -> Array:
         return heat.conductance(np.where(closed, np.maximum(pressure, 1e-300), 0.0))
 
-    def once(x: Array) -> tuple[Array, Loaded, bool]:
+    def once(x: Array) -> tuple[Array, LoadEffect, bool]:
         nonlocal last, conducting, settled, tries, near
         # Pressures that iterations have mixed are not zero where nodes are open: the last contact tells who conducts.
         conducting = last.closed if tries < ENOUGH else conducting

@@ -9,7 +9,7 @@ import scipy.optimize
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
-from fenwear.stick.equations import ContactStatus, Found, Step
+from fenwear.stick.equations import ContactStatus, StatusSolution, Step
 from fenwear.stick.full import FullStep
 from fenwear.stick.interface import OppositeBodies, Position, along_tangents
 from fenwear.stick.state import Imposed, StickState
@@ -197,7 +197,7 @@ def _from(step: Step, status: ContactStatus, most: int = MOST) -> StickState:
     return step.state(found, iterations, unique=unique)
 
 
-def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[Found, int, bool]:
+def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[StatusSolution, int, bool]:
     wrong, signs = np.inf, set[int]()
     for iteration in range(1, most + 1):
         found = _solve(step, status)
@@ -215,7 +215,7 @@ def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[Found
     raise ConvergenceError(f"{failed}: take more steps, or less friction")
 
 
-def _solve(step: Step, status: ContactStatus) -> Found:
+def _solve(step: Step, status: ContactStatus) -> StatusSolution:
     """Return the solution of a contact status; with a node stuck where an imposed force is held by nothing else.
 
     In two directions nodes that all slip hold a force: their slips turn with it, where bodies spread unlike each other.

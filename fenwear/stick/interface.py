@@ -20,8 +20,8 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
-from fenwear.assembly import Bodies, Needs, Sliding, body_needs, settle
-from fenwear.assembly.needs import condensed
+from fenwear.assembly import Bodies, Resources, Sliding, body_resources, choose_solvers
+from fenwear.assembly.resources import condensed
 from fenwear.bodies.creep import Retardation
 from fenwear.bodies.operators import SurfaceOperator, operators_for
 from fenwear.bodies.response import Request, identity
@@ -40,13 +40,13 @@ from fenwear.interface.placement import in_model
 from fenwear.layers import Layers, common_modulus, layers_of
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import StickCreep
 from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadEffect:
     """What the loads do at one time of the cycle.
 
     Attributes:
@@ -61,19 +61,19 @@ class Loaded:
     on_strip: Array
     by_force: tuple[Array, Array] | None = None
 
-    def times(self, factor: float) -> Loaded:
+    def times(self, factor: float) -> LoadEffect:
         """Return the same of loads times a factor."""
         if factor == 1:
             return self
         forced = None if self.by_force is None else (factor * self.by_force[0], factor * self.by_force[1])
-        return Loaded(factor * self.resultant, factor * self.on_punch, factor * self.on_strip, forced)
+        return LoadEffect(factor * self.resultant, factor * self.on_punch, factor * self.on_strip, forced)
 
-    def plus(self, other: Loaded) -> Loaded:
+    def plus(self, other: LoadEffect) -> LoadEffect:
         """Return what both loads do."""
         forced = None
         if self.by_force is not None and other.by_force is not None:
             forced = self.by_force[0] + other.by_force[0], self.by_force[1] + other.by_force[1]
-        return Loaded(
+        return LoadEffect(
             self.resultant + other.resultant, self.on_punch + other.on_punch, self.on_strip + other.on_strip, forced
         )
 
@@ -164,14 +164,14 @@ class OppositeBodies:
     moves = False
     full = False  # whether each step is solved on all displacements
     team = ALONE  # the ranks that have them, of which one leads
-    moved: Worn | None = None  # depths that the meshes have followed
+    moved: WornDepths | None = None  # depths that the meshes have followed
     creep: StickCreep | None = None  # what creeps
 
     def __init__(
         self, punch: SurfaceOperator, strip: SurfaceOperator, rigid: RigidEquilibrium, field: SlidingField
     ) -> None:
         self.punch, self.strip, self.field = punch, strip, field
-        self._load = Loaded(rigid.resultant, punch.by_load, strip.by_load)
+        self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load)
         self._positions = {0.0: position_of(rigid, punch, strip, field)}
         self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
 
@@ -190,7 +190,7 @@ class OppositeBodies:
         del offset
         return self.middle
 
-    def loaded(self, fraction: float | None) -> Loaded:
+    def loaded(self, fraction: float | None) -> LoadEffect:
         """Return what the loads do at a fraction of the cycle: always the same."""
         del fraction
         return self._load
@@ -245,7 +245,7 @@ class StickInterface(OppositeBodies):
         onto = identity(len(middle.strip.trace)) if moves else csr_array(middle.transfer.T)
         self.patterns = middle.punch.spread, onto
         if condensed is None:
-            self.needs = settle([bodies], self._needs(len(middle.weights), onto.shape[1]))
+            self.needs = choose_solvers([bodies], self._needs(len(middle.weights), onto.shape[1]))
             wanted = [Request(bodies.punch, middle.punch.spread), Request(bodies.strip, onto)]
             self.punch, self.strip = operators_for(wanted, keep=keep, fresh=fresh)
         else:
@@ -253,10 +253,10 @@ class StickInterface(OppositeBodies):
             self.punch, self.strip = condensed
         self.creep = self._creep()
         self._positions: dict[float, Position] = {0.0: self._position(middle)}
-        self._loaded: dict[float | None, Loaded] = {}
+        self._loaded: dict[float | None, LoadEffect] = {}
         self._whole: dict[float, WholeBodies] = {}
 
-    def _needs(self, nodes: int, on_strip: int) -> Needs:
+    def _needs(self, nodes: int, on_strip: int) -> Resources:
         """Return what condensing both along all axes takes, with C of each position and Newton's matrix; collective.
 
         Args:
@@ -266,9 +266,9 @@ class StickInterface(OppositeBodies):
         d, both = self.dim, self.bodies
         positions = 1 + (self.case.stick.steps if self.moves and self.case is not None else 0)
         punch, strip = (
-            body_needs(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
+            body_resources(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
         )
-        return Needs(punch, strip, nodes, positions * d, d**2, both.comm.size, condensed(both))
+        return Resources(punch, strip, nodes, positions * d, d**2, both.comm.size, condensed(both))
 
     def _creep(self) -> StickCreep | None:
         """Return what creeps; None where nothing does; collective."""
@@ -324,7 +324,7 @@ class StickInterface(OppositeBodies):
         """Make the bodies with nothing condensed for a place of the strip; collective."""
         self._whole[offset] = whole_bodies(self.bodies, self._positions[offset], moves=self.moves)
 
-    def loaded(self, fraction: float | None) -> Loaded:
+    def loaded(self, fraction: float | None) -> LoadEffect:
         """Return what the loads do at a fraction of the cycle, or their mean; collective, or for rank 0 that leads."""
         loads = [] if self.case is None else [*self.case.punch.loads, *self.case.strip.loads]
         constant = fraction is None or all(load.over_cycle is None for load in loads)
@@ -339,7 +339,7 @@ class StickInterface(OppositeBodies):
         resultant = np.concatenate([bodies.punch.rigid_resultant, bodies.strip.rigid_resultant])
         punch, strip = self.punch.under(bodies.punch).by_load, self.strip.under(bodies.strip).by_load
         forced = None if self.creep is None else (punch - self.creep.moved[0], strip - self.creep.moved[1])
-        self._loaded[fraction] = Loaded(resultant, punch, strip, forced)
+        self._loaded[fraction] = LoadEffect(resultant, punch, strip, forced)
 
     def _position(self, pair: ContactPair) -> Position:
         rigid = rigid_equilibrium(pair, self.bodies.punch, self.bodies.strip)

@@ -30,10 +30,10 @@ from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS
 from fenwear.layers.memory import Held
 from fenwear.layers.step import NUDGE
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
-from fenwear.stick.cycle import Records, Rig, RigState
-from fenwear.stick.heat import Course
+from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
+from fenwear.stick.heat import HeatHistory
 from fenwear.stick.interface import Position
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
@@ -62,26 +62,26 @@ class FrettingCycle:
     """
 
     number: int
-    worn: Worn
-    half_cycles: list[Records]
-    rate: Worn
+    worn: WornDepths
+    half_cycles: list[TimeStepRecords]
+    rate: WornDepths
     error: float
     first_step: int
-    end: RigState
+    end: PartialSlipState
     length: int = 1
     warm: Array | None = None
 
     @property
-    def records(self) -> Records:
+    def records(self) -> TimeStepRecords:
         """All time steps."""
-        return Records.joined(self.half_cycles)
+        return TimeStepRecords.joined(self.half_cycles)
 
 
-def jumped(rig: Rig, now: FrettingCycle, cycles: int, tolerance: float) -> FrettingCycle:
+def jumped(problem: PartialSlipProblem, now: FrettingCycle, cycles: int, tolerance: float) -> FrettingCycle:
     """Return the cycle after the next jump that is accurate enough.
 
     Args:
-        rig: The bodies and what is done to them.
+        problem: The bodies and what is done to them.
         now: The cycle to go on from.
         cycles: How many in all.
         tolerance: Largest estimated error of one jump.
@@ -93,7 +93,7 @@ def jumped(rig: Rig, now: FrettingCycle, cycles: int, tolerance: float) -> Frett
     while True:
         tried = min(length, cycles - now.number)
         try:
-            then = _attempt(rig, now, tried)
+            then = _attempt(problem, now, tried)
         except ConvergenceError:
             if tried == 1:
                 raise
@@ -108,35 +108,42 @@ def jumped(rig: Rig, now: FrettingCycle, cycles: int, tolerance: float) -> Frett
         return replace(then, length=length)
 
 
-def first_cycle(rig: Rig, at: RigState, worn: Worn, number: int, warm: Array | None = None) -> FrettingCycle:
+def first_cycle(
+    problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: int, warm: Array | None = None
+) -> FrettingCycle:
     """Return the cycle at a shape from which jumps go on, with its temperatures at its start (dim,)."""
-    return _rate(rig, at, worn, number, warm=warm)
+    return _rate(problem, at, worn, number, warm=warm)
 
 
 def _rate(
-    rig: Rig, at: RigState, worn: Worn, number: int, before: FrettingCycle | None = None, warm: Array | None = None
+    problem: PartialSlipProblem,
+    at: PartialSlipState,
+    worn: WornDepths,
+    number: int,
+    before: FrettingCycle | None = None,
+    warm: Array | None = None,
 ) -> FrettingCycle:
     """Return the cycle at a shape, after one that leads to it, half a one where nothing else changes within a cycle.
 
     Raises:
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
-    program, heat, own = rig.program, rig.heat, (rig.interface.layers.memory, rig.interface.creep)
-    at = rig.shaped(at, worn)
+    program, heat, own = problem.program, problem.heat, (problem.interface.layers.memory, problem.interface.creep)
+    at = problem.shaped(at, worn)
     settled = heat is None and own == (None, None)  # what goes to and fro in a cycle is its own
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
-        at, _ = rig.half_cycle(at)
+        at, _ = problem.half_cycle(at)
     if heat is not None and before is None:
         at = replace(at, temperature=heat.initial() if warm is None else warm)
     if heat is None or before is None or before.warm is None or before.end.temperature is None:
-        return _recorded(rig, at, worn, number)
+        return _recorded(problem, at, worn, number)
     cycles, rate = number - before.number, before.end.temperature - before.warm
     if cycles == 1:  # nothing is jumped over: the temperatures are those after the cycle before
-        return _recorded(rig, replace(at, temperature=before.end.temperature), worn, number)
+        return _recorded(problem, replace(at, temperature=before.end.temperature), worn, number)
     over = heat.through(_course(before, len(program.steps)))
     warm = over.after(before.warm, cycles)
     for _ in range(MOST_HEATINGS):
-        found = _recorded(rig, replace(at, temperature=warm), worn, number)
+        found = _recorded(problem, replace(at, temperature=warm), worn, number)
         over = heat.through(_course(found, len(program.steps)))
         again = over.after(before.warm, cycles)
         warmest = float(np.abs(heat.surfaces(again)).max())
@@ -147,35 +154,35 @@ def _rate(
     raise ConvergenceError(f"the temperatures of a jump did not settle in {MOST_HEATINGS} cycles")
 
 
-def _recorded(rig: Rig, at: RigState, worn: Worn, number: int) -> FrettingCycle:
-    at, creep = rig.shaped(at, worn), rig.interface.creep
+def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: int) -> FrettingCycle:
+    at, creep = problem.shaped(at, worn), problem.interface.creep
     first, warm, begin = at.next_step, at.temperature, at
-    at, parts = rig.cycle(at)
-    rate = rig.worn_in(Records.joined(parts), first, begin, rate=True)
+    at, parts = problem.cycle(at)
+    rate = problem.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
     if creep is not None:
-        rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, rig.program.period))
+        rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
     return FrettingCycle(number, worn, parts, rate, 0.0, first, at, warm=warm)
 
 
-def _course(cycle: FrettingCycle, steps: int) -> Course:
+def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
     """Return the heat of a cycle's time steps."""
     records = cycle.records
     numbers = [(cycle.first_step + k) % steps for k in range(len(records))]
-    return Course(numbers, records.dissipated / records.duration[:, None], records.conductance)
+    return HeatHistory(numbers, records.dissipated / records.duration[:, None], records.conductance)
 
 
-def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
+def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> FrettingCycle:
     """Return the cycle after a jump."""
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
-    between, layers = depths + now.worn.between.size, rig.interface.layers
+    between, layers = depths + now.worn.between.size, problem.interface.layers
     size = between + now.worn.carried.size
 
-    def parted(y: Array) -> Worn:
+    def parted(y: Array) -> WornDepths:
         shapes = now.worn.between.shape, now.worn.carried.shape
         state, carried = y[depths:between].reshape(shapes[0]), y[between:size].reshape(shapes[1])
-        return layers.settled(Worn(y[:n], y[n:depths], state, y[size:], carried))
+        return layers.settled(WornDepths(y[:n], y[n:depths], state, y[size:], carried))
 
-    def whole(worn: Worn) -> Array:
+    def whole(worn: WornDepths) -> Array:
         return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept])
 
     begin, rate = whole(now.worn), whole(now.rate)
@@ -185,32 +192,32 @@ def _attempt(rig: Rig, now: FrettingCycle, cycles: int) -> FrettingCycle:
 
     if not np.isfinite(rate).all():
         raise ConvergenceError(TOO_LARGE)
-    solve = _Implicit(rig, now, cycles).solve
+    solve = _Implicit(problem, now, cycles).solve
     first = solve(rate)
     start = _slid_on(now, cycles)
-    middle = _rate(rig, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
+    middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
     second = solve(whole(middle.rate) - 2 * first)
     end = whole(parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
-    then = _rate(rig, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
+    then = _rate(problem, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
     missing = solve(end - begin - cycles / 2 * (rate + whole(then.rate)))
-    pair = rig.interface.middle.pair
+    pair = problem.interface.middle.pair
     felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
     area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(len(begin) - depths - n * len(felt))])
     scale = area @ np.abs(end - begin) + REST * (area @ end)
     error = float(area @ np.abs(missing)) / max(float(scale), 1e-300)
-    remembered = _Remembered.of(rig, now, depths)
+    remembered = _Remembered.of(problem, now, depths)
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
-    of_creep = _creep_error(rig, missing[size:], (end - begin)[size:], end[size:])
+    of_creep = _creep_error(problem, missing[size:], (end - begin)[size:], end[size:])
     return replace(then, error=max(error, then.error, of_states, of_creep))
 
 
-def _creep_error(rig: Rig, missing: Array, change: Array, end: Array) -> float:
+def _creep_error(problem: PartialSlipProblem, missing: Array, change: Array, end: Array) -> float:
     """Return the error of what has crept over what a jump creeps; near the end of creep over a part of all."""
-    creep, middle = rig.interface.creep, rig.interface.middle
+    creep, middle = problem.interface.creep, problem.interface.middle
     if creep is None:
         return 0.0
     wrong, done, there = (
-        float(rig.weights @ np.abs(opened_by_creep(middle, creep, state))) for state in (missing, change, end)
+        float(problem.weights @ np.abs(opened_by_creep(middle, creep, state))) for state in (missing, change, end)
     )
     return wrong / max(done, CREPT * there, 1e-300)
 
@@ -224,7 +231,7 @@ class _Implicit:
     How depths change what creeps is left out: of second order the method is with any T.
 
     Args:
-        rig: The bodies and what is done to them.
+        problem: The bodies and what is done to them.
         now: The cycle that the jump begins with.
         cycles: N.
 
@@ -232,22 +239,22 @@ class _Implicit:
         ConvergenceError: T is beyond all numbers.
     """
 
-    def __init__(self, rig: Rig, now: FrettingCycle, cycles: int) -> None:
-        self.rig, self.now, self.cycles = rig, now, cycles
-        derivative, self.groups = _derivative(rig, now)
+    def __init__(self, problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> None:
+        self.problem, self.now, self.cycles = problem, now, cycles
+        derivative, self.groups = _derivative(problem, now)
         self._size = len(derivative)
         matrix = np.eye(self._size) - GAMMA * cycles * derivative
         if not np.isfinite(matrix).all():
             raise ConvergenceError(TOO_LARGE)
         self._factor = scipy.linalg.lu_factor(matrix)
-        creep = rig.interface.creep
-        self._creep = None if creep is None else CreepStep(creep, rig.interface, rig.program.period, cycles)
+        creep = problem.interface.creep
+        self._creep = None if creep is None else CreepStep(creep, problem.interface, problem.program.period, cycles)
         if self._creep is not None:
             self._creep.answering(self._answer())
 
     def _answer(self) -> Array:
         """Return how pressures fall by a depth that stays all through the cycle (n, n), on the mean of its steps."""
-        found = np.zeros((len(self.rig.weights),) * 2)
+        found = np.zeros((len(self.problem.weights),) * 2)
         for group in self.groups:
             found[np.ix_(group.closed, group.closed)] += group.share * group.answer
         return found
@@ -263,7 +270,7 @@ class _Implicit:
 
     def _by_creep(self, crept: Array) -> Array:
         """Return how a cycle's wear, and what lies between, change by what creeps (n + n_s + rows n)."""
-        creep, found = self.rig.interface.creep, np.zeros(self._size)
+        creep, found = self.problem.interface.creep, np.zeros(self._size)
         if creep is None:
             return found
         for group in self.groups:
@@ -272,12 +279,12 @@ class _Implicit:
         return found
 
 
-def _slid_on(now: FrettingCycle, cycles: int) -> RigState:
+def _slid_on(now: FrettingCycle, cycles: int) -> PartialSlipState:
     """Return the end of a cycle after so many more, as far as what its nodes have slipped tells."""
     slid = now.end.slid
     if slid is None:
         return now.end
-    return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slid.sum(axis=0))
+    return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slip_magnitude.sum(axis=0))
 
 
 @dataclass(frozen=True)
@@ -299,30 +306,30 @@ class _Group:
     share: float
 
 
-def _derivative(rig: Rig, now: FrettingCycle) -> tuple[Array, list[_Group]]:
+def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array, list[_Group]]:
     """Return A, the derivative of a cycle's wear to depths and what lies between, at the contact zone and slip of now.
 
     Square, of the depths (n + n_s), the state of what lies between (rows n) and of the strip's material (rows n_s); and
     the time steps that it is made of.
     """
-    records, steps, n = now.records, rig.program.steps, len(now.worn.punch)
-    depths, layers = n + len(now.worn.strip), rig.interface.layers
+    records, steps, n = now.records, problem.program.steps, len(now.worn.punch)
+    depths, layers = n + len(now.worn.strip), problem.interface.layers
     debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
-    remembered = _Remembered.of(rig, now, depths)
+    remembered = _Remembered.of(problem, now, depths)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     A, found = np.zeros((total, total)), list[_Group]()
-    slid, groups = records.slid, dict[tuple[float, bytes], list[int]]()
+    slid, groups = records.slip_magnitude, dict[tuple[float, bytes], list[int]]()
     fed = None if debris is None else debris.over(slid).fed
     for k in range(len(records)):
-        place = steps[(now.first_step + k) % len(steps)].offset if rig.interface.moves else 0.0
+        place = steps[(now.first_step + k) % len(steps)].offset if problem.interface.moves else 0.0
         groups.setdefault((place, (records.pressure[k] > 0).tobytes()), []).append(k)
     for (place, _), members in groups.items():
-        position = rig.interface.position(place)
+        position = problem.interface.position(place)
         closed = np.flatnonzero(records.pressure[members[0]] > 0)
-        answer = _stiffness(rig, position, closed, records.pressure[members[0]])  # of pressure to depth
+        answer = _stiffness(problem, position, closed, records.pressure[members[0]])  # of pressure to depth
         left = np.zeros((total, len(closed)))
         slopes, kept = np.zeros((2, n)), np.zeros(n)
-        for row, law in enumerate((rig.wear.punch, rig.wear.strip)):
+        for row, law in enumerate((problem.wear.punch, problem.wear.strip)):
             if law is not None:
                 for k in members:
                     step = steps[(now.first_step + k) % len(steps)]
@@ -372,10 +379,10 @@ class _Remembered:
     fills: tuple[float, ...]
 
     @classmethod
-    def of(cls, rig: Rig, now: FrettingCycle, depths: int) -> _Remembered | None:
+    def of(cls, problem: PartialSlipProblem, now: FrettingCycle, depths: int) -> _Remembered | None:
         """Return those of a cycle, behind so many depths; None without."""
-        layers, pair, memory = rig.interface.layers, rig.interface.middle.pair, rig.interface.layers.memory
-        evolution = rig.evolution(now.records, replace(now.end, worn=now.worn, held=None, next_step=now.first_step))
+        layers, pair, memory = problem.interface.layers, problem.interface.middle.pair, problem.interface.layers.memory
+        evolution = problem.evolution(now.records, replace(now.end, worn=now.worn, held=None, next_step=now.first_step))
         if memory is None or evolution is None:
             return None
         begin = depths + now.worn.between.size - len(pair.weights) * len(memory.contact)
@@ -418,14 +425,14 @@ class _Remembered:
         return found
 
 
-def _stiffness(rig: Rig, position: Position, closed: NDArray[np.int64], pressure: Array) -> Array:
+def _stiffness(problem: PartialSlipProblem, position: Position, closed: NDArray[np.int64], pressure: Array) -> Array:
     """Return how the pressures of closed nodes fall by a depth at each, under a constant load (k, k), MPa/mm."""
     k, r = len(closed), position.modes.shape[1]
     n = len(position.pair.weights)
     unit = float(np.median(position.compliance.diagonal()[:n]))
     system = np.zeros((k + r, k + r))
     system[:k, :k] = position.compliance.entries(closed, closed) / unit
-    closure = rig.interface.layers.closure
+    closure = problem.interface.layers.closure
     if closure is not None:
         system[np.arange(k), np.arange(k)] += closure.slope(pressure[closed]) / unit
     system[:k, k:] = position.modes[closed]

@@ -10,14 +10,14 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Oscillation
 from fenwear.errors import CaseError, InputError
-from fenwear.stick.cycle import Rig
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.program import far_enough, make_program
 from fenwear.stick.wear import LocalLaws
 
 
-def make_rig(
+def partial_slip_problem(
     case: Case,
     comm: MPI.Comm = MPI.COMM_WORLD,
     *,
@@ -25,7 +25,7 @@ def make_rig(
     fresh: bool = False,
     bodies: Bodies | None = None,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
-) -> Rig:
+) -> PartialSlipProblem:
     """Return the bodies of a case with what is done to them; collective.
 
     The condensed bodies and the bases of their temperatures are kept on disk for the next time.
@@ -43,18 +43,20 @@ def make_rig(
     """
     if case.contact.law != "coulomb":
         raise CaseError(InputError("contact.law", "expected 'coulomb' for contact with stick"))
-    return heated(unheated_rig(case, bodies or build_bodies(case, comm), steps, fresh=fresh, condensed=condensed), case)
+    return heated(
+        unheated_problem(case, bodies or build_bodies(case, comm), steps, fresh=fresh, condensed=condensed), case
+    )
 
 
-def unheated_rig(
+def unheated_problem(
     case: Case,
     bodies: Bodies,
     steps: int | None = None,
     *,
     fresh: bool = False,
     condensed: tuple[SurfaceOperator, SurfaceOperator] | None = None,
-) -> Rig:
-    """Return the same without heat; collective. Arguments as of `make_rig`."""
+) -> PartialSlipProblem:
+    """Return the same without heat; collective. Arguments as of `partial_slip_problem`."""
     sliding, surface = make_sliding(case), bodies.punch.surface
     interface = StickInterface(
         bodies,
@@ -75,21 +77,21 @@ def unheated_rig(
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     conditions = laws.conditions(middle.pair, mean, states=interface.layers.known(middle.pair, None))
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
-    return Rig(interface, make_program(case, steps), wear, mu, laws=None if laws.constant else laws)
+    return PartialSlipProblem(interface, make_program(case, steps), wear, mu, laws=None if laws.constant else laws)
 
 
-def with_steps(rig: Rig, case: Case, steps: int) -> Rig:
+def with_steps(problem: PartialSlipProblem, case: Case, steps: int) -> PartialSlipProblem:
     """Return the same with other time steps."""
-    return heated(rig.driven(make_program(case, steps)), case)
+    return heated(problem.driven(make_program(case, steps)), case)
 
 
-def heated(rig: Rig, case: Case) -> Rig:
+def heated(problem: PartialSlipProblem, case: Case) -> PartialSlipProblem:
     """Return the same with the heat of the case for its time steps; collective."""
     if case.heat is None:
-        return rig
-    steps = len(rig.program.steps) // rig.program.half_cycles
-    heat = stick_heat(meshed(rig.interface), case, steps)
-    return rig.with_heat(heat)
+        return problem
+    steps = len(problem.program.steps) // problem.program.half_cycles
+    heat = stick_heat(meshed(problem.interface), case, steps)
+    return problem.with_heat(heat)
 
 
 def _moves(case: Case, surface: ContactSurface) -> bool:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.sliding.wear import STIFF
-from fenwear.stick.interface import Loaded, OppositeBodies
+from fenwear.stick.interface import LoadEffect, OppositeBodies
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Imposed:
         duration: Of the step, s: what creeps does so over it.
     """
 
-    loaded: Loaded
+    loaded: LoadEffect
     opening: Array
     displacement: float | None = 0.0
     force: float | None = None

@@ -18,7 +18,7 @@ from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
-from fenwear.sliding.wear import Worn, coefficient
+from fenwear.sliding.wear import WornDepths, coefficient
 
 States = tuple[Mapping[str, Array], Mapping[str, Array]]
 
@@ -97,7 +97,7 @@ class LocalLaws:
         *,
         speed: Array | float = 0.0,
         temperatures: tuple[Array, Array] | None = None,
-        worn: Worn | None = None,
+        worn: WornDepths | None = None,
         slid: Array | None = None,
         states: States = ({}, {}),
     ) -> ContactConditions:

@@ -24,12 +24,12 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
 from fenwear.errors import FenwearError, InterruptedRunError, OutputError
-from fenwear.sweeps.evaluate import Workshop
+from fenwear.sweeps.evaluate import VariantRunner
 from fenwear.sweeps.plan import Of, Variant, in_pieces
 from fenwear.sweeps.store import Outcome, keep
 
 WORTH = 8.0  # s of work for one process from which on several are started: each takes about 2 s to begin
-_workshop = Workshop()  # of a worker: what its last variant was computed on
+_workshop = VariantRunner()  # of a worker: what its last variant was computed on
 
 
 def compute(piece: Sequence[Variant], of: Of, folder: Path | None) -> list[Outcome]:
@@ -41,7 +41,7 @@ def compute(piece: Sequence[Variant], of: Of, folder: Path | None) -> list[Outco
     return [_one(_workshop, variant, of, folder) for variant in piece]
 
 
-def _one(workshop: Workshop, variant: Variant, of: Of, folder: Path | None) -> Outcome:
+def _one(workshop: VariantRunner, variant: Variant, of: Of, folder: Path | None) -> Outcome:
     begin = time.perf_counter()
     assert variant.case is not None
     try:
@@ -98,7 +98,7 @@ def outcomes(
 
 def _alone(left: Sequence[Variant], of: Of, folder: Path | None, cores: int) -> Iterator[Outcome]:
     """Yield the outcomes that this process computes: all, or those before several cores are worth their start."""
-    workshop = Workshop()
+    workshop = VariantRunner()
     firsts: list[float] = []
     others: list[float] = []
     pieces = in_pieces(left, of, 1)

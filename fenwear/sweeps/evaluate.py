@@ -18,7 +18,7 @@ from fenwear.cycle import at_step, evolve, steady
 from fenwear.cycle.state import joined
 from fenwear.errors import ConvergenceError
 from fenwear.interface import is_translation
-from fenwear.law import check_decided
+from fenwear.law_choice import check_decided
 from fenwear.results.steps import numbers
 from fenwear.stick.final import FinalShape
 from fenwear.sweeps.plan import Of, preparation_for
@@ -89,7 +89,7 @@ def meaning(name: str, of: Of, case: Case) -> Meaning:
     return Meaning(dims, f"{unit}/{per}", "rigid-body wear of the punch")
 
 
-class Workshop:
+class VariantRunner:
     """Computes one variant after another, on this process alone, and keeps what the next may share."""
 
     def __init__(self) -> None:
@@ -126,7 +126,7 @@ def _nodes(system: Tribosystem) -> dict[str, Array]:
 def _final_shape(system: Tribosystem) -> Values:
     """Return the shape to which partial slip wears."""
     found = cast(FinalShape, steady(system))  # under Coulomb's law
-    steps = system.lawful.rig.program.steps
+    steps = system.law_state.problem.program.steps
     ends = [k for k, step in enumerate(steps) if steps[(k + 1) % len(steps)].half_cycle != step.half_cycle]
     pressure = found.pressures[ends]
     values: dict[str, Array] = {

@@ -41,7 +41,7 @@ FRICTION, PIN, ASIDE = 0.3, 0.5, 0.286  # mu; height of the pin over half the si
 
 
 @dataclass(frozen=True)
-class Worn:
+class WornDepths:
     """Wear of unit coefficient in two phases, as `fenwear.sliding.wear.PhasesWear` has it."""
 
     cap: float = np.inf
@@ -88,7 +88,7 @@ def system(side: int) -> Any:
         motion=SimpleNamespace(phases=(0, 1)),
         friction=SimpleNamespace(constant=True),
         friction_ratios=lambda: [ratio, -ratio],
-        phases_wear=Worn(),
+        phases_wear=WornDepths(),
         mode_lengths=np.ones(2),
         heat=None,
     )

@@ -24,8 +24,8 @@ import numpy as np
 import scipy.linalg
 import setup
 
-from fenwear.assembly.needs import ASSEMBLING, BodyNeeds, Needs
-from fenwear.assembly.ways import dealt
+from fenwear.assembly.resources import ASSEMBLING, BodyResources, Resources
+from fenwear.assembly.solver_choice import dealt
 from fenwear.bodies.factor import entries, operations
 
 SMALL, LARGE = ("plane", "32", "0.2"), ("plane", "64", "0.1")  # elements along the contact, growth of their size
@@ -143,14 +143,14 @@ def measure_solid(elements: str) -> None:
     from solids import describe
 
     from fenwear import assemble
-    from fenwear.assembly import elastic, needs_of, place_case
+    from fenwear.assembly import elastic, place_case, resources_of
 
     comm = MPI.COMM_WORLD
     assemble(describe(4))
     base = comm.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
     begin = time.process_time()
     placed = place_case(describe(int(elements)))
-    wanted = needs_of(placed)
+    wanted = resources_of(placed)
     elastic(placed)
     spent = comm.allgather(time.process_time() - begin)
     memory = comm.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
@@ -159,13 +159,13 @@ def measure_solid(elements: str) -> None:
         print(json.dumps(found))
 
 
-def needs_in(found: dict) -> Needs:
+def needs_in(found: dict) -> Resources:
     """Return the needs that a run of its own has printed."""
     own = found["needs"]
-    return Needs(**{**own, "punch": BodyNeeds(**own["punch"]), "strip": BodyNeeds(**own["strip"])})
+    return Resources(**{**own, "punch": BodyResources(**own["punch"]), "strip": BodyResources(**own["strip"])})
 
 
-def estimated(wanted: Needs, ranks: int) -> float:
+def estimated(wanted: Resources, ranks: int) -> float:
     """Return the s of the rank that works most: its share of meshes and assembly, its factor, its columns."""
     bodies = (wanted.punch, wanted.strip)
     own = [body.on_holder for body in bodies]
@@ -190,12 +190,12 @@ def solids() -> None:
                   f"| {found['seconds']:.2f} | {seconds:.2f} | {found['seconds'] / seconds:.2f} "
                   f"| {found['memory'] / GIB:.2f} | {memory / GIB:.2f} | {found['memory'] / memory:.2f} |",
                   flush=True)  # fmt: skip
-    bodies = [BodyNeeds(3, n, 150 * n, 2401, 2401, 0.0, 7203) for n in (151_000.0, 165_000.0)]
+    bodies = [BodyResources(3, n, 150 * n, 2401, 2401, 0.0, 7203) for n in (151_000.0, 165_000.0)]
     print("\nComputed, not run: 316,000 unknowns and 2,401 contact nodes of a solid")
     print("| ranks | holders | s | GiB of all |")
     print("| ---: | --- | ---: | ---: |")
     for ranks in (1, 2, 4, 8, 16, 64):
-        wanted = dealt(Needs(*bodies, 2401, 1, 2, ranks), ranks, None)
+        wanted = dealt(Resources(*bodies, 2401, 1, 2, ranks), ranks, None)
         seconds = speed * estimated(wanted, ranks)
         print(f"| {ranks} | {wanted.punch.holders} and {wanted.strip.holders} | {seconds:,.0f} "
               f"| {wanted.memory / GIB:,.1f} |")  # fmt: skip

@@ -10,7 +10,7 @@ import time
 import numpy as np
 
 from fenwear import assemble, jump, load_case
-from fenwear.stick.setup import make_rig
+from fenwear.stick.setup import partial_slip_problem
 
 
 def main() -> None:
@@ -18,15 +18,15 @@ def main() -> None:
     for elements in (50, 100, 200):
         case = load_case("fretting-partial-slip", [f"geometry.parameters.elements_along_contact={elements}"])
         begin = time.process_time()
-        rig = make_rig(case)
+        problem = partial_slip_problem(case)
         setup = time.process_time() - begin
-        at = rig.beginning()
-        at, _ = rig.cycle(at)
+        at = problem.beginning()
+        at, _ = problem.cycle(at)
         begin = time.process_time()
-        at, parts = rig.cycle(at)
+        at, parts = problem.cycle(at)
         cycle = time.process_time() - begin
-        n = len(rig.weights)
-        C = rig.interface.middle.compliance.entries(np.arange(n), np.arange(n))
+        n = len(problem.weights)
+        C = problem.interface.middle.compliance.entries(np.arange(n), np.arange(n))
         begin = time.process_time()
         for _ in range(10):
             np.linalg.solve(C + np.eye(n), np.ones(n))

@@ -15,7 +15,7 @@ from fenwear import Tribosystem, assemble, make_case
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case.templates import fill_in, find_template
 from fenwear.errors import MeshQualityError
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 COARSE = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
 
@@ -30,7 +30,7 @@ def test_the_bodies_lose_what_is_worn(assembled: Callable[..., Tribosystem]) -> 
     """The cross-sections shrink by the integral of the depth; contact nodes move by it, pins and the rest stay."""
     system = assembled("example1", *COARSE)
     x, strip_x = system.pair.x, system.pair.strip.x[:, 0]
-    worn = Worn(1 + 0.5 * (x / 30) ** 2, 0.2 * (1 - (strip_x / 30) ** 2))
+    worn = WornDepths(1 + 0.5 * (x / 30) ** 2, 0.2 * (1 - (strip_x / 30) ** 2))
     moved = assemble(system.case, system.comm, worn)
     assert moved.bodies.moved is not None
     vertices = slice(None, None, 2)  # straight elements: the middle nodes go with their ends
@@ -52,11 +52,13 @@ def test_an_even_depth_moves_the_punch_only_where_it_must(assembled: Callable[..
     """An even depth shrinks the punch between contact and pins; gap and stiffness change as little as it is."""
     system = assembled("example1", *COARSE)
     depth = 1e-6
-    moved = assemble(system.case, system.comm, Worn(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights))
+    moved = assemble(
+        system.case, system.comm, WornDepths(np.full_like(system.pair.x, depth), 0 * system.pair.strip.weights)
+    )
     scale = np.abs(system.interface.dense()).max()
     difference = np.abs(moved.interface.dense() - system.interface.dense()).max()
     assert 0 < difference < 1e-5 * scale
-    worn = Worn(np.full_like(system.pair.x, depth), system.unworn().strip)
+    worn = WornDepths(np.full_like(system.pair.x, depth), system.unworn().strip)
     np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-13)
 
 
@@ -73,7 +75,7 @@ def test_circles_are_offset_along_their_own_normals() -> None:
         angle = np.arctan2(surface.x[:, 0], surface.x[:, 1] - z)
         depth = 0.02 + 0.01 * np.cos(3 * angle) if surface.body == "punch" else np.full(len(angle), 0.03)
         none = system.unworn()
-        worn = Worn(depth, none.strip) if surface.body == "punch" else Worn(none.punch, depth)
+        worn = WornDepths(depth, none.strip) if surface.body == "punch" else WornDepths(none.punch, depth)
         moved = assemble(case, system.comm, worn)
         x, z_moved = getattr(moved.pair, surface.body).x.T
         np.testing.assert_allclose(np.hypot(x, z_moved - z), radius + way * depth, atol=2e-5 * depth.max())
@@ -89,7 +91,7 @@ def test_a_pin_gets_shorter(assembled: Callable[..., Tribosystem]) -> None:
     system = assembled("pin-on-disc", "geometry.degree=1", "geometry.order=1")
     x, old = system.pair.punch.x, system.bodies.punch.body
     for depth in (np.full(len(x), 3.0), 1.0 + 0.1 * (x[:, 0] - 15.0) + 0.05 * x[:, 1] ** 2):
-        moved = assemble(system.case, system.comm, Worn(depth, system.unworn().strip))
+        moved = assemble(system.case, system.comm, WornDepths(depth, system.unworn().strip))
         assert moved.bodies.moved is not None
         np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
         new = moved.bodies.punch.body
@@ -104,7 +106,7 @@ def test_a_pin_gets_shorter(assembled: Callable[..., Tribosystem]) -> None:
 def test_used_up_elements_are_refused(assembled: Callable[..., Tribosystem]) -> None:
     """A punch that is worn through is an error that says which body and how deep, not a wrong number."""
     system = assembled("example1", *COARSE)
-    worn = Worn(np.full_like(system.pair.x, 19.0), system.unworn().strip)
+    worn = WornDepths(np.full_like(system.pair.x, 19.0), system.unworn().strip)
     with pytest.raises(MeshQualityError, match=r"wear of the punch has used up .* the depth is 19 mm"):
         assemble(system.case, MPI.COMM_WORLD, worn)
 
@@ -113,10 +115,10 @@ def test_limit_of_the_offset(assembled: Callable[..., Tribosystem]) -> None:
     """The meshes follow where the depth exceeds the given share of the elements' height: 2 mm of its first row."""
     system = assembled("example1", *COARSE, "geometry.follow_wear=0.5")
     heights = system.element_heights.punch
-    low, high = (Worn(share * heights, system.unworn().strip) for share in (0.49, 0.51))
-    assert not system.outworn(low)
-    assert system.outworn(high)
-    assert not assembled("example1", *COARSE, "geometry.follow_wear=never").outworn(high)
+    low, high = (WornDepths(share * heights, system.unworn().strip) for share in (0.49, 0.51))
+    assert not system.mesh_update_due(low)
+    assert system.mesh_update_due(high)
+    assert not assembled("example1", *COARSE, "geometry.follow_wear=never").mesh_update_due(high)
     z = np.unique(system.bodies.punch.body.mesh.geometry.x[:, 1].round(9))
     np.testing.assert_allclose(heights, z[1] - z[0], rtol=1e-9)
 
@@ -160,11 +162,11 @@ def test_pressure_on_some_of_the_nodes() -> None:
         assert heights.shape == weights.shape
         if not solid:
             np.testing.assert_allclose(heights, 0.5, rtol=1e-9)
-        low, high = (Worn(share * heights, system.unworn().strip) for share in (0.49, 0.51))
-        assert not system.outworn(low)
-        assert system.outworn(high)
+        low, high = (WornDepths(share * heights, system.unworn().strip) for share in (0.49, 0.51))
+        assert not system.mesh_update_due(low)
+        assert system.mesh_update_due(high)
         depth = 0.02 + 0.01 * surface.x @ [1, 2, 0] if solid else np.full(len(weights), 0.02)
-        moved = assemble(system.case, system.comm, Worn(depth, system.unworn().strip))
+        moved = assemble(system.case, system.comm, WornDepths(depth, system.unworn().strip))
         assert moved.bodies.moved is not None
         np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
         lost = area(punch.body) - area(moved.bodies.punch.body)

@@ -12,7 +12,7 @@ from fenwear import Tribosystem, march, steady
 from fenwear.contact import ContactState
 from fenwear.contact.complementarity import BROKEN, broken_text, complementarity_error
 from fenwear.contact.condensed import CondensedContact
-from fenwear.watch import Watch, steady_warnings
+from fenwear.plausibility import StateMonitor, steady_warnings
 
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=6", "geometry.parameters.growth=1.5")
 
@@ -58,4 +58,4 @@ def test_a_contact_that_lies(assembled: Callable[..., Tribosystem], monkeypatch:
     *_, block = march(system, 2)
     assert block.equilibrium_error.max() < 1e-12
     assert block.complementarity_error.min() > 0.05
-    assert "in half-cycle 1 the contact breaks its own conditions" in Watch(system).see(block)[0]
+    assert "in half-cycle 1 the contact breaks its own conditions" in StateMonitor(system).see(block)[0]

@@ -14,7 +14,7 @@ from fenwear import ConvergenceError, Tribosystem, assemble
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.full import FullContact
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 P = 1000.0  # load per thickness, N/mm
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # c = 1.6: the rear edge lifts off
@@ -238,7 +238,7 @@ def test_action_is_reaction_on_a_scarred_surface(assembled: Callable[..., Tribos
     small = ("geometry.parameters.elements_along_contact=12", "motion.positions=3", "contact.friction=0.3")
     flat = assembled("fretting", *small)
     x = flat.pair.strip.x[:, 0]
-    scar = Worn(np.zeros(len(flat.pair.weights)), 4e-3 * np.maximum(1 - (x / 0.25) ** 2, 0) ** 2)
+    scar = WornDepths(np.zeros(len(flat.pair.weights)), 4e-3 * np.maximum(1 - (x / 0.25) ** 2, 0) ** 2)
     system = assemble(flat.case, followed=scar)
     assert np.ptp(system.pair.normal[:, 0]) > 0.02  # radians that the frame turns by
     thickness = flat.case.model.thickness

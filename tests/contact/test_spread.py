@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from fenwear import ConvergenceError, Tribosystem, assemble, jump, load_case, march, steady, vary
 from fenwear.arrays import Array
-from fenwear.assembly import needs_of, shares_text, tribosystem
+from fenwear.assembly import resources_of, resources_text, tribosystem
 from fenwear.contact import CondensedContact, SlidingContact, phase_rows, spread, spread_nodes
 from fenwear.cycle import stability_number
 from fenwear.interface import PressureCompliance
@@ -60,14 +60,14 @@ def test_runs_are_the_same(name: str, settings: tuple[str, ...], monkeypatch: py
 def test_steady_states_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """With another friction and stroke, and none where there is none; the explicit limit, too; check tells."""
     whole = assemble(load_case("example1", SMALL))
-    needed, changes = needs_of(whole).memory, ("contact.friction=0.2", "motion.amplitude=2")
+    needed, changes = resources_of(whole).memory, ("contact.friction=0.2", "motion.amplitude=2")
     expected = [steady(vary(whole, change)).phase_pressure for change in changes]
     monkeypatch.setattr(tribosystem, "SHARED", 0)
     monkeypatch.setattr(phase_rows, "RUN", 30)
     shared = assemble(load_case("example1", SMALL))
-    few = needs_of(shared).memory
+    few = resources_of(shared).memory
     assert stability_number(shared) == pytest.approx(stability_number(whole), rel=1e-6)
-    lines = shares_text(shared, needs_of(shared))
+    lines = resources_text(shared, resources_of(shared))
     assert any(f"{COMM.size} ranks share the rows of its {len(shared.pair.weights)} nodes" in line for line in lines)
     assert few < needed
     monkeypatch.setattr(PressureCompliance, "matrix", None)  # no matrix of all nodes is made

@@ -16,7 +16,7 @@ from fenwear.cycle import Block, decay_rates, evolve, growth_rate
 from fenwear.cycle.stability import phase_tangent
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 from fenwear_verify.bodies import two_blocks
 
 TERMS = "{terms=[{compliance=0.5, time='20 s'}, {compliance=1, time='400 s'}]}"
@@ -119,7 +119,7 @@ def test_growth_rates_see_creep() -> None:
     rng = np.random.default_rng(1)
     worn = 1e-9 * rng.random(len(begin.worn.punch))
     state = 1e-9 * rng.random(len(begin.worn.crept))
-    other = replace(begin, worn=begin.worn + Worn(worn, np.zeros_like(begin.worn.strip), crept=state))
+    other = replace(begin, worn=begin.worn + WornDepths(worn, np.zeros_like(begin.worn.strip), crept=state))
     done = begin.half_cycle + 2
     ends = [next(march(system, done, implicit=True, start=one)) for one in (begin, other)]
     assert (np.diff([one.pressure > 0 for one in ends], axis=0) == 0).all()

@@ -14,7 +14,7 @@ from fenwear.case.templates import fill_in, find_template
 from fenwear.cycle import Block, follow
 from fenwear.cycle.follow import _in_place
 from fenwear.cycle.state import RunState
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 SMALL = ("geometry.parameters.elements_along_contact=16", "geometry.parameters.contact_width=0.4")
 
@@ -88,7 +88,7 @@ def test_temperature_keeps_its_place(assembled: Callable[..., Tribosystem]) -> N
     """A linear temperature on the moved mesh is the same function of the place."""
     settings = ("geometry.parameters.elements_along_contact=8", "geometry.degree=2")
     system = assembled("example1-heat", *settings)
-    worn = Worn(0.3 + 0.1 * (system.pair.x / 30) ** 2, 0.1 + 0 * system.pair.strip.weights)
+    worn = WornDepths(0.3 + 0.1 * (system.pair.x / 30) ** 2, 0.1 + 0 * system.pair.strip.weights)
     moved = assemble(system.case, system.comm, worn)
     assert system.bodies.heat is not None
     assert moved.bodies.heat is not None

@@ -15,7 +15,7 @@ from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, mar
 from fenwear.case.program import read_program, stages_of
 from fenwear.cycle import Block, Span, at_step, follow_program
 from fenwear.errors import CaseError
-from fenwear.watch import stroke_warnings
+from fenwear.plausibility import stroke_warnings
 
 Edited = Callable[..., Case]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "geometry.follow_wear=never")

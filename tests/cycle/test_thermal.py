@@ -21,7 +21,7 @@ from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import none_yet
 from fenwear.heat import exchange
 from fenwear.life.model import steady_snapshot
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 Assemble = Callable[..., Tribosystem]
 MEAN = 1e4 / 600
@@ -217,7 +217,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]
     contacts = tuple(ContactState(p[None], g[None], modes, 0) for p, g in zip(state.pressure, state.gap, strict=True))
     shape = state.shape + bulge * (system.pair.x / 30) ** 2
     return RunState(
-        0, Worn(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic), none_yet(system)
+        0, WornDepths(shape, 0 * system.pair.strip.weights), contacts, heat.exchange.at(periodic), none_yet(system)
     ), state
 
 
@@ -279,7 +279,9 @@ def test_tangent_of_a_half_cycle(assembled: Assemble, name: str) -> None:
 
     def end(temperature: Array, worn: Array) -> tuple[Array, Array, Array]:
         start = heat.exchange.at(before.values + temperature)
-        moment = RunState(0, Worn(state.shape + worn, 0 * system.pair.strip.weights), contacts, start, none_yet(system))
+        moment = RunState(
+            0, WornDepths(state.shape + worn, 0 * system.pair.strip.weights), contacts, start, none_yet(system)
+        )
         block = run(system, 1, implicit=True, start=moment)
         return block.end.temperature.values, block.end.worn.punch, block.pressure[0]
 
@@ -328,7 +330,7 @@ def test_growth_with_friction_by_temperature(assembled: Assemble) -> None:
     ends = []
     for sign in (1, -1):
         temperature = heat.exchange.at(states[0].values + sign * mode[:dim])
-        worn = Worn(state.shape + sign * mode[dim:], 0 * system.pair.strip.weights)
+        worn = WornDepths(state.shape + sign * mode[dim:], 0 * system.pair.strip.weights)
         ends.append(run(system, 20, implicit=True, start=RunState(0, worn, contacts, temperature, none_yet(system))))
     apart = np.linalg.norm(ends[0].pressure - ends[1].pressure, axis=1)[1::2]
     rate = growth_rate(system, pressure)

@@ -15,14 +15,14 @@ from scipy.optimize import brentq
 
 from fenwear import Case, Tribosystem, assemble, jump, make_case, march, read_history, run_case, steady
 from fenwear.assembly import properties_outdated, taken_at, warmed_system
-from fenwear.cycle import Block, Steady, evolve, follow, monotonic
+from fenwear.cycle import Block, SteadyState, evolve, follow, monotonic
 from fenwear.cycle.state import RunState, beginning
 from fenwear.errors import CaseError, ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.life.model import Model
 from fenwear.life.quantities import evaluate, parse_quantity
 from fenwear.life.sensitivity import _method
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 HEIGHTS, FAR, SLOPE = (2.0, 3.0), (90.0, 20.0), 0.02
 K0 = (5.0, 1.5)
@@ -244,11 +244,11 @@ def softening(tables: dict[str, Any]) -> None:
     tables["heat"]["property_tolerance"] = 0.05
 
 
-def _settled(state: Steady) -> Block:
+def _settled(state: SteadyState) -> Block:
     """Return two cycles of a march from a steady state."""
     assert state.heat is not None
     system = state.system
-    worn = Worn(np.nan_to_num(state.shape - np.nanmin(state.shape)), system.unworn().strip)
+    worn = WornDepths(np.nan_to_num(state.shape - np.nanmin(state.shape)), system.unworn().strip)
     start = replace(beginning(system, state.heat.end), worn=worn)
     return list(evolve(system, 4, integration="explicit", start=start))[-1]
 

@@ -16,7 +16,7 @@ import invariants
 from fenwear.cycle.state import RunState
 from fenwear.cycle.totals import PhaseMeter
 from fenwear.results import checkpoint
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 # One seed of each kind, and each thing that is asked at least once; a night tries thousands of others.
 SEEDS = {
@@ -60,7 +60,7 @@ def test_a_checkpoint_that_is_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> 
 
     def load(*given: Any) -> RunState:
         state = true(*given)
-        return replace(state, worn=Worn((1 + 1e-6) * state.worn.punch, state.worn.strip))
+        return replace(state, worn=WornDepths((1 + 1e-6) * state.worn.punch, state.worn.strip))
 
     monkeypatch.setattr(checkpoint, "load", load)
     verdict, why = invariants.try_problem(SEEDS["plane, restart"])

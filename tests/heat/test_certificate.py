@@ -12,8 +12,8 @@ from fenwear.assembly import expansions, with_exchange, with_reduced_heat
 from fenwear.heat.certificate import rigid_gaps
 from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.prepare import opened_gap
+from fenwear.plausibility import fineness_text, fineness_warnings
 from fenwear.stick.heat import free_expansion
-from fenwear.watch import fineness_text, fineness_warnings
 
 COARSE = ("geometry.degree=2", "geometry.parameters.strip_length=160", "geometry.parameters.strip_height=16")
 

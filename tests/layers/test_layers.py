@@ -8,7 +8,7 @@ from combinations import SMALL, STICK
 
 from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, load_case, steady
 from fenwear.cycle import Block, evolve, growth_rate
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 DEBRIS = "contact.third_body={share=0.6, life='0.3 mm'}"
 LAYERS = {
@@ -89,10 +89,10 @@ def test_debris_that_stays_for_ever_carries_like_what_was_worn() -> None:
 def test_energy_of_a_layer_is_metered() -> None:
     """What a layer stores closes the balance of energy in partial slip, to rounding."""
     system = assemble(case_of("coulomb", f"contact.layer={LAYERS['power']}"), heat="none")
-    rig = system.lawful.rig
-    at, _ = rig.cycle(rig.beginning())
-    _, parts = rig.cycle(at)
-    assert max(one.balance_error(rig.weights) for one in parts) < 1e-12
+    problem = system.law_state.problem
+    at, _ = problem.cycle(problem.beginning())
+    _, parts = problem.cycle(at)
+    assert max(one.balance_error(problem.weights) for one in parts) < 1e-12
 
 
 def test_growth_rates_see_what_gives_way() -> None:
@@ -122,7 +122,7 @@ def test_no_pressure_is_beyond_the_hardness() -> None:
     assert (np.diff(depths, axis=0) >= 0).all()
     assert depths[-1].max() > 1e-4
     for row, phase in ((4, 0), (5, 1)):
-        gap = bare.gap(phase, Worn(block.wear[row - 1], block.wear_strip[row - 1])) + depths[row]
+        gap = bare.gap(phase, WornDepths(block.wear[row - 1], block.wear_strip[row - 1])) + depths[row]
         alone = bare.phase_contact((phase,)).solve(gap).pressure[0]
         assert np.abs(alone - block.pressure[row]).max() < 1e-6 * HARD
     volumes = [float(one.totals.of("volume_punch")[-1]) for one in (block, end(bare, "explicit"))]

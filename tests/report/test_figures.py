@@ -28,7 +28,7 @@ from fenwear.report.figures import (
 )
 from fenwear.report.sections import element_edges
 from fenwear.report.shapes import profile_figure, wear_map_figure
-from fenwear.report.style import COLOURS, Look, shades
+from fenwear.report.style import COLOURS, Style, shades
 from fenwear.results.reading import load_history
 
 SMALL = ("geometry.degree=1", "geometry.parameters.elements_along_contact=4", "wear.punch.coefficient=4e-7")
@@ -181,11 +181,11 @@ def test_profiles_and_maps(history: xarray.Dataset) -> None:
     """Heights are the unworn ones and the depth; the map begins at zero; volumes over the distance."""
     (ax,) = profile_figure(history, [20]).axes
     np.testing.assert_allclose(_lines(ax)[20], 1e3 * history.wear[-1], rtol=1e-9, atol=1e-9)  # of a flat punch
-    map_of = wear_map_figure(history, Look(axis="distance")).axes[0].collections[0]
+    map_of = wear_map_figure(history, Style(axis="distance")).axes[0].collections[0]
     values = np.asarray(map_of.get_array())
     assert not values[0].any()
     np.testing.assert_allclose(values[1:], 1e3 * history.wear, rtol=1e-12)
-    line = volume_figure(history, Look(axis="distance")).axes[0].lines[0]
+    line = volume_figure(history, Style(axis="distance")).axes[0].lines[0]
     np.testing.assert_allclose(line.get_xdata(), 1e-3 * history.sliding_distance, rtol=1e-12)
     np.testing.assert_array_equal(line.get_ydata(), history.worn_volume)
     np.testing.assert_array_equal(scar_figure(history).axes[1].lines[0].get_ydata(), history.scar_width)
@@ -194,7 +194,7 @@ def test_profiles_and_maps(history: xarray.Dataset) -> None:
 @pytest.mark.parametrize("folder", ["monotonic-lz20"], indirect=True)
 def test_formats_and_looks(folder: Path) -> None:
     """PDF and SVG beside PNG, with captions for all; what cannot be is said."""
-    paths = draw_figures(folder, (), Look(85 / 25.4, "time"), chosen_formats("pdf,svg"))
+    paths = draw_figures(folder, (), Style(85 / 25.4, "time"), chosen_formats("pdf,svg"))
     names = {path.stem for path in paths if path.suffix == ".pdf"}
     assert {"geometry", "surface_stress", "profiles"} <= names
     assert names == {path.stem for path in paths if path.suffix == ".svg"}

@@ -73,9 +73,9 @@ def test_a_force_relaxes_where_it_sticks() -> None:
     }
     for steps in (20, 40):
         system = two_blocks(*bars, sizes, punch={"creep": creep}, strip={"creep": creep}, **tables)
-        rig, at, forces = system.lawful.rig, system.lawful.rig.beginning(), []
+        problem, at, forces = system.law_state.problem, system.law_state.problem.beginning(), []
         for duration in (0.0, *[2 / steps] * steps):
-            at, record = rig.step(at, TimeStep(0, 0.0, duration, 0.0, 1e-3, None, 0.0))
+            at, record = problem.step(at, TimeStep(0, 0.0, duration, 0.0, 1e-3, None, 0.0))
             forces.append(float(record.force[0]))
         time = 2 / steps * np.arange(steps + 1)
         exact = forces[0] * (1 + 1.5 * np.exp(-2.5 * time)) / 2.5
@@ -102,12 +102,12 @@ def test_a_shape_has_an_end() -> None:
 def test_what_has_crept_comes_to_its_end() -> None:
     """Jumps over many retardation times end in the state that cycles leave as it is."""
     system = assemble(case_of(*WHO["all"], "wear.punch.coefficient='1e-12 1/MPa'"))
-    rig, creep = system.lawful.rig, system.lawful.rig.interface.creep
-    cycle = first_cycle(rig, rig.beginning(), rig.unworn(), 0)
+    problem, creep = system.law_state.problem, system.law_state.problem.interface.creep
+    cycle = first_cycle(problem, problem.beginning(), problem.unworn(), 0)
     while cycle.number < 20_000:
-        cycle = jumped(rig, cycle, 20_000, 5e-2)
+        cycle = jumped(problem, cycle, 20_000, 5e-2)
     now = cycle.worn.crept
-    lasting = creep.lasting(now, cycle.end.contact.crept, rig.program.period)
+    lasting = creep.lasting(now, cycle.end.contact.crept, problem.program.period)
     assert np.abs(lasting - now).max() < 1e-2 * np.abs(now).max()
 
 

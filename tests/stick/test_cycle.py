@@ -10,32 +10,32 @@ import pytest
 
 from fenwear import Block, CaseError, assemble, jump, load_case, march
 from fenwear.errors import ConvergenceError
-from fenwear.stick.cycle import Records, Rig
+from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
 from fenwear.stick.fineness import HALVINGS, fine_enough
 from fenwear.stick.program import make_program
-from fenwear.stick.setup import make_rig, with_steps
+from fenwear.stick.setup import partial_slip_problem, with_steps
 
 COARSE = ("geometry.parameters.elements_along_contact=20", "geometry.follow_wear='never'")
 SMALL = (*COARSE, "motion.amplitude='3 um'")
 
 
 @lru_cache
-def rig(*settings: str) -> Rig:
-    return make_rig(load_case("fretting-partial-slip", [*SMALL, *settings]))
+def problem(*settings: str) -> PartialSlipProblem:
+    return partial_slip_problem(load_case("fretting-partial-slip", [*SMALL, *settings]))
 
 
-def first_cycle(of: Rig) -> Records:
-    return Records.joined(of.cycle(of.beginning())[1])
+def first_cycle(of: PartialSlipProblem) -> TimeStepRecords:
+    return TimeStepRecords.joined(of.cycle(of.beginning())[1])
 
 
-def second_cycle(of: Rig) -> Records:
-    return Records.joined(of.cycle(of.cycle(of.beginning())[0])[1])
+def second_cycle(of: PartialSlipProblem) -> TimeStepRecords:
+    return TimeStepRecords.joined(of.cycle(of.cycle(of.beginning())[0])[1])
 
 
 @pytest.mark.parametrize("settings", [(), ("stick.force='60 N'",), ("stick.bulk_stress='200 MPa'",)])
 def test_energy_of_every_half_cycle(settings: tuple[str, ...]) -> None:
     """What the rig puts in is stored or dissipated, to rounding; friction never gives energy back."""
-    driven = rig(*settings)
+    driven = problem(*settings)
     at, parts = driven.cycle(driven.beginning())
     again = driven.cycle(at)[1]
     for part in [*parts, *again]:
@@ -50,9 +50,9 @@ def test_loop_area_is_the_work_of_friction() -> None:
     """The area of the closed loop tends to it with the time steps."""
     errors = []
     for steps in (10, 20, 40):
-        driven = with_steps(rig(), load_case("fretting-partial-slip", list(SMALL)), steps)
+        driven = with_steps(problem(), load_case("fretting-partial-slip", list(SMALL)), steps)
         at, _ = driven.cycle(driven.beginning())
-        records = Records.joined(driven.cycle(at)[1])
+        records = TimeStepRecords.joined(driven.cycle(at)[1])
         Q, d = records.force, records.displacement
         area = 0.5 * np.abs(np.sum(Q * np.roll(d, -1) - np.roll(Q, -1) * d))
         errors.append(abs(records.energy(driven.weights) / area - 1))
@@ -62,9 +62,9 @@ def test_loop_area_is_the_work_of_friction() -> None:
 
 def test_force_and_displacement_drive_the_same_loop() -> None:
     """The forces of a run by displacement, imposed, move the strip as it was moved."""
-    moved = second_cycle(rig())
+    moved = second_cycle(problem())
     largest = float(np.abs(moved.force).max())
-    pulled = second_cycle(rig(f"stick.force='{largest!r} N'"))
+    pulled = second_cycle(problem(f"stick.force='{largest!r} N'"))
     ends = slice(len(moved) // 2 - 1, None, len(moved) // 2)
     assert pulled.force[ends] == pytest.approx([largest, -largest], rel=1e-9)
     assert pulled.displacement[ends] == pytest.approx(moved.displacement[ends], rel=2e-3)
@@ -97,7 +97,7 @@ def test_jumps_tend_to_the_march() -> None:
 
 def test_worn_volume_goes_with_the_work_of_friction() -> None:
     """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
-    driven = rig()
+    driven = problem()
     records = first_cycle(driven)
     energy, worn = records.energy(driven.weights), driven.worn_in(records, 0)
     assert driven.weights @ worn.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
@@ -108,13 +108,15 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
 def test_wear_begins_at_a_pressure_and_ends_to_grow_at_another() -> None:
     """Threshold and cap count at each node in each time step; sqrt(p) and the square of the speed, too."""
     law = "wear.punch={coefficient='1e-8 1/MPa', pressure_threshold='200 MPa', pressure_cap='500 MPa'}"
-    records = first_cycle(rig(law))
-    expected = 1e-8 * (np.clip(records.pressure, 200, 500) - 200) * records.slid
+    records = first_cycle(problem(law))
+    expected = 1e-8 * (np.clip(records.pressure, 200, 500) - 200) * records.slip_magnitude
     assert records.punch_depth == pytest.approx(expected, rel=1e-12)
     law = "wear.punch={coefficient=1e-8, pressure_exponent=0.5, speed_exponent=2}"
-    records = first_cycle(rig(law))
+    records = first_cycle(problem(law))
     duration = 0.2 / 40
-    assert records.punch_depth == pytest.approx(1e-8 * records.pressure**0.5 * records.slid**2 / duration, rel=1e-12)
+    assert records.punch_depth == pytest.approx(
+        1e-8 * records.pressure**0.5 * records.slip_magnitude**2 / duration, rel=1e-12
+    )
 
 
 def test_large_strokes_slide_as_a_whole() -> None:
@@ -122,7 +124,7 @@ def test_large_strokes_slide_as_a_whole() -> None:
     settings = ["geometry.parameters.elements_along_contact=24", "motion.positions=9"]
     sliding = assemble(load_case("fretting", settings))
     case = load_case("fretting", [*settings, "contact.law='coulomb'", "stick.steps=9"])
-    driven = make_rig(case)
+    driven = partial_slip_problem(case)
     at, _ = driven.cycle(driven.beginning())
     _, parts = driven.cycle(at)
     for half, part in enumerate(parts):
@@ -143,7 +145,7 @@ LOAD = f"punch.loads=[{{on='punch_top', force=['0 N', '-120 N'], over_cycle={COU
 
 def test_steps_are_halved_where_it_counts() -> None:
     """The work of friction of the cycle tends to that of many equal steps as the tolerance falls, in fewer steps."""
-    start = rig(LOAD, "stick.steps=8")
+    start = problem(LOAD, "stick.steps=8")
     case = load_case("fretting-partial-slip", [*SMALL, LOAD, "stick.steps=8"])
     exact = first_cycle(with_steps(start, case, 96)).energy(start.weights)
     errors, counts = [], []
@@ -168,7 +170,7 @@ def test_steps_are_halved_where_it_counts() -> None:
 def test_steps_that_stay_too_coarse_are_told() -> None:
     """Where the finest do not reach the tolerance."""
     case = load_case("fretting-partial-slip", [*SMALL, LOAD, "stick.steps=2", "stick.step_tolerance=1e-7"])
-    found, fineness = fine_enough(rig(LOAD, "stick.steps=2"), case)
+    found, fineness = fine_enough(problem(LOAD, "stick.steps=2"), case)
     assert not fineness.enough
     assert 1e-7 < fineness.change < 0.1
     assert len(found.program.steps) <= 2 * 2 * 2**HALVINGS
@@ -207,15 +209,15 @@ def test_bad_cases_name_the_key(settings: list[str], message: str) -> None:
 
 def test_more_force_than_friction_holds() -> None:
     """The run ends with what the contact carries."""
-    driven = rig("stick.force='109 N'")
+    driven = problem("stick.force='109 N'")
     with pytest.raises(ConvergenceError, match=r"gross sliding starts: the tangential force .* reaches mu P = 108"):
         driven.cycle(driven.beginning())
 
 
 def test_the_surface_is_stretched_most_at_the_ends_of_strokes() -> None:
     """Like bodies stretch alike: what sticks keeps its strain. None swings at a node as the edge of slip comes by."""
-    driven = rig()
+    driven = problem()
     _, parts = driven.cycle(driven.cycle(driven.beginning())[0])
-    strain = Records.joined(parts).strain[:, :, 0]
+    strain = TimeStepRecords.joined(parts).strain[:, :, 0]
     largest, at_ends = strain.max(axis=0), strain[[len(strain) // 2 - 1, -1]].max(axis=0)
     assert np.abs(largest - at_ends).max() < 0.02 * np.ptp(strain, axis=0).max()

@@ -12,9 +12,9 @@ from fenwear import assemble, jump, load_case
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.case import Case
-from fenwear.stick.cycle import Rig
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import final_shape, stick_zone
-from fenwear.stick.setup import make_rig
+from fenwear.stick.setup import partial_slip_problem
 
 LOAD, RADIUS, E_STAR = 120.0, 6.0, 2e5 / (2 * (1 - 0.3**2))
 C = 0.0609  # half-width that stays
@@ -47,7 +47,7 @@ def test_the_scar_tends_to_the_exact_one() -> None:
     """Of first order in the distance of nodes, as the edge of a zone of nodes is; hardly any tangential force."""
     errors = []
     for elements in (20, 40):
-        pressed = make_rig(pressed_on(elements, "stick.steps=2", "stick.force='1e-6 N'"))
+        pressed = partial_slip_problem(pressed_on(elements, "stick.steps=2", "stick.force='1e-6 N'"))
         x, weights = pressed.interface.middle.pair.x, pressed.weights
         zone = np.abs(x) < C
         area = float(weights @ final_shape(pressed, zone).depth)
@@ -67,7 +67,7 @@ def test_the_end_is_as_exact_as_it_says() -> None:
     c, load = half_width * np.sqrt(1 - share), line_load(half_width)
     area, depth = exact_end(c, load, 4.0)
     for elements in (24, 36, 48):
-        worn = make_rig(equal_cylinders(half_width, elements, share * 0.2 * load))
+        worn = partial_slip_problem(equal_cylinders(half_width, elements, share * 0.2 * load))
         found = final_shape(worn)
         assert found.deepest is not None
         assert found.volume is not None
@@ -96,14 +96,14 @@ def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.
 
     monkeypatch.setattr("fenwear.stick.interface.contact_frame", upright)
     system = assemble(pressed_on(14, "stick.force='60 N'", "stick.steps=4", "stick.step_tolerance=1"))
-    coarse = system.lawful.rig
+    coarse = system.law_state.problem
     interface = coarse.interface
     interface.punch, interface.strip = alike(interface.punch), alike(interface.strip)
     interface._positions = {0.0: interface._position(interface.middle.pair)}
-    driven = Rig(interface, coarse.program, coarse.wear, coarse.friction)
+    driven = PartialSlipProblem(interface, coarse.program, coarse.wear, coarse.friction)
     zone = stick_zone(driven)
     end = final_shape(driven, zone)
-    alike_bodies = replace(system, lawful=replace(system.lawful, rig=driven))
+    alike_bodies = replace(system, law_state=replace(system.law_state, problem=driven))
     last = list(jump(alike_bodies, 4_000_000, tolerance=0.02))[-1]
     depth = last.wear[-1] + interface.middle.pair.wear_interpolation @ last.wear_strip[-1]
     pressure = last.steps[-1].pressure[-1]

@@ -15,8 +15,8 @@ from scipy.sparse.linalg import splu
 from fenwear import load_case
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.stick import Imposed, StickInterface, advance, untouched
-from fenwear.stick.cycle import Records
-from fenwear.stick.setup import make_rig
+from fenwear.stick.cycle import TimeStepRecords
+from fenwear.stick.setup import partial_slip_problem
 
 MU = 0.5
 CLOSE = 1e-8
@@ -147,12 +147,14 @@ def test_plane(unlike: Callable[[], StickInterface]) -> None:
     compare(unlike(), 200.0, [1e-3, 3e-3, 1e-3, -2e-3, 1e-3])
 
 
-def cycles(name: str, *settings: str) -> tuple[Records, Records]:
+def cycles(name: str, *settings: str) -> tuple[TimeStepRecords, TimeStepRecords]:
     """Return the first cycle of a case by its condensed bodies, and by contact.solver = "full"."""
     found = []
     for solver in ("condensed", "full"):
-        rig = make_rig(load_case(name, [*settings, "run.integration='explicit'", f"contact.solver='{solver}'"]))
-        found.append(Records.joined(rig.cycle(rig.beginning())[1]))
+        problem = partial_slip_problem(
+            load_case(name, [*settings, "run.integration='explicit'", f"contact.solver='{solver}'"])
+        )
+        found.append(TimeStepRecords.joined(problem.cycle(problem.beginning())[1]))
     return found[0], found[1]
 
 

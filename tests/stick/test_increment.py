@@ -15,11 +15,11 @@ from fenwear import load_case
 from fenwear.contact import CondensedContact, SlidingContact
 from fenwear.errors import ConvergenceError
 from fenwear.interface import join
+from fenwear.plausibility.slip import unique_text
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
 from fenwear.stick.cone import project
-from fenwear.stick.cycle import Records
-from fenwear.stick.setup import make_rig
-from fenwear.watch.slip import unique_text
+from fenwear.stick.cycle import TimeStepRecords
+from fenwear.stick.setup import partial_slip_problem
 
 RADIUS, LOAD = 200.0, 100.0
 SOFT_ON_STIFF = (
@@ -130,8 +130,8 @@ def test_friction_too_large_is_seen() -> None:
     found = {}
     for mu in (0.9, 6.0):
         case = load_case("fretting-partial-slip", [*SOFT_ON_STIFF, f"contact.friction={mu}"])
-        rig = make_rig(case)
-        records = Records.joined(rig.cycle(rig.beginning())[1])
+        problem = partial_slip_problem(case)
+        records = TimeStepRecords.joined(problem.cycle(problem.beginning())[1])
         found[mu] = records.unique.astype(bool)
     assert found[0.9].all()
     assert unique_text(found[0.9]) == ""

@@ -16,7 +16,7 @@ from fenwear.report.figures import all_figures
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import Records
+from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.heat import read_at
 
 WARM = (
@@ -77,7 +77,7 @@ def test_expansion_moves_the_surfaces_in_every_direction() -> None:
     free = (
         f"{{on='strip_bottom', fix=['z']}}, {{at=[0, 0, {bottom}], fix=['x', 'y']}}, {{at=[2, 0, {bottom}], fix=['y']}}"
     )
-    warm = assembled("strip.temperatures=[]", f"strip.supports=[{free}]").lawful.rig
+    warm = assembled("strip.temperatures=[]", f"strip.supports=[{free}]").law_state.problem
     assert warm.heat is not None
     punch, strip = warm.heat.exchange.bases
     even = np.concatenate([basis.coordinates(np.full(basis.body.owned, 10.0)) for basis in (punch, strip)])
@@ -116,7 +116,7 @@ def test_ranks_agree() -> None:
     """Tractions, slip and temperatures of every time step to 1e-9 of the largest."""
     case = load_case("fretting-sphere", WARM)
     together, alone = (
-        Records.joined([steps.records for steps in next(march(assemble(case, comm), 2)).steps])
+        TimeStepRecords.joined([steps.records for steps in next(march(assemble(case, comm), 2)).steps])
         for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )
     for name in ("pressure", "traction", "slip", "temperature", "heat", "force"):
@@ -126,7 +126,7 @@ def test_ranks_agree() -> None:
 
 def test_values_are_read_beside_their_nodes() -> None:
     """Linear fields are exact within the surface, and beside it stay as at its rim."""
-    surface = assembled("heat.partition=0.3", "heat.debris=0.1").lawful.rig.interface.middle.pair.strip
+    surface = assembled("heat.partition=0.3", "heat.debris=0.1").law_state.problem.interface.middle.pair.strip
     x = surface.trace
     moved = x + np.array([0.02, -0.01, 0.0])
     inside = (np.abs(moved[:, :2]) <= np.abs(x[:, :2]).max(axis=0)).all(axis=1)

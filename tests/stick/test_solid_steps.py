@@ -14,7 +14,7 @@ from laws import check_energy, check_laws
 from fenwear import load_case
 from fenwear.errors import ConvergenceError
 from fenwear.stick import Imposed, Position, StickInterface, advance, untouched
-from fenwear.stick.setup import make_rig
+from fenwear.stick.setup import partial_slip_problem
 
 LOAD = 50.0
 COARSE = (
@@ -27,7 +27,7 @@ COARSE = (
 
 @lru_cache
 def unlike() -> StickInterface:
-    interface = make_rig(load_case("fretting-sphere", list(COARSE))).interface
+    interface = partial_slip_problem(load_case("fretting-sphere", list(COARSE))).interface
     assert isinstance(interface, StickInterface)
     return interface
 

@@ -17,8 +17,8 @@ from fenwear.report.page import write_report
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import Records, Rig
-from fenwear.stick.setup import make_rig
+from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
+from fenwear.stick.setup import partial_slip_problem
 from fenwear.stick.strain import surface_gradient, surface_strain
 
 COARSE = (
@@ -30,13 +30,13 @@ COARSE = (
 
 
 @lru_cache
-def rig(*settings: str) -> Rig:
-    return make_rig(load_case("fretting-sphere", [*COARSE, *settings]))
+def problem(*settings: str) -> PartialSlipProblem:
+    return partial_slip_problem(load_case("fretting-sphere", [*COARSE, *settings]))
 
 
-def second_cycle(of: Rig) -> Records:
+def second_cycle(of: PartialSlipProblem) -> TimeStepRecords:
     at, _ = of.cycle(of.beginning())
-    return Records.joined(of.cycle(at)[1])
+    return TimeStepRecords.joined(of.cycle(at)[1])
 
 
 @pytest.fixture(scope="module")
@@ -93,8 +93,8 @@ def test_report_of_a_solid(ran: tuple[dict, Path]) -> None:
 
 def test_along_y_is_along_x_turned() -> None:
     """Sphere, square of nodes and supports are the same along both: the fields swap their axes."""
-    one, two = second_cycle(rig()), second_cycle(rig("motion.along=[0, 1, 0]"))
-    x = rig().interface.middle.pair.punch.x
+    one, two = second_cycle(problem()), second_cycle(problem("motion.along=[0, 1, 0]"))
+    x = problem().interface.middle.pair.punch.x
     far, order = cKDTree(x[:, :2]).query(x[:, 1::-1])
     assert far.max() < 1e-5
     scale = one.pressure.max()
@@ -105,7 +105,7 @@ def test_along_y_is_along_x_turned() -> None:
 
 def test_a_turning_strip_rubs_around_its_axis() -> None:
     """Torsion: tractions around the axis alone, a torque, slip from the edge inwards."""
-    turned = rig("motion={kind='oscillation', amplitude='0.01 rad', period=1, axis=[0, 0, 1], centre=[0, 0, 0]}")
+    turned = problem("motion={kind='oscillation', amplitude='0.01 rad', period=1, axis=[0, 0, 1], centre=[0, 0, 0]}")
     records = second_cycle(turned)
     x, t = turned.interface.middle.pair.punch.x, records.traction[4]
     around = x[:, 0] * t[:, 1] - x[:, 1] * t[:, 0]
@@ -133,7 +133,7 @@ def test_check_and_end_of_a_solid() -> None:
 def test_strains_of_linear_displacements_are_exact() -> None:
     """Along and across the sliding, whatever its direction."""
     for settings, expected in (((), [1e-3, -5e-4]), (("motion.along=[0, 1, 0]",), [-5e-4, 1e-3])):
-        interface = rig(*settings).interface
+        interface = problem(*settings).interface
         position = interface.middle
         gradient = surface_gradient(position.pair.punch)
         x = position.pair.punch.x
@@ -144,7 +144,7 @@ def test_strains_of_linear_displacements_are_exact() -> None:
 
 def test_bulk_stress_of_a_solid_strains_it_both_ways() -> None:
     """Pulled along x the strip gets narrower along y: both act on the contact."""
-    interface = rig().interface
+    interface = problem().interface
     x = interface.middle.pair.punch.x
     assert interface.bulk[:, 0] == pytest.approx(x[:, 0], abs=1e-6)
     assert interface.bulk[:, 1] == pytest.approx(-0.3 * x[:, 1], abs=1e-6)

@@ -16,7 +16,7 @@ from fenwear.cli.partial_slip import final_of
 from fenwear.results.cycles import by_cycles
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
-from fenwear.stick.cycle import Records
+from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.heat import balance_error
 
 WARM = (
@@ -47,7 +47,7 @@ def test_expansion_moves_the_surfaces_in_every_direction() -> None:
     """An even temperature of a free body: what expands by alpha T in every direction."""
     corner = "{at=[0, 0], fix=['x']}"
     supports = f"strip.supports=[{{on='strip_bottom', fix=['z']}}, {corner}]"
-    warm = assembled("strip.temperatures=[]", supports).lawful.rig
+    warm = assembled("strip.temperatures=[]", supports).law_state.problem
     assert warm.heat is not None
     punch, strip = warm.heat.exchange.bases
     even = np.concatenate([basis.coordinates(np.full(basis.body.owned, 10.0)) for basis in (punch, strip)])
@@ -95,7 +95,7 @@ def test_jumps_get_as_warm_as_the_march() -> None:
     for tolerance in (0.1, 5e-4):
         last = list(jump(warm, 2 * cycles, tolerance=tolerance))[-1]
         assert last.half_cycle[-1] == 2 * cycles
-        records = Records.joined([steps.records for steps in last.steps[-2:]])
+        records = TimeStepRecords.joined([steps.records for steps in last.steps[-2:]])
         assert balance_error(records.heat) < 1e-10
         errors.append(abs(records.temperature[-1, 0].max() / marched - 1))
     assert errors[1] < 0.5 * errors[0] < 0.02

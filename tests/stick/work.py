@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import pytest
 
 from fenwear import Tribosystem, march
-from fenwear.stick.cycle import Records
+from fenwear.stick.cycle import TimeStepRecords
 from fenwear.stick.heat import balance_error
 
 
-def half_cycles_whose_work_is_heat(warm: Tribosystem) -> Iterator[Records]:
+def half_cycles_whose_work_is_heat(warm: Tribosystem) -> Iterator[TimeStepRecords]:
     """Yield the half-cycles of two cycles, each with all its friction work as heat and both its balances kept."""
     weights = warm.pair.weights
     for block in march(warm, 4):

@@ -131,7 +131,7 @@ def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: 
             raise ZeroDivisionError("nothing to divide by")
         return {"mean_pressure": np.array(1.0)}
 
-    monkeypatch.setattr(engines.Workshop, "values", broken)
+    monkeypatch.setattr(engines.VariantRunner, "values", broken)
     found = package.sweep(CASE, {"contact.friction": [0.1, 0.2]})
     assert found["mean_pressure"].values.tolist()[0] == 1.0
     assert found["trouble"].values.tolist() == ["", "an error that was not foreseen: nothing to divide by"]
@@ -140,7 +140,7 @@ def test_an_error_that_was_not_foreseen(monkeypatch: pytest.MonkeyPatch, capfd: 
 
 def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Interrupted, or with values added, only what is not there is computed; a broken file is not there."""
-    folder, computed, real = tmp_path / "out", [], engines.Workshop.values
+    folder, computed, real = tmp_path / "out", [], engines.VariantRunner.values
 
     def counted(self: Any, case: package.Case, of: Any) -> Any:
         if len(computed) == 2 and not (folder / "sweep.nc").exists():
@@ -148,7 +148,7 @@ def test_goes_on_with_what_lacks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         computed.append(case.contact.friction)
         return real(self, case, of)
 
-    monkeypatch.setattr(engines.Workshop, "values", counted)
+    monkeypatch.setattr(engines.VariantRunner, "values", counted)
     with pytest.raises(InterruptedRunError, match=r"2 of 3 variants are in .*, to go on: --resume"):
         package.sweep(CASE, {"contact.friction": [0.1, 0.2, 0.3]}, folder=folder)
     (folder / "sweep.nc").touch()

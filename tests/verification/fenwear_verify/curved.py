@@ -7,7 +7,7 @@ import numpy as np
 from fenwear import vary
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.watch.ends import contact_ends
+from fenwear.plausibility.ends import contact_ends
 from fenwear_verify.bodies import STEEL, builtin
 from fenwear_verify.contact import measured_half_width, semi_ellipse
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification

@@ -15,7 +15,7 @@ from fenwear.case import load_case, make_case
 from fenwear.cycle import jump, march
 from fenwear.stick import Imposed, StickInterface, StickState, advance, untouched
 from fenwear.stick.final import final_shape, stick_zone
-from fenwear.stick.setup import make_rig
+from fenwear.stick.setup import partial_slip_problem
 from fenwear_verify.stick import pressed_half_planes
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -56,10 +56,10 @@ def partial_slip_end() -> Result:
             "geometry.parameters.strip_height='12 mm'",
             "motion.amplitude='0.001 um'",  # tractions small enough not to move the gap of bodies of some millimetres
         ]
-        rig = make_rig(load_case("fretting-partial-slip", settings))
-        x, weights = rig.interface.middle.pair.x, rig.weights
+        problem = partial_slip_problem(load_case("fretting-partial-slip", settings))
+        x, weights = problem.interface.middle.pair.x, problem.weights
         zone = np.abs(x) < 0.0501
-        found = final_shape(rig, zone)
+        found = final_shape(problem, zone)
         exact = worn_end(x, a, float(weights @ zone) / 2)
         errors.append(abs(float(weights @ found.depth / (weights @ exact) - 1)))
     rows += [
@@ -71,7 +71,7 @@ def partial_slip_end() -> Result:
     ]
     lines += [Line("closed form", x, exact, reference=True), Line("fenwear, directly", x, found.depth)]
     system = assemble(load_case("fretting-partial-slip", ["geometry.parameters.elements_along_contact=40", *FAST]))
-    end = final_shape(system.lawful.rig, stick_zone(system.lawful.rig))
+    end = final_shape(system.law_state.problem, stick_zone(system.law_state.problem))
     *_, last = jump(system, 4_000_000, tolerance=0.1)
     depth = system.pair.opening(last.wear[-1], last.wear_strip[-1])
     rows.append(profile("depth after 2,000,000 cycles by jumps", end.depth, depth, 2e-3, scale=float(end.depth.max())))

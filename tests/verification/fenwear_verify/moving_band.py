@@ -11,7 +11,7 @@ from scipy.special import erf, k0e
 
 from fenwear import load_case
 from fenwear.arrays import Array
-from fenwear.assembly import Placed, place_case
+from fenwear.assembly import ContactSetup, place_case
 from fenwear.heat.conduction import Surroundings
 from fenwear.heat.prepare import prepare_exchange
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
@@ -58,7 +58,7 @@ def after(x: float, half_width: float, speed: float, diffusivity: float, time: f
 DEEP = ("geometry.parameters.strip_height=2000", "geometry.parameters.strip_length=20000")
 
 
-def band(peclet: float, direction: int = 1, *settings: str) -> Placed:
+def band(peclet: float, direction: int = 1, *settings: str) -> ContactSetup:
     """Return the punch of Example 1 with its strip, which slides one way; collective.
 
     A half-cycle takes material past half the source.
@@ -89,7 +89,7 @@ def band(peclet: float, direction: int = 1, *settings: str) -> Placed:
     )
 
 
-def steady_rise(placed: Placed) -> tuple[Array, Array]:
+def steady_rise(placed: ContactSetup) -> tuple[Array, Array]:
     """Return k theta / q of the steady state at the contact nodes, found and exact (n,), mm; collective."""
     assert placed.bodies.heat is not None
     body, pair, phase = placed.bodies.heat[1], placed.pair, placed.motion.phases[0]
@@ -99,7 +99,7 @@ def steady_rise(placed: Placed) -> tuple[Array, Array]:
     return found, np.array([jaeger(phase.direction * x, HALF, phase.speed, DIFFUSIVITY) for x in pair.x])
 
 
-def rise_after(placed: Placed, *, reduced: bool = False) -> tuple[Array, Array]:
+def rise_after(placed: ContactSetup, *, reduced: bool = False) -> tuple[Array, Array]:
     """Return k theta / q at the end of the first half-cycle by the steps of a run, found and exact (n,); collective."""
     bodies, pair, motion, heat = placed.bodies.heat, placed.pair, placed.motion, placed.heat
     assert bodies is not None
@@ -153,7 +153,7 @@ def moving_source() -> Result:
     return Result(rows, [Plot("Moving band source: rise over its largest", "x (mm)", "rise", lines)])
 
 
-def _inner(placed: Placed) -> Array:
+def _inner(placed: ContactSetup) -> Array:
     """Return which contact nodes are not the outermost (n,)."""
     return np.asarray(np.abs(placed.pair.x) < HALF * (1 - 1e-9))
 

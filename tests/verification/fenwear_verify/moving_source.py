@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly import Placed, place_case
+from fenwear.assembly import ContactSetup, place_case
 from fenwear.heat.conduction import Surroundings
 from fenwear.sliding.field import SlidingField
 from fenwear_verify.solid import STEEL, describe
@@ -57,7 +57,7 @@ def rise_away(x: Array, speed: float) -> Array:
     return found
 
 
-def heated_block(elements: int) -> Placed:
+def heated_block(elements: int) -> ContactSetup:
     """Return a block below a punch as large as the source, held on its sides and below; collective."""
     sizes = {
         "width": 2 * HALF,
@@ -86,7 +86,7 @@ def heated_block(elements: int) -> Placed:
     return place_case(case)
 
 
-def moving_rise(placed: Placed, speed: float, direction: tuple[float, float, float]) -> tuple[Array, Array]:
+def moving_rise(placed: ContactSetup, speed: float, direction: tuple[float, float, float]) -> tuple[Array, Array]:
     """Return k theta / q found and exact where the source is (n,), mm, of material that moves so; collective.
 
     The flux enters by the pair's transfer, as friction heat does; the block's outer faces have the exact temperature.
@@ -151,6 +151,6 @@ def square_source() -> Result:
     return Result(rows, [Plot(title, "x over half the side", "k theta / (q l)", lines)])
 
 
-def _rms(placed: Placed, error: Array) -> float:
+def _rms(placed: ContactSetup, error: Array) -> float:
     weights = placed.pair.weights
     return float(np.sqrt(weights @ error**2 / weights.sum()))

@@ -6,7 +6,7 @@ import numpy as np
 
 from fenwear import assemble, load_case, vary
 from fenwear.arrays import Array
-from fenwear.assembly import Placed, Tribosystem, place_case
+from fenwear.assembly import ContactSetup, Tribosystem, place_case
 from fenwear.case import Case
 from fenwear_verify.suite import Line, Plot, Result, Row, number, order, profile, verification
 
@@ -44,7 +44,7 @@ def under(system: Tribosystem, place: float) -> tuple[Array, Array, Array]:
     return (pressure, *carried(loaded, pressure))
 
 
-def carried(system: Placed, pressure: Array) -> tuple[Array, Array]:
+def carried(system: ContactSetup, pressure: Array) -> tuple[Array, Array]:
     """Return what the nodes of each bushing carry (2, 3), N, and its moment about the origin (2, 3), N mm."""
     pair = system.pair
     forces = (pair.weights * pressure)[:, None] * (pair.normal + system.friction_ratio(1))
@@ -53,7 +53,7 @@ def carried(system: Placed, pressure: Array) -> tuple[Array, Array]:
     return np.array([forces[own].sum(axis=0) for own in owns]), np.array([turning[own].sum(axis=0) for own in owns])
 
 
-def worn_in(system: Placed, place: float) -> Array:
+def worn_in(system: ContactSetup, place: float) -> Array:
     """Return the pressures (n,) that wear tight rigid bores by a motion of the shaft, over half of each.
 
     (c0 + c1 y) cos(psi - psi0), psi0 = -atan mu, whose resultant and its moment about x are those of the load: the

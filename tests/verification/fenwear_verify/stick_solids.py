@@ -10,7 +10,7 @@ import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.stick import Imposed, StickState, advance, untouched
-from fenwear.stick.cycle import Rig
+from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.final import final_shape, stick_zone
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.jump import first_cycle, jumped
@@ -270,17 +270,17 @@ def sphere_wear_end() -> Result:
     for squares in (5, 10, 20):
         sphere = Sphere(0.3, squares, reach=1.7)
         amplitude = sphere.displacement(0.875)
-        rig = _rig(sphere, amplitude, 1e-8)
+        problem = _rig(sphere, amplitude, 1e-8)
         zone = sphere.r < sphere.a / 2
         if squares == 10:
-            sticks = sphere.area_radius(stick_zone(rig))
+            sticks = sphere.area_radius(stick_zone(problem))
             rows.append(number("amplitude of 1.58597e-3 mm: c / a of the first cycle, to half a node", 0.5, sticks,
                                0.5 / squares, scale=1.0))  # fmt: skip
-        found = final_shape(rig, zone)
+        found = final_shape(problem, zone)
         exact = worn_end(sphere, sphere.area_radius(zone) * sphere.a, sphere.r)
         errors.append(sphere.error(found.depth, exact))
-        volumes.append(float(rig.weights @ found.depth))
-        ratios.append(volumes[-1] / float(rig.weights @ exact))
+        volumes.append(float(problem.weights @ found.depth))
+        ratios.append(volumes[-1] / float(problem.weights @ exact))
     modelled = worn_end(sphere, sphere.a / 2, dense)
     rows += [
         number("closed form: radius of the scar (mm)", 0.280438, dense[modelled > 0].max(), 1e-3),
@@ -303,18 +303,18 @@ def sphere_wear_end() -> Result:
         Line("fenwear, directly", sphere.r[line], found.depth[line]),
     ]
     coarse = Sphere(0.3, 6, reach=1.7)
-    rig = _rig(coarse, amplitude, 2e-7)
-    end = final_shape(rig, stick_zone(rig))
+    problem = _rig(coarse, amplitude, 2e-7)
+    end = final_shape(problem, stick_zone(problem))
     cycles = 10_000_000
-    cycle = rig.led(lambda: first_cycle(rig, rig.beginning(), rig.unworn(), 0))
+    cycle = problem.led(lambda: first_cycle(problem, problem.beginning(), problem.unworn(), 0))
     while cycle.number < cycles:
-        cycle = rig.led(partial(jumped, rig, cycle, cycles, 0.1))
+        cycle = problem.led(partial(jumped, problem, cycle, cycles, 0.1))
     rows.append(number("6 squares over a: depth after 10,000,000 cycles by jumps, L2 error against it", 0,
                        coarse.error(cycle.worn.punch, end.depth), 5e-3, scale=1))  # fmt: skip
     return Result(rows, [Plot("End of partial-slip wear of a sphere: depth", "r (mm)", "depth (mm)", lines)])
 
 
-def _rig(sphere: Sphere, amplitude: float, rate: float) -> Rig:
+def _rig(sphere: Sphere, amplitude: float, rate: float) -> PartialSlipProblem:
     n = len(sphere.weights)
     wear = LocalWear(BodyRate(np.full(n, rate)), None)
-    return Rig(sphere.bodies, to_and_fro(amplitude, 10), wear, np.full(n, FRICTION))
+    return PartialSlipProblem(sphere.bodies, to_and_fro(amplitude, 10), wear, np.full(n, FRICTION))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.cycle import Steady
+from fenwear.cycle import SteadyState
 from fenwear_verify.paper.published import (
     PEAK_HALF_CYCLE,
     TEMPERATURE_HALF_CYCLE,
@@ -70,7 +70,7 @@ class NoHeat:
 
     x: Array
     mean: float
-    state: Steady
+    state: SteadyState
     marched: Array
 
 
@@ -88,7 +88,7 @@ class SteadyHeat:
     monotonic: float
     periodic: float
     growth: float
-    state: Steady
+    state: SteadyState
 
     @property
     def difference(self) -> float:

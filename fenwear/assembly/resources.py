@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.placed import Placed
+from fenwear.assembly.contact_setup import ContactSetup
 from fenwear.bodies.elasticity import ElasticBody, Solver
 from fenwear.bodies.response import BLOCK, SURFACE_SHARE, Request
 from fenwear.case import CONDENSED
@@ -38,7 +38,7 @@ COARSEST = 20.0  # times larger elements
 
 
 @dataclass(frozen=True)
-class BodyNeeds:
+class BodyResources:
     """What one body asks for.
 
     Attributes:
@@ -69,7 +69,7 @@ class BodyNeeds:
     together: bool = False
     made: bool = False
 
-    def coarser(self, times: float) -> BodyNeeds:
+    def coarser(self, times: float) -> BodyResources:
         """Return the same of elements so many times as large."""
         volume, surface = times**-self.dim, times ** (1 - self.dim)
         return replace(
@@ -150,7 +150,7 @@ class BodyNeeds:
 
 
 @dataclass(frozen=True)
-class Needs:
+class Resources:
     """What the set-up of both bodies, of their contact and of their heat asks for: an estimate.
 
     Attributes:
@@ -162,15 +162,15 @@ class Needs:
         numbers: Whether the contact is matrices of numbers.
     """
 
-    punch: BodyNeeds
-    strip: BodyNeeds
+    punch: BodyResources
+    strip: BodyResources
     nodes: float
     interfaces: int
     phases: int
     copies: int = 1
     numbers: bool = True
 
-    def coarser(self, times: float) -> Needs:
+    def coarser(self, times: float) -> Resources:
         """Return the same of elements so many times as large."""
         nodes = self.nodes * times ** (1 - self.punch.dim)
         parts = (self.punch.coarser(times), self.strip.coarser(times))
@@ -205,7 +205,7 @@ class Needs:
             f"of one core{heat} and {memory_size(self.memory)}, by an estimate"
         )
 
-    def fitting(self, memory: float) -> tuple[float, Needs] | None:
+    def fitting(self, memory: float) -> tuple[float, Resources] | None:
         """Return how many times as large elements fit into so much memory, and what they need; None where none do."""
         for times in np.geomspace(1.0, COARSEST, 121):
             less = self.coarser(float(times))
@@ -214,12 +214,12 @@ class Needs:
         return None
 
 
-def contact_memory(placed: Placed) -> float:
+def contact_memory(placed: ContactSetup) -> float:
     """Return the bytes of the whole contact, once."""
     return _contact(len(placed.pair.weights), _interfaces(placed), placed.pair.punch.dim, len(placed.pairs))
 
 
-def _interfaces(placed: Placed) -> int:
+def _interfaces(placed: ContactSetup) -> int:
     """Return how many interfaces the phases and the middle position have."""
     return len({id(rigid) for rigid in (*placed.rigids, placed.rigid)})
 
@@ -228,7 +228,7 @@ def _contact(nodes: float, interfaces: int, dim: int, phases: int) -> float:
     return NUMBER * (interfaces * dim + 2 * phases + 1) * nodes**2
 
 
-def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = False) -> Needs:
+def needs(placed: ContactSetup, frames: tuple[bool, bool, bool], *, shared: bool = False) -> Resources:
     """Return what condensing the bodies and joining them will need; collective.
 
     Args:
@@ -240,11 +240,11 @@ def needs(placed: Placed, frames: tuple[bool, bool, bool], *, shared: bool = Fal
     bodies, pair = placed.bodies, placed.pair
     n, dim = len(pair.weights), pair.punch.dim
     on_strip = len(pair.strip.trace) if moves else n
-    of_punch = body_needs(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
+    of_punch = body_resources(bodies.punch, n, n if fixed else n * dim, heat=bodies.heat is not None)
     one = not moves or (fixed and flat)
-    of_strip = body_needs(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
+    of_strip = body_resources(bodies.strip, on_strip, on_strip if one else on_strip * dim, heat=bodies.heat is not None)
     copies, numbers = 1 if shared else placed.comm.size, condensed(bodies)
-    return Needs(of_punch, of_strip, n, _interfaces(placed), len(placed.pairs), copies, numbers)
+    return Resources(of_punch, of_strip, n, _interfaces(placed), len(placed.pairs), copies, numbers)
 
 
 def condensed(bodies: Bodies) -> bool:
@@ -252,7 +252,7 @@ def condensed(bodies: Bodies) -> bool:
     return CONDENSED in (bodies.punch.operator, bodies.strip.operator)
 
 
-def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool = False) -> BodyNeeds:
+def body_resources(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool = False) -> BodyResources:
     """Return what condensing a body will need; collective.
 
     Args:
@@ -262,13 +262,13 @@ def body_needs(elastic: ElasticBody, patterns: int, columns: int, *, heat: bool 
         heat: Whether its answer to temperatures is asked for, too.
     """
     if elastic.operator != CONDENSED:
-        return BodyNeeds(elastic.dim, elastic.size, 0, 0, 0, 0, 0, way=elastic.setup.way, made=True)
+        return BodyResources(elastic.dim, elastic.size, 0, 0, 0, 0, 0, way=elastic.setup.way, made=True)
     size, surface = elastic.size, elastic.surface_dofs.size
     temperatures = size / elastic.dim if heat else 0.0
     entries, solver = elastic.matrix_entries(), elastic.solver
     way, together = elastic.setup.way, not heat and Request(elastic, elastic.surface.spread).in_substructures
     known = (elastic.dim, size, entries, columns, patterns, temperatures, surface, solver)
-    return BodyNeeds(*known, way=way, together=together, made=elastic.is_factored)
+    return BodyResources(*known, way=way, together=together, made=elastic.is_factored)
 
 
 def duration(seconds: float) -> str:

@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.cycle import heat_gain, heat_warnings
-from fenwear.watch.fineness import fineness_remarks
+from fenwear.plausibility.fineness import fineness_remarks
 
 STEPS, CHANGE, DIFFERENCE = "heat_steps", "heat_change_by_halving_steps", "heat_difference_from_whole_mesh"
 GAIN = "heat_gain"
 KINDS = {CHANGE: "steps", DIFFERENCE: "basis", GAIN: "answers"}  # of what is said of each
 
 
-class HeatWatch:
+class HeatMonitor:
     """Looks at the heat of each stage of a run, whose motion, friction and surroundings are its own.
 
     Attributes:

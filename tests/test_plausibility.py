@@ -20,18 +20,26 @@ from fenwear.bodies.mesh import meshes_folder
 from fenwear.case import plausibility_warnings
 from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError
+from fenwear.plausibility import (
+    StateMonitor,
+    elastic_way,
+    hot,
+    initial_warnings,
+    pressed,
+    steady_warnings,
+    stroke_warnings,
+)
+from fenwear.plausibility.chamfer import contact_chamfer
+from fenwear.plausibility.ends import contact_ends
+from fenwear.plausibility.few import few_text
+from fenwear.plausibility.layer import heated_layer, layer_warnings
+from fenwear.plausibility.rim import contact_rim
+from fenwear.plausibility.thickness import thickness
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
 from fenwear.run import position_warnings, run_case
-from fenwear.stick.cycle import Records
-from fenwear.stick.setup import make_rig
-from fenwear.watch import Watch, elastic_way, hot, initial_warnings, pressed, steady_warnings, stroke_warnings
-from fenwear.watch.chamfer import contact_chamfer
-from fenwear.watch.ends import contact_ends
-from fenwear.watch.few import few_text
-from fenwear.watch.layer import heated_layer, layer_warnings
-from fenwear.watch.rim import contact_rim
-from fenwear.watch.thickness import thickness
+from fenwear.stick.cycle import TimeStepRecords
+from fenwear.stick.setup import partial_slip_problem
 from fenwear_verify.solid import STEEL, describe
 
 Assembled = Callable[..., Tribosystem]
@@ -266,8 +274,8 @@ def test_elastic_way_against_stick(assembled: Assembled) -> None:
     """
     load, amplitude = 120.0, 20.0
     settings = (f"motion.amplitude={amplitude} um", *FRETTING)
-    rig = make_rig(load_case("fretting-partial-slip", settings))
-    work = Records.joined(rig.cycle(rig.beginning())[1]).energy(rig.weights)
+    problem = partial_slip_problem(load_case("fretting-partial-slip", settings))
+    work = TimeStepRecords.joined(problem.cycle(problem.beginning())[1]).energy(problem.weights)
     way = 1e-3 * amplitude - work / (4 * 0.9 * load)
     assert elastic_way(pressed_by(assembled, load, amplitude)) == pytest.approx(way, rel=0.2)
 
@@ -383,11 +391,11 @@ def test_a_body_worn_through_is_told(assembled: Assembled) -> None:
     area = system.bodies.punch.thickness * system.bodies.punch.surface.weights.sum()
     (block,) = march(system, 60, implicit=True)
     first = int(block.half_cycle[block.totals.of("volume_punch") >= 10 * area][0])
-    watch = Watch(system)
+    watch = StateMonitor(system)
     (text,) = watch.see(block)
     assert f"from half-cycle {first} on the punch is worn through: it has lost 10 mm where it was 10 mm thick" in text
     assert watch.warnings() == [text]
-    assert not Watch(system).see(next(march(system, first - 1, implicit=True)))
+    assert not StateMonitor(system).see(next(march(system, first - 1, implicit=True)))
 
 
 @pytest.mark.mpi

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import BodyNeeds, Needs, duration
-from fenwear.assembly.placed import Placed
+from fenwear.assembly.contact_setup import ContactSetup
+from fenwear.assembly.resources import BodyResources, Resources, duration
 from fenwear.assembly.tribosystem import shared_rows
 from fenwear.bodies.condensation import deal
 from fenwear.bodies.elasticity import ElasticBody
@@ -18,7 +18,7 @@ from fenwear.memory import memory_size
 DENSE = 4e9  # operations a second of joining ranks: Cholesky and triangular solutions of dense matrices
 
 
-def shares_text(placed: Placed, wanted: Needs) -> list[str]:
+def resources_text(placed: ContactSetup, wanted: Resources) -> list[str]:
     """Return a line for each body: how it is condensed, which ranks do it, and what each takes; collective.
 
     One more says how ranks share a large contact.
@@ -38,8 +38,8 @@ def shares_text(placed: Placed, wanted: Needs) -> list[str]:
     return lines
 
 
-def body_lines(bodies: Bodies, wanted: Needs) -> list[str]:
-    """Return a line for each body, as `shares_text`; collective."""
+def body_lines(bodies: Bodies, wanted: Resources) -> list[str]:
+    """Return a line for each body, as `resources_text`; collective."""
     own = (wanted.punch, wanted.strip)
     dealt = reversed(deal([need.holders for need in reversed(own)], bodies.comm.size))
     return [
@@ -50,7 +50,7 @@ def body_lines(bodies: Bodies, wanted: Needs) -> list[str]:
     ]
 
 
-def _text(elastic: ElasticBody, need: BodyNeeds, holders: list[int]) -> str:
+def _text(elastic: ElasticBody, need: BodyResources, holders: list[int]) -> str:
     comm, name = elastic.body.mesh.comm, elastic.body.name
     topology = elastic.body.mesh.topology
     cells: Sequence[int] = comm.allgather(topology.index_map(topology.dim).size_local)
@@ -75,7 +75,7 @@ def _text(elastic: ElasticBody, need: BodyNeeds, holders: list[int]) -> str:
     return f"{name}: {_by_columns(need, holders, columns, taken)}"
 
 
-def _by_columns(need: BodyNeeds, holders: list[int], columns: str, taken: str) -> str:
+def _by_columns(need: BodyResources, holders: list[int], columns: str, taken: str) -> str:
     """Say who solves for columns with a factor of its own."""
     if len(holders) == 1:
         return f"rank {holders[0]} factors it and solves {columns}: {taken}"
@@ -84,7 +84,7 @@ def _by_columns(need: BodyNeeds, holders: list[int], columns: str, taken: str) -
     return f"ranks {ranks} factor it, each by itself, and share its {columns}: {each} each, {memory} in all"
 
 
-def _taken(part: BodyNeeds, edge: int) -> str:
+def _taken(part: BodyResources, edge: int) -> str:
     """Return what a rank's own cells take, with an edge that is joined."""
     seconds, memory = part.alone
     return f"{duration(seconds + edge**3 / DENSE)}, {memory_size(memory + 8.0 * edge**2)}"

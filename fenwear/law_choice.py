@@ -16,14 +16,14 @@ from fenwear.assembly.laws import GROSS
 from fenwear.case import Case
 from fenwear.case.laws import Stick
 from fenwear.errors import CaseError, InputError
-from fenwear.watch import TAKEN_UP, elastic_share
+from fenwear.plausibility import TAKEN_UP, elastic_share
 
 Law = Literal["gross-sliding", "coulomb"]
 Log = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Choice:
+class LawChoice:
     """The law that contact.law = "auto" takes.
 
     Attributes:
@@ -38,7 +38,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Decided:
+class ResolvedCase:
     """A case whose law is decided.
 
     Attributes:
@@ -49,7 +49,7 @@ class Decided:
 
     case: Case
     system: Tribosystem
-    choice: Choice | None
+    choice: LawChoice | None
 
     @property
     def numbers(self) -> dict[str, Any]:
@@ -59,7 +59,7 @@ class Decided:
         return {"contact_law": self.case.contact.law, "elastic_share_of_stroke": share}
 
 
-def choose_law(system: Tribosystem) -> Choice:
+def choose_law(system: Tribosystem) -> LawChoice:
     """Return the law that the stroke of a system calls for; collective.
 
     Stick where the bodies take up more than `watch.TAKEN_UP` of the amplitude elastically and nothing in the case
@@ -71,19 +71,19 @@ def choose_law(system: Tribosystem) -> Choice:
     share = system.team.lead(lambda: elastic_share(system))
     if share is None:
         why = "the cycle is a table" if system.motion.steps else "the strip slides one way"
-        return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {why}")
+        return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {why}")
     told = f"the bodies take up about {100 * share:.3g} % of the stroke elastically"
     if share <= TAKEN_UP:
-        return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {told}", share)
+        return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken: {told}", share)
     against = system.case.against_stick
     if against:
-        return Choice("gross-sliding", f"contact.law: 'gross-sliding' is taken, though {told}: {against[0]}", share)
-    return Choice("coulomb", f"contact.law: 'coulomb' is taken: {told}", share)
+        return LawChoice("gross-sliding", f"contact.law: 'gross-sliding' is taken, though {told}: {against[0]}", share)
+    return LawChoice("coulomb", f"contact.law: 'coulomb' is taken: {told}", share)
 
 
-def decided(
+def resolve_law(
     case: Case, log: Log, comm: MPI.Comm = MPI.COMM_WORLD, *, heat: Preparation = "as set", fresh: bool = False
-) -> Decided:
+) -> ResolvedCase:
     """Return a case with its law, and its system where it slides; collective.
 
     Args:
@@ -97,23 +97,25 @@ def decided(
         CaseError: what only the geometry can tell is wrong.
     """
     if case.contact.law != "auto":
-        return Decided(case, assemble(case, comm, heat=heat, fresh=fresh), None)
+        return ResolvedCase(case, assemble(case, comm, heat=heat, fresh=fresh), None)
     if case.stick != Stick():
-        choice = Choice("coulomb", "contact.law: 'coulomb' is taken, as the table stick is given")
+        choice = LawChoice("coulomb", "contact.law: 'coulomb' is taken, as the table stick is given")
         log(choice.text)
         taken = with_law(case, choice.law)
-        return Decided(taken, assemble(taken, comm, heat=heat, fresh=fresh), choice)
+        return ResolvedCase(taken, assemble(taken, comm, heat=heat, fresh=fresh), choice)
     system = assemble(case, comm, heat="none", fresh=fresh)
     choice = choose_law(system)
     log(choice.text)
     taken = with_law(case, choice.law)
     if choice.law == "coulomb":
-        return Decided(taken, law_named(choice.law).of_bodies(taken, system.bodies, heat=heat, fresh=fresh), choice)
+        return ResolvedCase(
+            taken, law_named(choice.law).of_bodies(taken, system.bodies, heat=heat, fresh=fresh), choice
+        )
     system = replace(system, made_from=taken)
     if heat != "none":
         prepare = with_reduced_heat if heat == "reduced" else with_exchange
         system = prepare(system, keep=True, fresh=fresh)
-    return Decided(taken, system, choice)
+    return ResolvedCase(taken, system, choice)
 
 
 def with_law(case: Case, law: Law) -> Case:

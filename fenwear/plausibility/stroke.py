@@ -30,7 +30,7 @@ def elastic_way(system: Tribosystem) -> float:
 
 def elastic_and_amplitude(system: Tribosystem) -> tuple[float, float]:
     """Return the elastic way, see `elastic_way`, and the mean amplitude of the sliding to and fro, mm."""
-    slid = float((system.slid.mean(axis=1) * system.motion.sliding()).sum())
+    slid = float((system.sliding_ratio.mean(axis=1) * system.motion.sliding()).sum())
     return elastic_way(system), slid / (2 * system.motion.half_cycles)
 
 
@@ -50,7 +50,7 @@ def _radius_warnings(system: Tribosystem) -> list[str]:
     program = (system.made_from or system.case).program
     if program is None or program.radius is None:
         return []
-    radii, weights = system.slid[0], system.pair.weights
+    radii, weights = system.sliding_ratio[0], system.pair.weights
     if radii.min() <= program.radius <= radii.max():
         return []
     return [

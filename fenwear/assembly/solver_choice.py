@@ -15,7 +15,7 @@ from dataclasses import replace
 from mpi4py import MPI
 
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.needs import NUMBER, SMALL, WORKING, BodyNeeds, Needs
+from fenwear.assembly.resources import NUMBER, SMALL, WORKING, BodyResources, Resources
 from fenwear.bodies.elasticity import Solver
 from fenwear.bodies.factor import SPREAD
 from fenwear.case import Setup
@@ -36,7 +36,7 @@ def free_on_ranks(comm: MPI.Comm) -> float | None:
     return None if any(one is None for one in found) else float(sum(one or 0.0 for one in found))
 
 
-def settle(bodies: Sequence[Bodies], wanted: Needs, free: float | None = None) -> Needs:
+def choose_solvers(bodies: Sequence[Bodies], wanted: Resources, free: float | None = None) -> Resources:
     """Choose what solves for the columns of each body, and have the bodies do it; return what they need; collective.
 
     Args:
@@ -58,7 +58,7 @@ def settle(bodies: Sequence[Bodies], wanted: Needs, free: float | None = None) -
     return wanted
 
 
-def chosen(wanted: Needs, setup: Setup, comm: MPI.Comm, free: float | None) -> Needs:
+def chosen(wanted: Resources, setup: Setup, comm: MPI.Comm, free: float | None) -> Resources:
     """Return what the set-up needs with what solves for the columns of each body; collective.
 
     Args:
@@ -77,14 +77,14 @@ def chosen(wanted: Needs, setup: Setup, comm: MPI.Comm, free: float | None) -> N
     return agreed(comm, dealt(wanted, ranks, free))
 
 
-def _spread(body: BodyNeeds, most: float) -> BodyNeeds:
+def _spread(body: BodyResources, most: float) -> BodyResources:
     """Return the same with its factor over all ranks where one rank cannot have it in so many bytes, or it is large."""
     large = NUMBER * body.factor > SPREAD or NUMBER * WORKING * body.factor > most
     free = body.solver == "factor" and not (body.together or body.made)
     return replace(body, solver="spread factor") if large and free else body
 
 
-def dealt(wanted: Needs, ranks: int, free: float | None) -> Needs:
+def dealt(wanted: Resources, ranks: int, free: float | None) -> Resources:
     """Return the same with the ranks beyond the two owners dealt out, each to the body that takes longer.
 
     A factor more has to fit into the memory, and to take away a part of that body's time.
@@ -105,17 +105,17 @@ def dealt(wanted: Needs, ranks: int, free: float | None) -> Needs:
     return wanted
 
 
-def fits(wanted: Needs, free: float | None) -> bool:
+def fits(wanted: Resources, free: float | None) -> bool:
     """Return whether it fits into the memory."""
     return free is None or wanted.memory <= max(free, SMALL)
 
 
-def first_fitting(wanted: Needs, free: float | None) -> Needs:
+def first_fitting(wanted: Resources, free: float | None) -> Resources:
     """Return the same with what fits into the memory; as it was where nothing does."""
     return next((one for one in (wanted, *_less_and_less(wanted)) if fits(one, free)), wanted)
 
 
-def _less_and_less(wanted: Needs) -> Iterator[Needs]:
+def _less_and_less(wanted: Resources) -> Iterator[Resources]:
     """Yield the same with what takes less memory, first in the larger body, then in both."""
     for solver in SOLVERS[1:]:
         punch, strip = (one if one.made else replace(one, solver=solver) for one in (wanted.punch, wanted.strip))
@@ -125,7 +125,7 @@ def _less_and_less(wanted: Needs) -> Iterator[Needs]:
         yield wanted
 
 
-def check_memory(wanted: Needs, setup: Setup, free: float | None) -> None:
+def check_memory(wanted: Resources, setup: Setup, free: float | None) -> None:
     """Make sure that the set-up fits into the memory that is free.
 
     Raises:

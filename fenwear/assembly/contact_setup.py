@@ -30,7 +30,7 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import HERE, in_model, in_space
-from fenwear.layers import Evolution, Layers, Passing, common_modulus, layers_of
+from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, layers_of
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
@@ -38,7 +38,7 @@ from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
 from fenwear.sliding.track import on_closed_track
-from fenwear.sliding.wear import PhasesWear, Wear, Worn
+from fenwear.sliding.wear import PhasesWear, Wear, WornDepths
 
 ROUNDING = 1e-12  # of the largest sliding: what lies on the axis
 STILL = 0.1  # of the distance of contact nodes: how far a strip moves that stays in its place for the heat
@@ -60,7 +60,7 @@ class Clock:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Placed:
+class ContactSetup:
     """Both bodies opposite each other in every phase, in equilibrium; nothing elastic in it.
 
     Attributes:
@@ -175,7 +175,7 @@ class Placed:
         return self.sliding.wear[1] is not None
 
     @cached_property
-    def slid(self) -> Array:
+    def sliding_ratio(self) -> Array:
         """What each node slides in each phase for a unit of the stroke's law (phases, n): 1, or mm/rad."""
         return np.array(
             [self.field_of(phase).rate(pair.opposite, pair.normal) for phase, pair in enumerate(self.pairs)]
@@ -188,7 +188,7 @@ class Placed:
     @cached_property
     def path(self) -> Array:
         """What each node slides in each phase (phases, n), mm."""
-        return np.array([phase.distance for phase in self.motion.phases])[:, None] * self.slid
+        return np.array([phase.distance for phase in self.motion.phases])[:, None] * self.sliding_ratio
 
     @cached_property
     def sliding_directions(self) -> Array:
@@ -210,7 +210,7 @@ class Placed:
         slid = []
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
-            slid.append(self.motion.sliding(exponent)[:, None] * self.slid**exponent)
+            slid.append(self.motion.sliding(exponent)[:, None] * self.sliding_ratio**exponent)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction)
 
     @cached_property
@@ -232,7 +232,7 @@ class Placed:
 
     def passing(
         self, wear: PhasesWear, phases: Sequence[int] | None = None, evolution: Evolution | None = None
-    ) -> Passing:
+    ) -> LayerEvolution:
         """Return what phases of the motion, by default all, wear and do to what lies between.
 
         Args:
@@ -241,10 +241,13 @@ class Placed:
             evolution: What they do to the states that laws remember; None where there are none.
         """
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
-        return Passing.over(self.layers, wear, self.path[chosen], evolution)
+        return LayerEvolution.over(self.layers, wear, self.path[chosen], evolution)
 
     def evolution(
-        self, conditions: Sequence[ContactConditions], worn: Worn | None = None, phases: Sequence[int] | None = None
+        self,
+        conditions: Sequence[ContactConditions],
+        worn: WornDepths | None = None,
+        phases: Sequence[int] | None = None,
     ) -> Evolution | None:
         """Return what phases of the motion, by default all, do to the states that laws remember; None without.
 
@@ -266,7 +269,7 @@ class Placed:
         depth = np.zeros(len(self.pair.strip.weights)) if worn is None else worn.strip
         return Evolution(memory, conditions, durations, [self.pairs[k] for k in chosen], wearing, depth)
 
-    def rested(self, conditions: Sequence[ContactConditions]) -> Worn:
+    def rested(self, conditions: Sequence[ContactConditions]) -> WornDepths:
         """Return no depths, with the states of laws that cycles at conditions of the phases leave as they are.
 
         Raises:
@@ -281,7 +284,7 @@ class Placed:
     def position_spacing(self) -> float:
         """Largest distance between neighbouring positions of the strip over that between contact nodes; 0 for one."""
         offsets, pair = np.unique([phase.offset for phase in self.motion.phases]), self.pair
-        moved = self.path.max() if self.motion.steps else np.diff(offsets).max(initial=0.0) * self.slid.max()
+        moved = self.path.max() if self.motion.steps else np.diff(offsets).max(initial=0.0) * self.sliding_ratio.max()
         # Among the nodes of a solid there is no order along the sliding.
         spacing = np.median(np.diff(pair.x)) if pair.punch.dim == 2 else np.sqrt(np.median(pair.weights))
         return float(moved / spacing)
@@ -311,7 +314,7 @@ class Placed:
         """Largest displacement along e_n of each rigid mode for a unit velocity (modes,): 1, and mm for a rotation."""
         return np.abs(self.rigid.rigid_normal).max(axis=0, initial=1e-300)
 
-    def gap(self, phase: int, worn: Worn) -> Array:
+    def gap(self, phase: int, worn: WornDepths) -> Array:
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm."""
         pair, between = self.pairs[phase], self.layers.opening(worn.between)
         if self.bodies.moved is not None:
@@ -320,11 +323,11 @@ class Placed:
             return pair.initial_gap + worn.punch + between
         return pair.initial_gap + pair.opening(worn.punch, worn.strip) + between
 
-    def unworn(self) -> Worn:
+    def unworn(self) -> WornDepths:
         """Return the worn depths at the start, none, and what lies between then."""
         return self.layers.unworn(len(self.pair.strip.weights))
 
-    def outworn(self, worn: Worn) -> bool:
+    def mesh_update_due(self, worn: WornDepths) -> bool:
         """Return whether the wear since the meshes were moved is large against the elements at the contact."""
         limit = None if self.made_from is None else self.made_from.geometry.follow_wear
         if limit is None or self.pair.punch.grid is not None:  # nothing of a grid's wear is the mesh's
@@ -337,9 +340,9 @@ class Placed:
         )
 
     @cached_property
-    def element_heights(self) -> Worn:
+    def element_heights(self) -> WornDepths:
         """Height of the elements at the contact nodes of both bodies, mm."""
-        return Worn(element_height(self.bodies.punch), element_height(self.bodies.strip))
+        return WornDepths(element_height(self.bodies.punch), element_height(self.bodies.strip))
 
     @cached_property
     def _places(self) -> tuple[tuple[Array, Array], ...]:
@@ -369,7 +372,7 @@ class Placed:
         phase: int | None,
         pressure: Array | None = None,
         temperatures: tuple[Array, Array] | None = None,
-        worn: Worn | None = None,
+        worn: WornDepths | None = None,
         half_cycles: float | None = None,
         cycle: Array | None = None,
     ) -> ContactConditions:
@@ -385,11 +388,11 @@ class Placed:
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
-        slid = self.slid[phase or 0]
+        slid = self.sliding_ratio[phase or 0]
         if self.motion.steps:
             slid = self.path.sum(axis=0)
         if phase is not None:
-            speed = self.motion.phases[phase].speed * self.slid[phase]
+            speed = self.motion.phases[phase].speed * self.sliding_ratio[phase]
         elif self.motion.steps:
             speed = slid / self.motion.period
         else:
@@ -486,7 +489,7 @@ class Placed:
 @told_by_name
 def place(
     bodies: Bodies, sliding: Sliding, heat: Heat | None = None, *, solver: str = "condensed", case: Case | None = None
-) -> Placed:
+) -> ContactSetup:
     """Bring the surfaces opposite each other in every phase of the motion; collective.
 
     Without heat the strip moves as a whole. With heat its elasticity is that of the middle position: then only its
@@ -530,7 +533,7 @@ def place(
         if moved not in made:
             made[moved] = rigid_equilibrium(pairs[moved], bodies.punch, bodies.strip)
         rigids.append(made[moved])
-    placed = Placed(
+    placed = ContactSetup(
         bodies=bodies,
         sliding=sliding,
         heat=heat,
@@ -547,7 +550,9 @@ def place(
 
 
 @told_by_name
-def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None) -> Placed:
+def place_at_rest(
+    bodies: Bodies, sliding: Sliding, middle: ContactPair, law: str, case: Case | None = None
+) -> ContactSetup:
     """Return the surfaces opposite each other in the middle of the motion, in every half-cycle; collective.
 
     Where nodes stick or slip by themselves their law says how friction acts, and where the strip is in a time step.
@@ -562,7 +567,7 @@ def place_at_rest(bodies: Bodies, sliding: Sliding, middle: ContactPair, law: st
     loaded = _loaded(bodies, sliding.motion, case)
     rigid = rigid_equilibrium(middle, bodies.punch, bodies.strip)
     own = [rigid if one is bodies else rigid_equilibrium(middle, one.punch, one.strip) for one in loaded]
-    return Placed(
+    return ContactSetup(
         bodies=bodies,
         sliding=sliding,
         heat=None if case is None else case.heat,

@@ -12,8 +12,8 @@ from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.grid import RegularGrid
-from fenwear.watch.ends import ContactEnds, contact_ends, contact_modulus
-from fenwear.watch.rim import ContactRim, curvatures
+from fenwear.plausibility.ends import ContactEnds, contact_ends, contact_modulus
+from fenwear.plausibility.rim import ContactRim, curvatures
 
 BESIDE = 1.5  # spacings of the grid that it may end before the surface does
 

@@ -27,7 +27,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import ContactSurface, contact_tag
 from fenwear.bodies.elasticity import ElasticBody
-from fenwear.watch.ends import SMOOTH, WIDER, contact_modulus
+from fenwear.plausibility.ends import SMOOTH, WIDER, contact_modulus
 
 NEAR = 1e-6  # of the surface's extent: corners that are the same
 BESIDE = 1e-3  # of the surface's extent: nodes on an edge of the other body

@@ -14,7 +14,7 @@ import numpy as np
 from basix import CellType
 
 from fenwear.arrays import Array
-from fenwear.assembly import Placed
+from fenwear.assembly import ContactSetup
 from fenwear.case.program import speeds_of
 from fenwear.sliding.chart import sliding_chart
 
@@ -34,7 +34,7 @@ class HeatedLayer:
     needed: float
 
 
-def heated_layer(system: Placed) -> HeatedLayer | None:
+def heated_layer(system: ContactSetup) -> HeatedLayer | None:
     """Return where the strip's elements are the coarsest for the layer that heats up at the fastest; collective.
 
     None without heat, to and fro, and where nothing passes.
@@ -55,7 +55,7 @@ def heated_layer(system: Placed) -> HeatedLayer | None:
     return HeatedLayer(layer, float(heights[worst]), surface.degree * layer)
 
 
-def _passing(system: Placed, speed: float) -> float:
+def _passing(system: ContactSetup, speed: float) -> float:
     """Return how long material is under the contact at a speed, mm/s or rad/s, in s."""
     field = system.sliding.field
     chart = sliding_chart(field, system.pair)
@@ -65,7 +65,7 @@ def _passing(system: Placed, speed: float) -> float:
     return length / (chart.radius or 1.0) / speed
 
 
-def _diffusivities(system: Placed) -> Array:
+def _diffusivities(system: ContactSetup) -> Array:
     """Return k / (rho c) at the strip's pressure nodes (n,), mm²/s: the smallest where regions meet."""
     regions, materials = system.case.strip.regions, system.case.initial_materials
     found: Array = np.full(len(system.pair.strip.weights), np.inf)
@@ -76,7 +76,7 @@ def _diffusivities(system: Placed) -> Array:
     return found
 
 
-def layer_warnings(system: Placed) -> list[str]:
+def layer_warnings(system: ContactSetup) -> list[str]:
     """Say where the strip's nodes are further apart than the layer that heats up is thick; collective."""
     layer = heated_layer(system)
     if layer is None or layer.height <= layer.needed:

@@ -12,7 +12,7 @@ from fenwear.progress import LOOK, Progress
 from fenwear.signals import Signals
 
 
-class Lookout:
+class RunMonitor:
     """Looks at signals and at the clock, that of rank 0; a signal to any rank ends all of them.
 
     Args:

@@ -18,9 +18,9 @@ from fenwear.assembly import Tribosystem
 from fenwear.bodies.contact_surface import contact_tag
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.compat import facet_nodes
-from fenwear.sliding.wear import Worn
-from fenwear.watch.ends import SMOOTH
-from fenwear.watch.rim import rim_edges
+from fenwear.plausibility.ends import SMOOTH
+from fenwear.plausibility.rim import rim_edges
+from fenwear.sliding.wear import WornDepths
 
 STEEP = 0.27  # cotangent of 75 degrees: beyond, a chamfer widens by a quarter of the depth
 WIDER = 0.02  # of the surface's width
@@ -40,7 +40,7 @@ class Chamfer:
     cotangent: Array
     width: float
 
-    def widened(self, system: Tribosystem, worn: Worn) -> float:
+    def widened(self, system: Tribosystem, worn: WornDepths) -> float:
         """Return how much wider the contact would be for the depths worn off both bodies, both sides together, mm."""
         opening = system.pair.opening(worn.punch, worn.strip)[self.nodes]
         return float(2 * (opening * self.cotangent).max())

@@ -14,19 +14,19 @@ size      bodies whose mesh is hardly in mm
 states    a run's blocks, the first contact and the steady state: clipped, too hot, harder pressed than hard
 """
 
-from fenwear.watch.fineness import fineness_text, fineness_warnings
-from fenwear.watch.heated import HeatWatch
-from fenwear.watch.layer import HeatedLayer, heated_layer, layer_warnings
-from fenwear.watch.size import size_warnings
-from fenwear.watch.slip import law_warnings, sliding_text, unique_text, uniques
-from fenwear.watch.states import Watch, hot, initial_warnings, pressed, steady_warnings
-from fenwear.watch.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_warnings
+from fenwear.plausibility.fineness import fineness_text, fineness_warnings
+from fenwear.plausibility.heated import HeatMonitor
+from fenwear.plausibility.layer import HeatedLayer, heated_layer, layer_warnings
+from fenwear.plausibility.size import size_warnings
+from fenwear.plausibility.slip import law_warnings, sliding_text, unique_text, uniques
+from fenwear.plausibility.states import StateMonitor, hot, initial_warnings, pressed, steady_warnings
+from fenwear.plausibility.stroke import TAKEN_UP, elastic_share, elastic_way, stroke_warnings
 
 __all__ = [
     "TAKEN_UP",
-    "HeatWatch",
+    "HeatMonitor",
     "HeatedLayer",
-    "Watch",
+    "StateMonitor",
     "elastic_share",
     "elastic_way",
     "fineness_text",

@@ -9,7 +9,7 @@ How wide it should be is estimated by areas: the worn cross-section A fills the 
     integral of max(D - g, 0) dx = A,    g the gap of the unworn bodies with its least value taken off,
 
 and D is at least what Hertz's line contact closes, 2 F / (pi E*), F the load over the thickness, or of a ring over its
-mean circumference. Of solids: `fenwear.watch.rim`.
+mean circumference. Of solids: `fenwear.plausibility.rim`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.bodies.mesh import BodyMesh
 from fenwear.case import Case
-from fenwear.sliding.wear import Worn
+from fenwear.sliding.wear import WornDepths
 
 SMOOTH = np.cos(np.radians(20))  # cosine of the angle between two facets up to which the boundary goes on
 FINE = 4001  # abscissae of the gap between the bodies
@@ -146,7 +146,7 @@ def contact_ends(system: Tribosystem) -> ContactEnds | None:
     return ContactEnds(goes_on, punch.ends, x, gap - gap.min(), closed, around)
 
 
-def opened(system: Tribosystem, worn: Worn) -> float:
+def opened(system: Tribosystem, worn: WornDepths) -> float:
     """Return what depths worn off both bodies open in the middle position: mm² in a plane, mm³ of rings and solids."""
     return float(system.pair.weights @ system.pair.opening(worn.punch, worn.strip))
 

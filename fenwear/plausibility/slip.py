@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def law_warnings(system: Tribosystem) -> list[str]:
     """Return what is to be said of the time steps of a system before it is followed."""
-    fineness = None if system.lawful is None else system.lawful.fineness
+    fineness = None if system.law_state is None else system.law_state.fineness
     return [] if fineness is None or fineness.enough else [fineness.text()]
 
 

@@ -10,23 +10,23 @@ from fenwear.bodies.elasticity import ElasticBody
 from fenwear.case import Case
 from fenwear.case.plausible import HOT
 from fenwear.contact.complementarity import broken_text, complementarity_error
-from fenwear.cycle import Block, Steady
+from fenwear.cycle import Block, SteadyState
+from fenwear.plausibility.chamfer import contact_chamfer
+from fenwear.plausibility.ends import ContactEnds, contact_ends, opened
+from fenwear.plausibility.few import few_text
+from fenwear.plausibility.grid_rim import grid_limits
+from fenwear.plausibility.layer import layer_warnings
+from fenwear.plausibility.rim import ContactRim, contact_rim
+from fenwear.plausibility.size import size_warnings
+from fenwear.plausibility.stroke import stroke_warnings
+from fenwear.plausibility.thickness import thickness, worn_through
 from fenwear.results.summary import net_of
-from fenwear.watch.chamfer import contact_chamfer
-from fenwear.watch.ends import ContactEnds, contact_ends, opened
-from fenwear.watch.few import few_text
-from fenwear.watch.grid_rim import grid_limits
-from fenwear.watch.layer import layer_warnings
-from fenwear.watch.rim import ContactRim, contact_rim
-from fenwear.watch.size import size_warnings
-from fenwear.watch.stroke import stroke_warnings
-from fenwear.watch.thickness import thickness, worn_through
 
 SHALLOW = 1e-3  # of the contact surface's extent: depths that no body is thin enough for
 STRONGEST = 0.1  # of Young's modulus: the strength of a perfect crystal, which no hardness exceeds
 
 
-class Watch:
+class StateMonitor:
     """Looks at the blocks of a run.
 
     Args:
@@ -192,7 +192,7 @@ def initial_warnings(system: Tribosystem) -> list[str]:
     return [*told, *(text for text in texts if text), *stroke_warnings(system)]
 
 
-def steady_warnings(system: Tribosystem, state: Steady) -> list[str]:
+def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:
     """Return what is to be said of a cyclic steady state; collective."""
     weights, limits = system.pair.weights, contact_limits(system)
     texts = [*size_warnings(system.case, system.bodies, system.rigid), *layer_warnings(system)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fenwear.assembly import Tribosystem
-from fenwear.watch.layer import layer_warnings
+from fenwear.plausibility.layer import layer_warnings
 
 
 def fineness_text(system: Tribosystem) -> str:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 LAST = 0.1  # of what is done, that a mean pressure is of
 BEYOND = 0.05  # of an axis: what is left free beyond its lines
 MANY = 100.0  # last over first of a logarithmic axis, at least
+SHORT = 0.01  # of cycles, m or s: an end whose labels are long, so that few of them go beside each other
 
 
 def peak_figure(history: xarray.Dataset, look: Style = STANDARD) -> Figure:
@@ -317,4 +318,8 @@ def run_axis(ax: Axes, history: xarray.Dataset, look: Style, *, logarithmic: boo
         ax.set_xlim(first, last)
     elif last > first:
         ax.set_xlim(0 if not logarithmic else first, last)
+        if last < SHORT:
+            from matplotlib.ticker import MaxNLocator
+
+            ax.xaxis.set_major_locator(MaxNLocator(4))
     ax.set_xlabel(look.label)

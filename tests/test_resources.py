@@ -13,7 +13,15 @@ import pytest
 from mpi4py import MPI
 
 from fenwear import Case, CaseError, assemble, load_case
-from fenwear.assembly import elastic, place_case, resources_of, resources_text, tribosystem, warmed_system, ways
+from fenwear.assembly import (
+    elastic,
+    place_case,
+    resources_of,
+    resources_text,
+    solver_choice,
+    tribosystem,
+    warmed_system,
+)
 from fenwear.assembly.resources import BodyResources, Resources, needs
 from fenwear.bodies.condensation import condense, deal
 from fenwear.heat.field import HeatState
@@ -86,7 +94,7 @@ def test_columns_of_frames() -> None:
 def test_not_enough_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Refused before anything is factored, with the mesh that would fit."""
     placed = place_case(load_case("ball-on-flat", COARSE))
-    monkeypatch.setattr(ways, "SMALL", 0.0)
+    monkeypatch.setattr(solver_choice, "SMALL", 0.0)
     monkeypatch.setattr(tribosystem, "operators_for", lambda *_, **__: pytest.fail("condensed all the same"))
     expected = (
         r"geometry: .* unknowns, .* are free, and no setup\.way would fit: .*; elements \d\.\d times as large would"
@@ -100,9 +108,9 @@ def test_the_way_by_the_memory() -> None:
     small, large = (solid(size, 1000).punch for size in (1.5e6, 2e6))
     whole, found = Resources(small, large, 1000, 1, 2), []
     for memory in np.geomspace(1.1 * whole.memory, 0.3 * whole.memory, 200):
-        one = ways.first_fitting(whole, memory)
+        one = solver_choice.first_fitting(whole, memory)
         found.append((one.punch.solver, one.strip.solver))
-        assert one.memory <= memory or not ways.fits(one, memory)
+        assert one.memory <= memory or not solver_choice.fits(one, memory)
     assert list(dict.fromkeys(found)) == [
         ("factor", "factor"),
         ("factor", "low-rank"),
@@ -110,29 +118,29 @@ def test_the_way_by_the_memory() -> None:
         ("low-rank", "multigrid"),
         ("multigrid", "multigrid"),
     ]
-    assert ways.first_fitting(whole, 2 * GIB) == whole  # nothing fits
-    assert ways.first_fitting(whole, None) == whole
+    assert solver_choice.first_fitting(whole, 2 * GIB) == whole  # nothing fits
+    assert solver_choice.first_fitting(whole, None) == whole
 
 
 def test_further_ranks_share_columns() -> None:
     """Each goes to the body that takes longer, while it saves a tenth and its factor fits."""
     body = solid(155_000, 2401).punch
     for ranks, holders in ((1, (1, 1)), (2, (1, 1)), (3, (2, 1)), (4, (2, 2)), (6, (3, 3))):
-        found = ways.dealt(Resources(body, body, 2401, 1, 2), ranks, None)
+        found = solver_choice.dealt(Resources(body, body, 2401, 1, 2), ranks, None)
         assert (found.punch.holders, found.strip.holders) == holders
     small = replace(body, columns=300.0, patterns=300.0)
-    found = ways.dealt(Resources(small, body, 2401, 1, 2), 64, None)
+    found = solver_choice.dealt(Resources(small, body, 2401, 1, 2), 64, None)
     assert found.punch.holders == 1  # its columns take less than the other's factor
     few = found.strip
     assert few.on_holder <= 0.9 * replace(few, holders=few.holders - 1).on_holder
     assert replace(few, holders=few.holders + 1).on_holder > 0.9 * few.on_holder
     whole = Resources(body, body, 2401, 1, 2)
     most = replace(whole, strip=replace(body, holders=2)).memory
-    counts = [ways.dealt(whole, 64, times * most) for times in (0.99, 1.01)]
+    counts = [solver_choice.dealt(whole, 64, times * most) for times in (0.99, 1.01)]
     assert [one.punch.holders + one.strip.holders for one in counts] == [2, 3]
     for solver in ("spread factor", "low-rank", "multigrid"):
         other = replace(body, solver=solver)
-        assert ways.dealt(Resources(other, other, 2401, 1, 2), 4, None).strip.holders == 1
+        assert solver_choice.dealt(Resources(other, other, 2401, 1, 2), 4, None).strip.holders == 1
 
 
 def test_an_owner_for_each_body_and_then_the_rest() -> None:
@@ -151,7 +159,7 @@ def test_all_ranks_are_told_of() -> None:
     wanted = resources_of(placed)
     ranks = placed.comm.size
     many = replace(wanted, punch=replace(wanted.punch, columns=1e6), strip=replace(wanted.strip, columns=1e6))
-    lines = resources_text(placed, ways.dealt(many, ranks, None))[:2]
+    lines = resources_text(placed, solver_choice.dealt(many, ranks, None))[:2]
     told = [
         int(rank) for line in lines for rank in re.findall(r"\d+", re.split("factor", line.partition("rank")[2])[0])
     ]
@@ -169,11 +177,11 @@ def test_another_way_would_fit(monkeypatch: pytest.MonkeyPatch) -> None:
         place_case(load_case("ball-on-flat", [*COARSE, f"setup.way={way}"])) for way in ("columns", "automatic")
     )
     with pytest.raises(CaseError, match=r"are free; setup\.way = 'multigrid' would take .* GiB; elements"):
-        ways.check_memory(resources_of(by_columns, free), by_columns.bodies.punch.setup, free)
+        solver_choice.check_memory(resources_of(by_columns, free), by_columns.bodies.punch.setup, free)
     found = resources_of(automatic, free)
     assert found == least
     assert all("conjugate gradients on all ranks" in line for line in resources_text(automatic, found)[:2])
-    ways.choose_solvers([automatic.bodies], wanted, free)
+    solver_choice.choose_solvers([automatic.bodies], wanted, free)
     assert automatic.bodies.punch.solver == "multigrid"
 
 
@@ -183,8 +191,10 @@ def test_a_factor_over_the_ranks(monkeypatch: pytest.MonkeyPatch) -> None:
 
     What all ranks eliminate together needs no such factor, and one rank alone has nobody to share it with.
     """
-    monkeypatch.setattr(ways, "SMALL", 0.0)
-    monkeypatch.setattr(ways, "first_fitting", lambda wanted, _free: wanted)  # so small a contact outweighs the factors
+    monkeypatch.setattr(solver_choice, "SMALL", 0.0)
+    monkeypatch.setattr(
+        solver_choice, "first_fitting", lambda wanted, _free: wanted
+    )  # so small a contact outweighs the factors
     ready = [place_case(load_case("example1", [*COARSE, f"setup.way={way}"])) for way in ("columns", "automatic")]
     placed, together = ready
     ranks = placed.comm.size
@@ -229,13 +239,13 @@ def test_bodies_made_anew_and_stick_take_the_same_choice(
         return replace(wanted, strip=replace(wanted.strip, solver="low-rank"))
 
     with monkeypatch.context() as patch:
-        patch.setattr(ways, "first_fitting", low)
+        patch.setattr(solver_choice, "first_fitting", low)
         warm, problem = warmed_system(cold, at), partial_slip_problem(sticking)
     assert [warm.bodies.strip.solver, meshed(problem.interface).bodies.strip.solver] == ["low-rank", "low-rank"]
     for found, other in zip((warm.condensed.strip, problem.interface.strip), expected, strict=True):
         np.testing.assert_allclose(found.response, other, rtol=0, atol=1e-10 * np.abs(other).max())
-    monkeypatch.setattr(ways, "SMALL", 0.0)
-    monkeypatch.setattr(ways, "free_on_ranks", lambda _comm: 1e5)
+    monkeypatch.setattr(solver_choice, "SMALL", 0.0)
+    monkeypatch.setattr(solver_choice, "free_on_ranks", lambda _comm: 1e5)
     with pytest.raises(CaseError, match="are free"):
         warmed_system(cold, at)
     with pytest.raises(CaseError, match="are free"):

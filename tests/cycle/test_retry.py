@@ -145,10 +145,10 @@ def test_jumps_that_fail(assembled: Assemble, monkeypatch: pytest.MonkeyPatch, s
     stepper = sys.modules["fenwear.cycle.jump_step"].Stepper
     original = stepper.step
 
-    def step(self: Any, moment: Any, cycles: float, *since: Any) -> Any:
+    def step(self: Any, moment: Any, cycles: float, *since: Any, **more: Any) -> Any:
         if cycles >= shortest:
             raise ConvergenceError("on purpose")
-        return original(self, moment, cycles, *since)
+        return original(self, moment, cycles, *since, **more)
 
     monkeypatch.setattr(stepper, "step", step)
     blocks = list(jump(system, 400, tolerance=1e-3))

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from fenwear import Tribosystem
-from fenwear.assembly import bodies, placed
+from fenwear.assembly import bodies, contact_setup
 from fenwear.bodies import material
 from fenwear.bodies.material import Isotropic
 from fenwear.contact import CondensedContact, SlidingContact
@@ -74,13 +74,13 @@ def lame_of_the_other_plane(patch: Patch) -> None:
 
 
 def _pairs_with(patch: Patch, change: Callable[[ContactPair], dict[str, Any]]) -> None:
-    right = placed.pair
+    right = contact_setup.pair
 
     def pair(*surfaces: Any, **options: Any) -> ContactPair:
         found = right(*surfaces, **options)
         return replace(found, **change(found))
 
-    patch.setattr(placed, "pair", pair)
+    patch.setattr(contact_setup, "pair", pair)
 
 
 def even_weights(patch: Patch) -> None:

@@ -118,6 +118,8 @@ def test_jump_equals_march(assembled: Assemble, settings: tuple[str, ...], half_
 
     A jump's phases meet the shape in the middle of its cycle, marches that of the step's start or end: halfway
     between explicit and implicit is what they are compared with, and half of their distance is left of the error.
+    It does not fall evenly from one tolerance to the next: 0.13, 0.13, 0.26, 0.17, 0.06 % after 2,000 half-cycles at
+    2e-2, 1e-2, 3e-3, 1e-3, 3e-4.
     """
     system = assembled("example1-heat", *COARSE, "wear.punch.coefficient=4e-8", *settings)
     ends = [run(system, half_cycles, implicit=implicit) for implicit in (False, True)]
@@ -125,7 +127,7 @@ def test_jump_equals_march(assembled: Assemble, settings: tuple[str, ...], half_
     heated = np.mean([temperatures(end)[-2:] for end in ends], axis=0)
     floor = np.abs(ends[0].pressure[-2:] - pressure).max() / MEAN
     errors = []
-    for tolerance in (2e-2, 1e-3):
+    for tolerance in (2e-2, 3e-4):
         *_, end = jump(system, half_cycles, tolerance=tolerance)
         assert end.half_cycle[-1] == half_cycles
         difference = np.abs(temperatures(end)[-2:] - heated).max()

@@ -40,6 +40,10 @@ MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, 
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
+TOLERANCE, SAME_POINT = "Geometry.Tolerance", 1e-8  # of the size of what gmsh compares points in: closer ones are one
+_largest = [
+    1.0
+]  # size of all geometries that this process has read: gmsh goes on comparing points by the largest of them
 
 
 @dataclass(frozen=True)
@@ -319,10 +323,13 @@ def _merge(gmsh: Any, path: Path) -> None:
         Exception: the first error in the file.
     """
     gmsh.option.setNumber("General.AbortOnError", 0)
+    gmsh.option.setNumber(TOLERANCE, SAME_POINT / max(1.0, _largest[0]))
     gmsh.logger.start()
     gmsh.merge(str(path))
     messages = gmsh.logger.get()
     gmsh.logger.stop()
+    gmsh.option.setNumber(TOLERANCE, SAME_POINT)
+    _largest[0] = max(_largest[0], gmsh.option.getNumber("General.BoundingBoxSize"))
     gmsh.option.setNumber("General.AbortOnError", 2)
     errors = [m.removeprefix("Error: ") for m in messages if m.startswith("Error: ")]
     if errors:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fenwear import CaseError, Tribosystem, assemble, load_case, steady
 from fenwear.bodies.mesh import BodyMesh, build_meshes, meshes_folder, write_msh
 from fenwear.case import Geometry
+from fenwear.case.quantities import Kind
 from fenwear.parallel import on_root
 
 READY = "punch_on_strip.geo"
@@ -356,3 +357,15 @@ def test_a_ring_across_its_axis_is_refused() -> None:
     """In an axisymmetric model x is the radius."""
     with pytest.raises(CaseError, match="x is the radius"):
         build_meshes(Geometry(file="blocks.geo"), None, MPI.COMM_SELF, "axisymmetric")
+
+
+def test_a_large_geometry_leaves_small_ones_as_they_are() -> None:
+    """Points 10 nm apart are two, whatever this process has read before: gmsh would compare them by its size."""
+
+    def read(file: str, kind: Kind, **parameters: float) -> None:
+        build_meshes(Geometry(file=file, parameters=parameters), None, MPI.COMM_SELF, kind)
+
+    with pytest.raises(CaseError, match="overlap must not be negative"):
+        read("punch_on_strip.geo", "stress", overlap=1e9)
+    read("pin_on_disc.geo", "solid", across=2, around=2, outer=1, pin_layers=1, disc_layers=1)
+    read("two_bushings.geo", "solid", clearance=1e-5, along=2, between_elements=2, overhang_elements=1, fine_elements=4)

@@ -226,7 +226,7 @@ rows = [
 ]
 ends = {
     "stick zone of the second cycle": steady(system),
-    "stick zone of the last cycle": final_shape(system.law_state.rig, rows[-1][0].steps[-1].stuck),
+    "stick zone of the last cycle": final_shape(system.law_state.problem, rows[-1][0].steps[-1].stuck),
 }
 
 

@@ -542,7 +542,7 @@ def place(
         loaded=loaded,
         rigids=tuple(rigids),
         rigid=rigid,
-        passage=None if heat is None else _passage(middle, sliding),
+        passage=None if heat is None else _passage(middle, sliding, rings=rings),
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
         check_equilibrium(one, placed.direction_words[phase.direction], ratio)
@@ -580,17 +580,19 @@ def place_at_rest(
     )
 
 
-def _passage(middle: ContactPair, sliding: Sliding) -> Passage | None:
-    """Return where the punch is on a strip that passes under it to and fro; None where it hardly moves.
+def _passage(middle: ContactPair, sliding: Sliding, *, rings: bool) -> Passage | None:
+    """Return where the punch is on a strip that passes under it to and fro or through a cycle.
+
+    None where it hardly moves, or is of rings, whose temperatures are the same all around.
 
     Raises:
         CaseError: the stroke runs off the strip's contact surface.
     """
     motion, here = sliding.motion, middle.strip.trace
-    if len(set(motion.directions)) == 1:
+    if motion.one_way or rings:
         return None
-    farthest = sliding.field.placement(float(np.abs(motion.offsets(1)).max())).points(here)
-    moved = float(np.linalg.norm(farthest - here, axis=1).max())
+    ends = [way.at(share).points(here) for row in motion.ways(sliding.field, 1) for way in row for share in (0.0, 1.0)]
+    moved = max(float(np.linalg.norm(end - here, axis=1).max()) for end in ends)
     return Passage(middle, sliding.field, motion) if moved > STILL * middle.punch.spacing() else None
 
 

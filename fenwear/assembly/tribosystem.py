@@ -431,9 +431,6 @@ def with_exchange(
             the settings say.
         keep: Whether what is reduced is kept on disk, and taken from there where it is.
         fresh: Reduce whatever is kept.
-
-    Raises:
-        CaseError: with heat, half-cycles of unequal duration.
     """
     if system.heat is None or system.bodies.heat is None:
         return system
@@ -446,7 +443,7 @@ def with_exchange(
         expansions(system),
         system.sliding.field,
         system.motion,
-        heating_friction(system),
+        heating_frictions(system),
         system.bodies.punch.thickness,
         reduced=reduced,
         passage=system.passage,
@@ -514,16 +511,24 @@ def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, 
 
 def friction_power(system: ContactSetup) -> float:
     """Return the mean power of friction at the mean pressure and speed, per thickness, mW/mm."""
-    rate = float(system.pair.weights @ heating_friction(system))
-    return rate * system.rigid.mean_pressure * system.motion.mean_speed
+    slid = np.array([phase.distance for phase in system.motion.phases]) @ heating_frictions(system)
+    return float(system.pair.weights @ slid) * system.rigid.mean_pressure / system.motion.period
 
 
-def heating_friction(system: ContactSetup, mu: Array | None = None) -> Array:
+def heating_friction(system: ContactSetup, mu: Array | None = None, phase: int | None = None) -> Array:
     """Return mu times what each node slides for a unit of the stroke's law (n,): friction heat is that times p v.
 
     Args:
         system: The placed bodies.
         mu: (n,); by default at the mean pressure and speed.
+        phase: Its number; None for the field of the whole motion.
     """
     mu = system.friction.values(system.conditions(None)) if mu is None else mu
-    return mu * system.sliding.field.rate(system.pair.opposite, system.pair.normal)
+    field = system.sliding.field if phase is None else system.field_of(phase)
+    return mu * field.rate(system.pair.opposite, system.pair.normal)
+
+
+def heating_frictions(system: ContactSetup) -> Array:
+    """Return the same in each phase (phases, n), at the mean pressure and speed."""
+    mu = system.friction.values(system.conditions(None))
+    return np.array([heating_friction(system, mu, phase) for phase in range(len(system.motion.phases))])

@@ -22,7 +22,7 @@ from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
 
 FLAT = 1e-9  # mm: depths below it count as none
-MANY = 300  # contact nodes above which heat is lagged
+MANY, LARGE = 300, 4000  # contact nodes, and pressures of all phases, above which heat is lagged
 SMOOTH = 15  # changes of pressure that are combined: the heat of few patterns is not small
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
@@ -251,7 +251,7 @@ class Coupled:
     def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
         """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""
         shape = start.pressure.shape
-        if shape[1] <= MANY:
+        if shape[1] <= MANY and shape[0] * shape[1] <= LARGE:
             return solve(end.gap, end.coupling * self.mu, start)
         contact = start
 
@@ -312,7 +312,8 @@ class Coupled:
             evolution = replace(evolution, near=self.held)
         self._take(conditions, evolution)
         if not system.friction.constant:
-            self.mu = np.array([heating_friction(system, system.friction.values(state)) for state in conditions])
+            friction = [system.friction.values(state) for state in conditions]
+            self.mu = np.array([heating_friction(system, mu, phase) for phase, mu in enumerate(friction)])
 
     def _remembering(self, evolution: Evolution, passing: DepthEvolution | None) -> Sequence[ContactConditions]:
         """Return the conditions of the phases with the states of laws: at the end of a step, or at rest."""

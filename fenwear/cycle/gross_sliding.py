@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import reduce
 
-import numpy as np
-
 from fenwear.assembly import (
     Bodies,
     ContactLaw,
@@ -21,7 +19,7 @@ from fenwear.assembly import (
     Tribosystem,
     build_conduction,
     elastic,
-    heating_friction,
+    heating_frictions,
     joined,
     make_sliding,
     place,
@@ -187,8 +185,7 @@ class GrossSliding:
             return joined(placed, condensed)
         if not conducts_alike or placed.motion != system.motion:
             return _with_heat_as(system, joined(placed, condensed))
-        friction = np.tile(heating_friction(placed), (len(placed.motion.phases), 1))
-        return joined(placed, condensed, system.exchange.varied(case.heat, friction))
+        return joined(placed, condensed, system.exchange.varied(case.heat, heating_frictions(placed)))
 
     def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> ContactSetup:
         placed = place(bodies, sliding or make_sliding(case), case.heat, solver=case.contact.solver, case=case)

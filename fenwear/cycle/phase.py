@@ -139,7 +139,7 @@ class PhaseStep:
             self._friction_ratio = system.phase_friction(self.phase, mu)
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
-                self._thermal.slide(heating_friction(system, mu))
+                self._thermal.slide(heating_friction(system, mu, self.phase))
         return system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
 
     def _solve(

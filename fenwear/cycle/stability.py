@@ -234,7 +234,8 @@ def repeating_temperatures(
     for _ in range(MAX_ITERATIONS):
         if not system.friction.constant:
             conditions = [system.conditions(k, pressure[k], surfaces[k]) for k in range(len(pressure))]
-            mu = np.array([heating_friction(system, system.friction.values(c)) for c in conditions])
+            friction = [system.friction.values(c) for c in conditions]
+            mu = np.array([heating_friction(system, own, phase) for phase, own in enumerate(friction)])
             heat = CycleHeat(heat.exchange.with_friction(mu))
         exchange = heat.exchange
         try:
@@ -322,7 +323,7 @@ def _laws(
     picked = _picked(heat, phase, n)
     mu_s: Array = (np.array(mu_t)[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t) @ picked).sum(axis=0)
-    rate = heating_friction(system, np.ones(n))
+    rate = heating_friction(system, np.ones(n), phase)
     return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
 
 

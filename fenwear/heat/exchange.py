@@ -63,7 +63,6 @@ class HeatExchange:
         heat: Partition, conductance and convection.
         sides: The punch and the strip.
         plans: The steps of each phase.
-        duration: Of a stage of a step, s; infinite for steady states, which have one stage.
         friction: mu of the interface nodes in each phase (phases, n).
         weights: Quadrature weights of the interface (n,), mm.
         thickness: Of the plane model, mm.
@@ -74,13 +73,13 @@ class HeatExchange:
         heat: Heat,
         sides: tuple[Side, Side],
         plans: list[list[StepPlan]],
-        duration: float,
         friction: Array,
         weights: Array,
         thickness: float,
     ) -> None:
         self.heat, self.sides, self.plans = heat, sides, plans
-        self.duration, self.friction, self.weights, self.thickness = duration, friction, weights, thickness
+        self.friction, self.weights, self.thickness = friction, weights, thickness
+        self._steady = np.isinf(plans[0][0].duration)
         # T_i: temperature at the contact from unit fluxes there, per prepared step.
         self._contact_responses = [
             side.field.contact_responses
@@ -233,7 +232,7 @@ class HeatExchange:
         Raises:
             HeatError: it is out of these bounds.
         """
-        if np.isinf(self.duration) or not all(side.bounded for side in self.sides):
+        if self._steady or not all(side.bounded for side in self.sides):
             return
         start, end = (
             sum(one[0] for one in self._balances(self.own(state).values, sources=True)) for state in (before, after)
@@ -284,10 +283,10 @@ class HeatExchange:
                 ends, fluxes, _ = self._stage(kinds, values, heat, conductance, sources=sources)
                 starts += counts * values
                 reached += counts * ends
-                heated += counts * heat
-                entered += counts * (fluxes[0] + fluxes[1])
+                heated += counts * plan.seconds * heat
+                entered += counts * plan.seconds * (fluxes[0] + fluxes[1])
                 values = values + counts * (ends - values)
-            spans.append((kinds, starts, reached))
+            spans.append((plan, starts, reached))
             if len(spans) * pressure[:1].size >= AT_ONCE:
                 terms += self._kept(spans, sources=sources)
                 spans = []
@@ -303,10 +302,10 @@ class HeatExchange:
     ) -> tuple[Array, Array, tuple[Array, Array] | None]:
         """Return the same on small bases and of few nodes, whose stages are matrices."""
         heated = (self.friction[phase] * pressure.T).T
-        speeds = sum(self._stages) * sum(plan.speed for plan in self.plans[phase])
-        terms = self._made(speeds * heated, np.zeros_like(pressure))
+        slid = sum(self._stages) * sum(plan.speed * plan.seconds for plan in self.plans[phase])
+        terms = self._made(slid * heated, np.zeros_like(pressure))
         for plan in self.plans[phase]:
-            stage = self._stage_of((plan.punch, plan.strip), conductance)
+            stage = self._stage_of(plan, conductance)
             entering = stage.entering(plan.speed * heated, sources=sources)
             for counts in self._stages:
                 begun = values
@@ -317,35 +316,36 @@ class HeatExchange:
             return values, terms, self._read(phase, values, np.split(stage.fluxes(begun, entering), 2))
         return values, terms, None
 
-    def _stage_of(self, kinds: tuple[int, int], conductance: Array) -> Stage:
+    def _stage_of(self, plan: StepPlan, conductance: Array) -> Stage:
         """Return a stage of few nodes on small bases; kept for conductances met before."""
+        kinds = (plan.punch, plan.strip)
         key = (*kinds, conductance.tobytes())
         if key not in self._few:
             if len(self._few) > max(LEAST, MEMORY // (48 * len(conductance) ** 2)):
                 self._few.clear()
             if kinds not in self._prepared_few:
-                self._prepared_few[kinds] = self._prepared_stage(kinds)
+                self._prepared_few[kinds] = self._prepared_stage(plan)
             fluxes = cast("FluxMap", self._flux_map(kinds, conductance))  # which those of few nodes are
             self._few[key] = self._prepared_few[kinds].at(fluxes)
         return self._few[key]
 
-    def _prepared_stage(self, kinds: tuple[int, int]) -> PreparedStage:
+    def _prepared_stage(self, plan: StepPlan) -> PreparedStage:
         """Return a stage on small bases, whatever conducts."""
-        of_kinds = list(zip(self.sides, kinds, strict=True))
+        of_kinds = list(zip(self.sides, (plan.punch, plan.strip), strict=True))
         motions = [one for side, kind in of_kinds if (one := side.field.propagation(kind)) is not None]
         every = np.eye(sum(len(basis) for basis in self.bases))
         none = np.zeros_like(every)
-        by_start, by_end = (self._kept([(kinds, *ends)], sources=False) for ends in ((every, none), (none, every)))
-        each = np.eye(len(self.weights))
+        by_start, by_end = (self._kept([(plan, *ends)], sources=False) for ends in ((every, none), (none, every)))
+        each = plan.seconds * np.eye(len(self.weights))
         by_flux = self._made(np.zeros((len(each), 2 * len(each))), np.hstack([each, each]))
-        constant = np.asarray(self._kept([(kinds, none[0], none[0])], sources=True) / sum(self._stages), dtype=float)
+        constant = np.asarray(self._kept([(plan, none[0], none[0])], sources=True) / sum(self._stages), dtype=float)
         ledger = HeatBalance(by_start, by_end, by_flux, constant)
         return PreparedStage(motions, [side.contacts[kind] for side, kind in of_kinds], ledger, self.heat.ambient)
 
     @property
     def _stages(self) -> tuple[float, ...]:
         """How often each stage of a step counts."""
-        return (1.0,) if np.isinf(self.duration) else (EARLIER, 1.0)
+        return (1.0,) if self._steady else (EARLIER, 1.0)
 
     def _read(self, phase: int, values: Array, fluxes: list[Array]) -> tuple[Array, Array]:
         """Return the temperatures of both contact surfaces at the end of a phase, from the fluxes of its last step."""
@@ -448,12 +448,12 @@ class HeatExchange:
                 values, changes = (a + counts * (b - a) for a, b in ((values, ends), (changes, after)))
         return changes
 
-    def _kept(self, spans: Sequence[tuple[tuple[int, int], Array, Array]], *, sources: bool) -> Array:
+    def _kept(self, spans: Sequence[tuple[StepPlan, Array, Array]], *, sources: bool) -> Array:
         """Return the terms of what bodies have kept or lost in steps, per thickness; of a steady state a second.
 
         Args:
-            spans: The steps: which prepared one each body takes, and the coordinates at the start and at the end of
-                its stages, summed as often as each counts.
+            spans: The steps, and the coordinates at the start and at the end of their stages, summed as often as each
+                counts.
             sources: Whether there is more than changes.
         """
         starts = self._summed([start for _, start, _ in spans], sources=sources)
@@ -473,45 +473,42 @@ class HeatExchange:
         return found
 
     def _account(
-        self, taken: Sequence[tuple[int, int]], before: Sequence[Array], after: Sequence[Array], counted: float
+        self, taken: Sequence[StepPlan], before: Sequence[Array], after: Sequence[Array], counted: float
     ) -> Array:
         """Return these terms from the rows of the balances.
 
         Args:
-            taken: Which prepared step each body takes in each step.
+            taken: The steps.
             before, after: Of both bodies, at the start and at the end of the stages, of `_summed`.
             counted: How often the constant parts of a stage count in a step; 0 for changes.
         """
         stored, convected, held, carried = (np.zeros(after[0].shape[2:]) for _ in range(4))
-        every = np.arange(len(taken))
-        for side, kinds, a, b in zip(self.sides, np.transpose(taken), after, before, strict=True):
-            stored = stored + (a[0] - b[0]).sum(axis=0) / self.duration
-            convected = convected + a[1].sum(axis=0) - counted * len(taken) * side.ambient_loss
-            held = held - (a[2 + 3 * kinds, every] - b[3 + 3 * kinds, every]).sum(axis=0)
-            held = held + counted * sum(side.held_source[k] for k in kinds)
-            carried = carried + a[4 + 3 * kinds, every].sum(axis=0) - counted * sum(side.brought[k] for k in kinds)
+        every, seconds = np.arange(len(taken)), np.array([plan.seconds for plan in taken])
+        both = np.array([[plan.punch for plan in taken], [plan.strip for plan in taken]])
+        for side, kinds, a, b in zip(self.sides, both, after, before, strict=True):
+            if not self._steady:
+                stored = stored + (a[0] - b[0]).sum(axis=0)
+            convected = convected + seconds @ a[1] - counted * seconds.sum() * side.ambient_loss
+            held = held - seconds @ (a[2 + 3 * kinds, every] - b[3 + 3 * kinds, every])
+            held = held + counted * (seconds @ np.array(side.held_source)[kinds])
+            carried = carried + seconds @ a[4 + 3 * kinds, every] - counted * (seconds @ np.array(side.brought)[kinds])
             if side.gives_back:
-                convected = convected - a[kinds - len(side.contacts), every].sum(axis=0)
+                convected = convected - seconds @ a[kinds - len(side.contacts), every]
         none = np.zeros_like(stored)
-        return np.array([none, none, stored, convected, held, carried]) * self._seconds
+        return np.array([none, none, stored, convected, held, carried])
 
     def _made(self, heat: Array, entered: Array) -> Array:
         """Return the terms of the heat made at the contact, per thickness; of a steady state a second.
 
         Args:
-            heat: Of friction, summed over all stages as often as each counts (n,) or (n, k), mW/mm².
-            entered: The fluxes into both bodies alike.
+            heat: Of friction over all stages, as often as each counts (n,) or (n, k), mJ/mm².
+            entered: By the fluxes into both bodies alike.
         """
         friction = self.weights @ heat
         debris, none = self.heat.debris * friction, np.zeros_like(friction)
         # At open nodes the surfaces lose heat to the surroundings: what of the friction heat did not go in.
         lost = friction - debris - self.weights @ entered
-        return np.array([friction, debris, none, lost, none, none]) * self._seconds
-
-    @property
-    def _seconds(self) -> float:
-        """Of a stage; of a steady state one."""
-        return 1.0 if np.isinf(self.duration) else self.duration
+        return np.array([friction, debris, none, lost, none, none])
 
     def step_map(self, kinds: tuple[int, int], conductance: Array) -> StepMap:
         """Return what a step does to the coordinates; for both on a small basis.

@@ -29,7 +29,7 @@ class BasisRequest:
 
     Attributes:
         velocities: Of the body's material in all its steps, and in those of other stages that share the basis.
-        duration: Of a step, s.
+        duration: Of the shortest step, s.
         tolerance: Singular values below this fraction of the largest are dropped.
         difference: From the whole mesh that is let pass, relative.
         surroundings: What the body meets.
@@ -60,7 +60,7 @@ def fitted_field(
 
     Args:
         body: The body.
-        steps: Prepared ones.
+        steps: Prepared ones, the shortest first.
         own: Velocity of its material in each of them.
         trial: What it is held against the whole mesh with, where the material has one velocity.
         wish: What is wanted.
@@ -99,8 +99,8 @@ def _on(
     basis: ReducedBasis, steps: Sequence[HeatStep], wish: BasisRequest, inflow: csc_array, exact: Sequence[Array] | None
 ) -> ReducedField:
     """Return the field on a basis, of material at rest on its modes; collective."""
-    if len(steps) == 1 and not any(wish.velocities):
-        return ModalField(steps[0], inflow, modal_basis(basis, steps[0], wish.duration)[0], exact)
+    if not any(wish.velocities):
+        return ModalField(steps, inflow, modal_basis(basis, steps[0], wish.duration)[0], exact)
     one_way = min(wish.velocities) * max(wish.velocities) >= 0 and any(step.moves for step in steps)
     return ReducedField(steps, inflow, basis, exact, one_way=one_way)
 

@@ -36,26 +36,32 @@ class HeatedCycle:
         rates: lambda (dim,), 1/s.
         loads: b of each step (k, dim), K/s.
         reading: Temperature of the contact at the end of the cycle (n, dim).
-        duration: Of a step, s.
+        durations: Of the steps (k,), s.
     """
 
     rates: Array
     loads: Sequence[Array]
     reading: Array
-    duration: float
+    durations: Sequence[float]
 
     def repeating(self) -> Array:
         """Return the contact's temperature at the end of the cycle that repeats (n,), K, beside a mean without end."""
-        each = self.rates * self.duration
-        stage = 1 / (1 + STAGE * each)
-        factor = stage * (1 + EARLIER * (stage - 1))
-        lasts = each * len(self.loads) > NEUTRAL  # else a mean that grows on, by any steps alike
-        warms = np.divide(1 - factor, self.rates, out=np.zeros_like(factor), where=lasts)
-        state: Array = np.zeros(len(factor))
-        for load in self.loads:
-            state = factor * state + warms * load
-        missing = 1 - factor ** len(self.loads)
+        lasts = self.rates * sum(self.durations) > NEUTRAL  # else a mean that grows on, by any steps alike
+        known = {duration: self._factor(duration) for duration in dict.fromkeys(self.durations)}
+        state: Array = np.zeros(len(self.rates))
+        through: Array = np.ones(len(self.rates))
+        for load, duration in zip(self.loads, self.durations, strict=True):
+            factor = known[duration]
+            warms = np.divide(1 - factor, self.rates, out=np.zeros_like(factor), where=lasts)
+            state, through = factor * state + warms * load, through * factor
+        missing = 1 - through
         return np.asarray(self.reading @ np.divide(state, missing, out=np.zeros_like(state), where=lasts))
+
+    def _factor(self, duration: float) -> Array:
+        """Return what a step leaves of each mode (dim,), by the rule of `fenwear.heat.exchange`."""
+        each = self.rates * duration
+        stage = 1 / (1 + STAGE * each)
+        return np.asarray(stage * (1 + EARLIER * (stage - 1)))
 
 
 @dataclass(frozen=True)
@@ -97,7 +103,7 @@ def chosen(heat: Heat, positions: int, temperatures: Callable[[int], tuple[Array
         positions: In a half-cycle, at each of which there are as many steps.
         temperatures: Gives the contact's by so many steps at each of them, and by twice as many, (n,) each.
     """
-    steps = heat.steps or STEPS
+    steps = max(heat.steps or STEPS, positions)
     while True:
         count = -(-steps // positions)
         change = _change(*temperatures(count))

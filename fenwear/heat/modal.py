@@ -33,26 +33,26 @@ def modal_basis(basis: ReducedBasis, step: HeatStep, duration: float) -> tuple[R
 
 
 class ModalField(ReducedField):
-    """The reduced temperature of a body at rest on its modes: one step, which is a factor for each."""
+    """The reduced temperature of a body at rest on its modes: each step is a factor for each of them."""
 
     def __init__(
         self,
-        step: HeatStep,
+        steps: Sequence[HeatStep],
         inflow: csc_array,
         basis: ReducedBasis,
         contact_responses: Sequence[Array] | None = None,
     ) -> None:
-        """Project the step; collective.
+        """Project the steps; collective.
 
         Args:
-            step: Of the body.
+            steps: Of the body, of different durations.
             inflow: Loads of unit fluxes (owned, n), mm.
             basis: Of `modal_basis`.
             contact_responses: See `ReducedField`.
         """
-        super().__init__([step], inflow, basis, contact_responses)
-        self._decay = np.diag(self._propagators[0]).copy()
+        super().__init__(steps, inflow, basis, contact_responses)
+        self._decays = [np.diag(one).copy() for one in self._propagators]
 
     def propagation(self, step: int) -> Propagation:
         """Return the step that lets each mode decay."""
-        return replace(super().propagation(step), decay=self._decay)
+        return replace(super().propagation(step), decay=self._decays[step])

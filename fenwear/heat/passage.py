@@ -1,13 +1,13 @@
-"""Where the punch is on a strip that passes under it to and fro, in the strip's own frame.
+"""Where the punch is on a strip that passes under it to and fro or through a cycle, in the strip's own frame.
 
-The strip's mesh stays with its material, and the contact moves over it. In each step the friction's flux enters
-through the transfer of the places of that step, their mean over what is slid in it: so the flux of a place counts by
-the speed with which it is passed. The temperature of the contact is read through the transpose.
+The strip's mesh stays with its material, and the contact moves over it, whichever way the strip shifts and turns. In
+each step the friction's flux enters through the transfer of the places of that step, their mean over what is slid in
+it: so the flux of a place counts by the speed with which it is passed. The temperature of the contact is read through
+the transpose.
 """
 
 from __future__ import annotations
 
-import itertools
 from functools import cached_property, reduce
 from operator import add
 
@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from fenwear.arrays import Array
-from fenwear.interface import ContactPair, transfer_at
+from fenwear.interface import ContactPair, Placement, transfer_at
+from fenwear.interface.placement import HERE
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.motion import Motion
+from fenwear.sliding.screw import Way
 
 INSTANTS = 8  # places at most that stand for those of a step
 
@@ -28,8 +29,8 @@ class Passage:
 
     Args:
         middle: Both surfaces in the middle position.
-        sliding: How the strip's material moves for a unit of the motion.
-        motion: To and fro.
+        sliding: How the strip's material moves for a unit of the motion, where its phases have no fields of their own.
+        motion: To and fro, or a cycle as a table.
 
     Raises:
         CaseError: the stroke runs off the strip's contact surface; says how much is missing.
@@ -37,41 +38,43 @@ class Passage:
 
     def __init__(self, middle: ContactPair, sliding: SlidingField, motion: Motion) -> None:
         self.middle, self._sliding, self.motion = middle, sliding, motion
-        self._found: dict[float, csr_array] = {}
-        ends = motion.offsets(1)
-        self._farthest = float(ends.min()), float(ends.max())
-        for offset in sorted(self._farthest, key=abs, reverse=True):  # the farthest first: its error tells all
-            self._at(offset)
+        self._found: dict[Placement, csr_array] = {}
+        self._whole = list(dict.fromkeys(way for row in motion.ways(sliding, 1) for way in row))
+        ends = list(dict.fromkeys(way.at(share) for way in self._whole for share in (0.0, 1.0)))
+        for place in sorted(
+            ends, key=lambda place: -self._moved(HERE, place)
+        ):  # the farthest first: its error tells all
+            self._at(place)
 
     @cached_property
     def nodes(self) -> NDArray[np.int64]:
         """The strip's trace nodes that some place of the contact covers, ascending (q,)."""
-        punch, (first, last) = self.middle.punch, self._farthest
-        moved = np.linalg.norm(self._moved(last) - self._moved(first), axis=1).max()
-        count = 2 + int(2 * moved / np.sort(np.ptp(punch.x, axis=0))[1 - punch.dim])  # by half a width
-        return np.unique(np.concatenate([self._at(float(x)).indices for x in np.linspace(first, last, count)]))
+        punch = self.middle.punch
+        width = np.sort(np.ptp(punch.x, axis=0))[1 - punch.dim]
+        covered = []
+        for way in self._whole:
+            count = 2 + int(2 * self._moved(way.at(0.0), way.at(1.0)) / width)  # by half a width
+            covered += [self._at(way.at(float(share))).indices for share in np.linspace(0, 1, count)]
+        return np.unique(np.concatenate(covered))
 
     @cached_property
     def ends(self) -> list[csr_array]:
         """What takes values at `nodes` to the contact nodes at the end of each phase (n, q) each."""
-        return [csr_array(self._at(float(end))[:, self.nodes]) for end in self.motion.offsets(1)[:, -1]]
+        return [csr_array(self._at(end)[:, self.nodes]) for end in self.motion.ends(self._sliding)]
 
     def steps(self, count: int) -> tuple[list[csr_array], list[list[int]]]:
         """Return the mean transfers (n, q) of steps, and which of them each of `count` steps of each phase takes."""
-        edges = self.motion.offsets(count)
-        numbers: dict[tuple[float, float], int] = {}
-        kinds = []
-        for row in edges:
-            places = [(min(float(a), float(b)), max(float(a), float(b))) for a, b in itertools.pairwise(row)]
-            kinds.append([numbers.setdefault(place, len(numbers)) for place in places])
-        return [self._mean(*ends) for ends in numbers], kinds
+        numbers: dict[Way, int] = {}
+        kinds = [
+            [numbers.setdefault(way, len(numbers)) for way in row] for row in self.motion.ways(self._sliding, count)
+        ]
+        return [self._mean(way) for way in numbers], kinds
 
-    def _mean(self, low: float, high: float) -> csr_array:
-        """Return the mean transfer between two offsets (n, q)."""
-        slid = np.linalg.norm(self._moved(high) - self._moved(low), axis=1).max()
-        count = min(INSTANTS, 1 + int(2 * slid / self._spacing))
-        places = low + (high - low) * (np.arange(count) + 0.5) / count
-        mean = reduce(add, (self._at(float(place)) for place in places)) / count
+    def _mean(self, way: Way) -> csr_array:
+        """Return the mean transfer over a way (n, q)."""
+        count = min(INSTANTS, 1 + int(2 * self._moved(way.at(0.0), way.at(1.0)) / self._spacing))
+        places = [way.at((k + 0.5) / count) for k in range(count)]
+        mean = reduce(add, (self._at(place) for place in places)) / count
         return csr_array(csr_array(mean)[:, self.nodes])
 
     @cached_property
@@ -82,10 +85,12 @@ class Passage:
         apart = np.linalg.norm(corners[:, :, None] - corners[:, None], axis=3)
         return float(apart[:, ~np.eye(facets.shape[1], dtype=bool)].min())
 
-    def _moved(self, offset: float) -> Array:
-        return self._sliding.placement(offset).points(self.middle.strip.trace)
+    def _moved(self, one: Placement, other: Placement) -> float:
+        """Return how far the strip's nodes are apart at two places, mm."""
+        trace = self.middle.strip.trace
+        return float(np.linalg.norm(other.points(trace) - one.points(trace), axis=1).max())
 
-    def _at(self, offset: float) -> csr_array:
-        if offset not in self._found:
-            self._found[offset] = transfer_at(self.middle, self._sliding.placement(offset))
-        return self._found[offset]
+    def _at(self, place: Placement) -> csr_array:
+        if place not in self._found:
+            self._found[place] = transfer_at(self.middle, place)
+        return self._found[place]

@@ -1,4 +1,4 @@
-"""The temperature of a strip that passes under the punch to and fro, in its own frame.
+"""The temperature of a strip that passes under the punch to and fro or through a cycle, in its own frame.
 
 Its mesh is fixed to its material, its ends move with it, and the source moves over it (see `fenwear.heat.passage`):
 no velocity is in its equation, so that capacity M and conductivity K are symmetric. All of its contact surface
@@ -24,7 +24,7 @@ from fenwear.heat.field import FullField, Functional, Propagation, ReducedField
 
 
 class ReciprocatingField:
-    """The temperature of a strip in its own frame, over the steps of a motion to and fro.
+    """The temperature of a strip in its own frame, over the steps of a motion.
 
     Attributes:
         contacts: Temperature at the interface nodes over the places of each step (n,), K.
@@ -36,6 +36,7 @@ class ReciprocatingField:
         inner: FullField | ReducedField,
         nodes: csr_array,
         transfers: Sequence[csr_array],
+        kinds: Sequence[int],
         weights: Array,
         convection: float,
         ambient: float,
@@ -43,46 +44,45 @@ class ReciprocatingField:
         """Bring the contact to the places of each step; collective.
 
         Args:
-            inner: The strip without the contact, its only step and its responses to unit loads at q trace nodes.
+            inner: The strip without the contact, its steps and its responses to unit loads at q trace nodes.
             nodes: Temperature at these trace nodes (q, owned).
             transfers: From them to the interface nodes in each step (n, q).
+            kinds: Which step of the inner field each takes.
             weights: Areas of the interface nodes (n,).
             convection: h, mW/(mm² K).
             ambient: theta_a, K.
         """
         self.inner, self.basis, self._ambient, self._convection = inner, inner.basis, ambient, convection
         at_nodes = inner.observe(nodes)
-        exact = None if inner.contact_responses is None else inner.contact_responses[0]
-        self._at_nodes, self._exact = at_nodes, exact
+        self._at_nodes, self._kinds = at_nodes, kinds
         self.contacts = [at_nodes.through(transfer) for transfer in transfers]
         self._loads = [csr_array(transfer.T @ diags_array(weights)) for transfer in transfers]
         self.responses: Sequence[Array] = []
-        self.contact_responses: Sequence[Array] | None = None if exact is None else []
         self._returns: list[Array] = []
         found, corrected = [], []
-        for contact, load, transfer in zip(self.contacts, self._loads, transfers, strict=True):
-            response = np.asarray(inner.responses[0] @ load)
+        for contact, load, transfer, kind in zip(self.contacts, self._loads, transfers, kinds, strict=True):
+            response = np.asarray(inner.responses[kind] @ load)
             warms = contact.of_changes(response)
             back = np.linalg.inv(np.eye(len(weights)) - convection * warms)
             found.append(response @ back)
             self._returns.append(convection * found[-1])
-            if exact is not None:
+            if inner.contact_responses is not None:
+                exact = inner.contact_responses[kind]
                 corrected.append(back @ warms + np.asarray(transfer @ (exact @ load)) - warms)
         self.responses = found
-        if exact is not None:
-            self.contact_responses = corrected
+        self.contact_responses: Sequence[Array] | None = None if inner.contact_responses is None else corrected
         self.given_back = np.array([convection * (nodes.T @ load.sum(axis=1)) for load in self._loads])
 
     def advance(self, step: int, coordinates: Array, *, sources: bool = True) -> Array:
         """Return what a step without flux through the contact, but for what is given back, makes of coordinates."""
-        free = self.inner.advance(0, coordinates, sources=sources)
+        free = self.inner.advance(self._kinds[step], coordinates, sources=sources)
         contact = self.contacts[step]
         above = contact(free) - self._ambient if sources else contact.of_changes(free)
         return np.asarray(free + self._returns[step] @ above)
 
     def propagation(self, step: int) -> Propagation | None:
         """Return the step over its places; None on the nodes of a mesh."""
-        inner = self.inner.propagation(0)
+        inner = self.inner.propagation(self._kinds[step])
         return inner and replace(inner, response=self.responses[step], given_back=self._convection)
 
     def observe(self, rows: Array | csr_array) -> Functional:
@@ -95,8 +95,8 @@ class ReciprocatingField:
 
     def left_out(self, transfer: csr_array, step: int) -> Array | None:
         """Return what a unit flux of a step adds to such a reading beside the coordinates (n, n); None for nothing."""
-        if self._exact is None:
+        if self.inner.contact_responses is None:
             return None
-        load = self._loads[step]
-        known = self.reading(transfer).of_changes(np.asarray(self.inner.responses[0] @ load))
-        return np.asarray(transfer @ (self._exact @ load)) - known
+        load, kind = self._loads[step], self._kinds[step]
+        known = self.reading(transfer).of_changes(np.asarray(self.inner.responses[kind] @ load))
+        return np.asarray(transfer @ (self.inner.contact_responses[kind] @ load)) - known

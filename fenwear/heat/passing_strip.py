@@ -77,7 +77,7 @@ class PassingStrip:
 
     def fitted(
         self,
-        step: HeatStep,
+        steps: Sequence[HeatStep],
         duration: float,
         transfers: Sequence[csr_array],
         plans: Sequence[Sequence[StepPlan]],
@@ -89,8 +89,8 @@ class PassingStrip:
         Collective.
 
         Args:
-            step: A stage.
-            duration: Of a stage, s.
+            steps: Stages, the shortest first.
+            duration: Of the shortest, s.
             transfers: Of the places of each prepared step.
             plans: The steps of each phase.
             opened: Gap at the end of the last phase by changes of temperature, see `Trial`.
@@ -101,10 +101,10 @@ class PassingStrip:
         entering = [transfers[plan.strip].T @ (forces * plan.speed) for row in plans for plan in row]
         rigid = rigid_gaps(self.body, pair.punch.x)
         trial = Trial(self.loads, entering, csr_array(end @ self.nodes), opened, rigid, through=end)
-        exact = contact_responses([step], self.loads, self.nodes) if self.lasting else None
+        exact = contact_responses(steps, self.loads, self.nodes) if self.lasting else None
         for tries in range(1, TRIES + 1):
-            small = ModalField(step, self.loads, self.modes(duration), exact)
-            difference = certificate(step, 0.0, self.around, small, trial)
+            small = ModalField(steps, self.loads, self.modes(duration), exact)
+            difference = certificate(steps[0], 0.0, self.around, small, trial)
             if difference <= allowed or tries == TRIES:
                 break
             self._tolerance, self._known = self._tolerance / 10, None
@@ -114,7 +114,7 @@ class PassingStrip:
         """Return the steps of a half-cycle, as given or as many as the tolerance asks for; collective."""
 
         def temperatures(count: int) -> tuple[Array, Array]:
-            basis, rates = self._modes(STAGE * motion.phases[0].duration / (2 * count))
+            basis, rates = self._modes(STAGE * min(phase.duration for phase in motion.phases) / (2 * count))
             at_nodes = total(self.body.body.mesh.comm, self.nodes @ basis.columns)
             coarse, fine = (self._cycle(rates, at_nodes, motion, k).repeating() for k in (count, 2 * count))
             return coarse, fine
@@ -128,4 +128,5 @@ class PassingStrip:
         entering = [at_nodes.T @ (transfer.T @ weights) for transfer in transfers]
         loads = [entering[kind] * speeds[phase, k] for phase, row in enumerate(kinds) for k, kind in enumerate(row)]
         reading = np.asarray(self.passage.ends[-1] @ at_nodes)
-        return HeatedCycle(rates, loads, reading, motion.phases[0].duration / count)
+        durations = [duration / count for duration in motion.durations for _ in range(count)]
+        return HeatedCycle(rates, loads, reading, durations)

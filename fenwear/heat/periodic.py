@@ -65,12 +65,20 @@ class Cycle:
 
     Attributes:
         maps: Of each phase.
-        through: State after each phase from that at the start of the cycle without sources and pressures (m, dim, dim).
     """
 
     def __init__(self, maps: Sequence[PhaseMap]) -> None:
         self.maps = maps
-        self.through = list(accumulate((one.propagator for one in maps), lambda through, one: one @ through))
+
+    @cached_property
+    def propagator(self) -> Array:
+        """State after the cycle from that at its start without sources and pressures (dim, dim)."""
+        return reduce(lambda through, one: one.propagator @ through, self.maps[1:], self.maps[0].propagator)
+
+    @cached_property
+    def through(self) -> list[Array]:
+        """The same after each phase (m, dim, dim): of few phases and nodes, which ask for it."""
+        return list(accumulate((one.propagator for one in self.maps), lambda through, one: one @ through))
 
     def states(self, state: Array, pressure: Array) -> list[Array]:
         """Return the states after each phase from that at the start (dim,) and the pressures (m, n)."""
@@ -121,22 +129,14 @@ class CycleJump:
 
     def state(self, pressure: Array) -> Array:
         """Return the state at the end of the jump (dim,) for pressures (m, n)."""
-        return self._end(self._brought(pressure)[-1])
+        brought = self._cycle.states(np.zeros(len(self._start)), pressure)[-1]
+        return np.asarray(scipy.linalg.lu_solve(self._factor, self._start + self._weight * brought))
 
     def gaps(self, pressure: Array) -> Array:
         """Return the thermal gap at the end of each phase of the cycle that starts there (m, n), mm, at pressures."""
-        brought = self._brought(pressure)
-        end = self._end(brought[-1])
-        states = [through @ end + one for through, one in zip(self._cycle.through, brought, strict=True)]
+        states = self._cycle.states(self.state(pressure), pressure)
         found = zip(self._gap_rows, states, self._gap_constants, strict=True)
         return np.array([rows @ state + constant for rows, state, constant in found])
-
-    def _brought(self, pressure: Array) -> list[Array]:
-        """Return the states after each phase of a cycle from zero (dim,)."""
-        return self._cycle.states(np.zeros(len(self._start)), pressure)
-
-    def _end(self, brought: Array) -> Array:
-        return np.asarray(scipy.linalg.lu_solve(self._factor, self._start + self._weight * brought))
 
     @cached_property
     def gap(self) -> Array:
@@ -201,7 +201,7 @@ class CycleHeat:
     def jump(self, state: Array, cycles: float, conductances: Array) -> CycleJump:
         """Return the end of `cycles` cycles from `state`; infinitely many give the periodic state."""
         cycle = self.cycle(conductances)
-        changes = np.eye(len(state)) - cycle.through[-1]
+        changes = np.eye(len(state)) - cycle.propagator
         if np.isinf(cycles):
             return CycleJump(np.zeros(len(state)), 1.0, changes, cycle, self.gap_rows, self._gap_constants)
         matrix = np.eye(len(state)) + cycles * changes

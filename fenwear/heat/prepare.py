@@ -14,7 +14,7 @@ from fenwear.case import Heat, Track
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.certificate import Trial, pressures, rigid_gaps
 from fenwear.heat.conduction import HeatBody, HeatStep, Surroundings
-from fenwear.heat.exchange import STAGE, HeatExchange
+from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import FullField, Functional, ReducedField
 from fenwear.heat.fitted import BasisRequest, fitted_field
 from fenwear.heat.halving import STEPS, HeatedPassage, chosen
@@ -23,6 +23,7 @@ from fenwear.heat.modal import ModalField
 from fenwear.heat.passage import Passage
 from fenwear.heat.passing import ReciprocatingField
 from fenwear.heat.passing_strip import MANY, PassingStrip
+from fenwear.heat.plans import StageKind, at_places, step_plans
 from fenwear.heat.section import section_modes
 from fenwear.heat.side import Fineness, Reading, Side, StepPlan
 from fenwear.heat.track import TrackField
@@ -62,10 +63,11 @@ def prepare_exchange(
             a strip that passes under the punch at the nodes of the passage (q, owned).
         sliding: The velocity of the strip's material for a unit speed.
         motion: The sliding motion.
-        friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), in all phases.
+        friction: mu of the contact nodes times what they slide for a unit of the stroke (n,), or in each phase (m, n).
         thickness: Of a plane model, mm.
         reduced: Whether the temperatures are projected onto a small basis.
-        passage: Where the punch is on a strip that passes to and fro; None where it moves one way or not at all.
+        passage: Where the punch is on a strip that passes to and fro or through a cycle; None where it moves one way
+            or not at all.
         moved: What the bodies' temperatures move their surfaces by, for the certificates, where `expansions` are not to
             open the contact.
         others: Speeds of all stages of a program one way, which share their bases.
@@ -73,48 +75,48 @@ def prepare_exchange(
         fresh: Make them whatever is kept.
 
     Raises:
-        CaseError: the half-cycles of the motion last unequally long.
         HeatError: no basis gives temperatures that die out.
     """
-    one_way = len(set(motion.directions)) == 1
+    one_way = motion.one_way
+    friction = np.broadcast_to(friction, (len(motion.phases), len(pair.weights)))
     way: Way = partial(kept_basis, fresh=fresh) if keep else made
     strip = None if passage is None else PassingStrip(heat, bodies[1], passage, way)
     fineness = Fineness(heat.steps or STEPS)
-    if strip is not None and motion.positions < STEPS:
+    if strip is not None and (motion.steps or motion.positions < STEPS):
         fineness = strip.fineness(motion, heat)
     elif one_way and motion.positions < STEPS:
-        fineness = _passed_fineness(heat, bodies, pair, sliding, motion, friction, others)
+        fineness = _passed_fineness(heat, bodies, pair, sliding, motion, friction[0], others)
     count = -(-fineness.steps // motion.positions)  # of each phase: at least as many in a half-cycle as asked for
-    plans, velocities, duration = _plans(motion, count, moves=one_way)
-    transfers: list[csr_array] = []
+    plans, *stages = step_plans(motion, count, moves=one_way)
+    shortest = stages[0][0].duration
+    of_places: list[tuple[csr_array, int]] = []
     if passage is not None:
-        transfers, kinds = passage.steps(count)
-        plans = [
-            [replace(plan, strip=kind) for plan, kind in zip(row, own, strict=True)]
-            for row, own in zip(plans, kinds, strict=True)
-        ]
+        plans, of_places = at_places(passage, plans, count)
     sides, differences = [], []
     for body, inflow, rows, own, by in zip(
-        bodies, inflows(bodies, pair), expansions, ([0.0], velocities), moved or (None, None), strict=True
+        bodies, inflows(bodies, pair), expansions, stages, moved or (None, None), strict=True
     ):
+        velocities = [stage.velocity for stage in own]
         if strip is not None and body is strip.body:
             opened = opened_gap(body, pair, rows, by, strip.passage)
-            side, difference = _passing(heat, strip, transfers, plans, rows, opened, duration, reduced=reduced)
+            side, difference = _passing(heat, strip, of_places, own, plans, rows, opened, reduced=reduced)
         else:
             around = _surroundings(body, pair, sliding, renewed=one_way)
-            steps = [body.step(velocity, duration, around, at_once=reduced) for velocity in own]
+            steps = [body.step(stage.velocity, stage.duration, around, at_once=reduced) for stage in own]
             rated = None
             if reduced:
                 cycle = [step.of(body) for row in plans for step in row]
-                moving = [own[step] for step in cycle] + [v for v in others if body.body.name == "strip"]
+                moving = [velocities[step] for step in cycle] + [v for v in others if body.body.name == "strip"]
                 wish = BasisRequest(
-                    moving, duration, heat.reduction_tolerance, heat.reduction_difference, around, cycle, way
+                    moving, shortest, heat.reduction_tolerance, heat.reduction_difference, around, cycle, way
                 )
                 rated = wish, _trial(body, pair, inflow, opened_gap(body, pair, rows, by), friction, plans)
-            side, difference = _in_place(heat, body, steps, own, pair, inflow, rows, plans, around, rated, thickness)
+            side, difference = _in_place(
+                heat, body, steps, velocities, pair, inflow, rows, plans, around, rated, thickness
+            )
         sides.append(side)
         differences += [] if difference is None else [difference]
-    exchange = _exchange(heat, (sides[0], sides[1]), plans, duration, pair, friction, thickness)
+    exchange = HeatExchange(heat, (sides[0], sides[1]), plans, friction.copy(), pair.weights, thickness)
     exchange.fineness = replace(fineness, steps=count * motion.positions, difference=max(differences, default=None))
     return exchange
 
@@ -199,9 +201,12 @@ def _trial(
     plans: Sequence[Sequence[StepPlan]],
 ) -> Trial:
     """Return what the reduced temperatures of a body whose contact stays in its place are tried with."""
-    fluxes = pressures(pair.punch.x) * friction[:, None]
-    speeds = [plan.speed for row in plans for plan in row]
-    entering = [fluxes * (speed if any(speeds) else 1.0) for speed in speeds]
+    tried, moves = pressures(pair.punch.x), any(plan.speed for row in plans for plan in row)
+    entering = [
+        tried * friction[phase, :, None] * (plan.speed if moves else 1.0)
+        for phase, row in enumerate(plans)
+        for plan in row
+    ]
     return Trial(inflow, entering, contact_rows(body, pair), opened, rigid_gaps(body, pair.punch.x))
 
 
@@ -232,30 +237,6 @@ def opened_gap(
     return by_displacement
 
 
-def _plans(motion: Motion, count: int, *, moves: bool) -> tuple[list[list[StepPlan]], list[float], float]:
-    """Return the steps of each phase, the velocities of the strip's material in them, and how long stages last, s.
-
-    Args:
-        motion: The sliding motion.
-        count: Steps of each phase.
-        moves: Whether the strip's material moves through its mesh.
-
-    Raises:
-        CaseError: the half-cycles of the motion last unequally long.
-    """
-    if len({round(phase.duration, 12) for phase in motion.phases}) > 1:
-        raise CaseError(InputError("motion", "expected half-cycles of equal duration with heat"))
-    speeds = motion.mean_speeds(count)
-    signed = [[d * float(v) if moves else 0.0 for v in speeds[phase]] for phase, d in enumerate(motion.directions)]
-    velocities = sorted({velocity for row in signed for velocity in row})
-    of_strip = {velocity: kind for kind, velocity in enumerate(velocities)}
-    plans = [
-        [StepPlan(0, of_strip[velocity], float(speeds[phase, k])) for k, velocity in enumerate(row)]
-        for phase, row in enumerate(signed)
-    ]
-    return plans, velocities, STAGE * motion.phases[0].duration / count
-
-
 def prepare_steady(
     heat: Heat,
     bodies: tuple[HeatBody, HeatBody],
@@ -271,24 +252,25 @@ def prepare_steady(
     Raises:
         CaseError: a body has no heat sink.
     """
-    plans = [[StepPlan(0, k, abs(v))] for k, v in enumerate(velocities)]
+    plans = [[StepPlan(0, k, abs(v), np.inf)] for k, v in enumerate(velocities)]
     sides = []
     for body, inflow, rows, own in zip(bodies, inflows(bodies, pair), expansions, ([0.0], velocities), strict=True):
         around = _surroundings(body, pair, sliding, renewed=True)
         steps = [body.step(velocity, np.inf, around) for velocity in own]
         last = [row[-1].of(body) for row in plans]
         sides.append(_side(FullField(body, steps, inflow), steps, around, pair, rows, last, cooled=True))
-    return _exchange(heat, (sides[0], sides[1]), plans, np.inf, pair, friction, thickness)
+    of_phases = np.tile(friction, (len(plans), 1))
+    return HeatExchange(heat, (sides[0], sides[1]), plans, of_phases, pair.weights, thickness)
 
 
 def _passing(
     heat: Heat,
     strip: PassingStrip,
-    transfers: Sequence[csr_array],
+    of_places: Sequence[tuple[csr_array, int]],
+    stages: Sequence[StageKind],
     plans: Sequence[Sequence[StepPlan]],
     expansion: Array,
     opened: Opened,
-    duration: float,
     *,
     reduced: bool,
 ) -> tuple[Side, float | None]:
@@ -296,22 +278,26 @@ def _passing(
 
     Args:
         strip: With its modes.
-        transfers: Of the places of each step.
+        of_places: The mean transfer of each kind of step, and which stage it takes.
+        stages: Of the strip, the shortest first.
         plans: The steps of each phase.
         expansion: Of the nodes of the passage (q, owned), mm/K.
         opened: Gap that changes of its temperature open.
-        duration: Of a stage, s.
         reduced: Whether it is on its modes.
     """
     body, around, passage = strip.body, strip.around, strip.passage
-    step = body.step(0.0, duration, around, at_once=reduced)
+    transfers, kinds = [transfer for transfer, _ in of_places], [kind for _, kind in of_places]
+    steps = [body.step(0.0, stage.duration, around, at_once=reduced) for stage in stages]
     inner: FullField | ModalField
     difference = None
     if reduced:
-        inner, difference = strip.fitted(step, duration, transfers, plans, opened, heat.reduction_difference)
+        shortest = stages[0].duration
+        inner, difference = strip.fitted(steps, shortest, transfers, plans, opened, heat.reduction_difference)
     else:
-        inner = FullField(body, [step], strip.loads)
-    field = ReciprocatingField(inner, strip.nodes, transfers, passage.middle.weights, heat.convection, heat.ambient)
+        inner = FullField(body, steps, strip.loads)
+    field = ReciprocatingField(
+        inner, strip.nodes, transfers, kinds, passage.middle.weights, heat.convection, heat.ambient
+    )
     initial = total(body.body.mesh.comm, expansion @ np.full(body.owned, heat.initial))
     expanded = field.observe(expansion).less(initial).times(-1.0)
     readings = [
@@ -319,9 +305,9 @@ def _passing(
         for end, row in zip(passage.ends, plans, strict=True)
     ]
     cooled = body.loses_heat(0.0, around)
-    steps = [step] * len(transfers)
-    side = _on_balance(field, steps, around, field.contacts, readings, field.given_back, cooled=cooled)
-    if reduced:
+    taken = [steps[kind] for kind in kinds]
+    side = _on_balance(field, taken, around, field.contacts, readings, field.given_back, cooled=cooled)
+    for step in steps if reduced else ():
         step.free()
     return side, difference
 
@@ -406,18 +392,6 @@ def inflows(bodies: tuple[HeatBody, HeatBody], pair: ContactPair) -> tuple[csc_a
         for body, onto in zip(bodies, (pair.punch.spread, pair.transfer.T), strict=True)
     )
     return punch, strip
-
-
-def _exchange(
-    heat: Heat,
-    sides: tuple[Side, Side],
-    plans: list[list[StepPlan]],
-    duration: float,
-    pair: ContactPair,
-    friction: Array,
-    thickness: float,
-) -> HeatExchange:
-    return HeatExchange(heat, sides, plans, duration, np.tile(friction, (len(plans), 1)), pair.weights, thickness)
 
 
 def _side(

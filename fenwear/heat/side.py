@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from fenwear.arrays import Array
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.field import Field, Functional
@@ -62,11 +64,23 @@ class Side:
 
 @dataclass(frozen=True)
 class StepPlan:
-    """One time step of a phase: which prepared step each body takes, and the mean sliding speed."""
+    """One time step of a phase.
+
+    Attributes:
+        punch, strip: Which prepared step each body takes; together they have one duration.
+        speed: Mean sliding speed, mm/s or rad/s.
+        duration: Of a stage, s; infinite for a steady state, which has one stage.
+    """
 
     punch: int
     strip: int
     speed: float
+    duration: float
+
+    @property
+    def seconds(self) -> float:
+        """Over which a stage makes and loses heat; of a steady state one."""
+        return 1.0 if np.isinf(self.duration) else self.duration
 
     def of(self, body: HeatBody) -> int:
         """Return the prepared step of one of the bodies."""

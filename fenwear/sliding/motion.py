@@ -5,12 +5,8 @@ times, one for each position of the strip under the punch. Such a phase has one 
 an offset of the strip, and the sliding that is done there. Rotations are counted in rad in place of mm.
 
 A cycle that is a table is one half-cycle, whose phases are the steps between its rows. Each has a sliding field of its
-own, the constant screw that takes the strip from one row to the next,
-
-    R = R_1 R_0^T = exp(w),  s_1 - R s_0 = J(w) V,  J(w) = 1 + (1 - cos t) / t² [w] + (t - sin t) / t³ [w]²,  t = |w|,
-
-the velocity V + w x (x - c) for a unit of time (exponential of se(3); R. M. Murray et al., A Mathematical Introduction
-to Robotic Manipulation, 1994): what slides past a place in space is exact for steps of any size.
+own, that of the constant screw which takes the strip from one row to the next (`fenwear.sliding.screw`): what slides
+past a place in space is exact for steps of any size.
 """
 
 from __future__ import annotations
@@ -29,11 +25,10 @@ from scipy.special import beta, betainc
 from fenwear.arrays import Array
 from fenwear.case import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.errors import CaseError, InputError
-from fenwear.interface.placement import HERE, Placement
-from fenwear.sliding.field import SlidingField, screw
+from fenwear.interface.placement import HERE, Placement, Vector
+from fenwear.sliding.field import SlidingField
+from fenwear.sliding.screw import Screw, Slide, Way
 
-ROUNDING = 1e-14  # rad, and of the largest shift: what matrices leave of a motion that is none
-SMALL = 1e-4  # rad: a turn whose series ends after three terms
 DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
 
 
@@ -48,7 +43,8 @@ class Phase:
         distance: Slid in it, mm.
         fraction: Of the cycle, at the middle of the phase.
         field: Of a step of a table, in its direction; None where it is that of the whole motion.
-        place: Where the strip is in the middle of such a step.
+        place: Where the strip is in the middle of such a step, where it moves.
+        way: From its begin to its end.
     """
 
     direction: int
@@ -58,6 +54,7 @@ class Phase:
     fraction: float
     field: SlidingField | None = None
     place: Placement = HERE
+    way: Screw | None = None
 
     @property
     def speed(self) -> float:
@@ -164,9 +161,23 @@ class Motion:
         return sum(phase.distance for phase in self.phases) / self.period
 
     @property
+    def durations(self) -> list[float]:
+        """Of the phases, s; those that differ by rounding alone are the same to the last digit."""
+        found: list[float] = []
+        for phase in self.phases:
+            alike = (one for one in found if abs(one - phase.duration) < 1e-9 * phase.duration)
+            found.append(next(alike, phase.duration))
+        return found
+
+    @property
     def reach(self) -> float:
         """Largest offset of the strip, mm."""
         return max(abs(phase.offset) for phase in self.phases)
+
+    @property
+    def one_way(self) -> bool:
+        """Whether the strip's material goes one way without end, and not through a cycle."""
+        return not self.steps and len(set(self.directions)) == 1
 
     def in_parts(self, parts: int) -> Motion:
         """Return the motion with each phase cut into parts of equal time at its position."""
@@ -179,6 +190,10 @@ class Motion:
             for low, high in itertools.pairwise(edges):
                 distance = stroke.power(low, high, 1.0)
                 phases.append(replace(phase, duration=high - low, distance=distance))
+            if phase.way is not None:
+                phases[-parts:] = [
+                    replace(part, way=way) for part, way in zip(phases[-parts:], phase.way.parts(parts), strict=True)
+                ]
         cut = replace(self, phases=tuple(phases), positions=self.positions * parts)
         return cut if self._ends is None else replace(cut, _ends=tuple(ends))
 
@@ -232,6 +247,8 @@ class Motion:
 
         Speeds that differ by rounding alone are the same to the last digit: such steps share their operators.
         """
+        if self.steps:
+            return np.repeat([[phase.speed] for phase in self.phases], steps, axis=1)
         rows = []
         for stroke in self._strokes:
             edges = itertools.pairwise(_edges(stroke, self.positions * steps))
@@ -257,6 +274,26 @@ class Motion:
             places = np.round(start + direction * slid, 12)  # the same on the way there and back
             rows += [places[k * steps : (k + 1) * steps + 1] for k in range(self.positions)]
         return np.array(rows)
+
+    def ways(self, field: SlidingField, steps: int) -> list[list[Way]]:
+        """Return where the strip goes in equal steps of each phase.
+
+        Args:
+            field: Of the motion, where its phases have none of their own.
+            steps: Of each phase.
+        """
+        if self.steps:
+            return [[one.undirected for one in phase.way.parts(steps)] if phase.way else [] for phase in self.phases]
+        return [
+            [Slide(field, *sorted((float(a), float(b)))) for a, b in itertools.pairwise(row)]
+            for row in self.offsets(steps)
+        ]
+
+    def ends(self, field: SlidingField) -> list[Placement]:
+        """Return where the strip is at the end of each phase."""
+        if self.steps:
+            return [phase.way.last if phase.way else HERE for phase in self.phases]
+        return [field.placement(float(end)) for end in self.offsets(1)[:, -1]]
 
 
 def make_motion(description: Motions, *, strip_wears: bool = False) -> Motion:
@@ -353,51 +390,22 @@ def _table_motion(description: Cycle, *, moves: bool) -> Motion:
         description: The table.
         moves: Whether the strip is in its place in the middle of each step, not where it is meshed.
     """
-    course, centre = description.course, np.array(description.centre)
+    course, centre = description.course, description.centre
     times = course.fraction * course.duration
+    turns = Turn.from_matrix(course.turn).as_rotvec()
+    rows = [Placement(_vector(course.shift[k]), _vector(turn), centre) for k, turn in enumerate(turns)]
     phases = []
-    for k in range(len(times) - 1):
-        turn, shift = course.turn[k : k + 2], course.shift[k : k + 2]
-        w = Turn.from_matrix(turn[1] @ turn[0].T).as_rotvec()
-        w = np.where(np.abs(w) < ROUNDING, 0.0, w)
-        v = np.linalg.solve(_advance(w), shift[1] - Turn.from_rotvec(w).apply(shift[0]))
-        v = np.where(np.abs(v) < ROUNDING * np.abs(course.shift).max(), 0.0, v)
-        rests = not (w.any() or v.any())
-        place = HERE
-        if moves:
-            half = Turn.from_rotvec(w / 2)
-            middle = half.apply(shift[0]) + _advance(w / 2) @ (v / 2)
-            turned = (half * Turn.from_matrix(turn[0])).as_rotvec()
-            # The same on the way there and back.
-            place = Placement(_rounded(middle), _rounded(turned), description.centre)
-            place = HERE if not (any(place.shift) or any(place.turn)) else place
-        begin, end = course.fraction[k : k + 2]
-        phases.append(
-            Phase(
-                1,
-                0.0,
-                float(times[k + 1] - times[k]),
-                0.0 if rests else 1.0,
-                float(begin + end) / 2,
-                screw(v, w, centre),
-                place,
-            )
-        )
+    for k, (first, last) in enumerate(itertools.pairwise(rows)):
+        way = Screw(first, last)
+        middle = float(course.fraction[k] + course.fraction[k + 1]) / 2
+        place = way.at(0.5) if moves else HERE
+        unit = 0.0 if way.rests else 1.0
+        phases.append(Phase(1, 0.0, float(times[k + 1] - times[k]), unit, middle, way.field, place, way))
     speeds = tuple(phase.speed for phase in phases)
     ends = tuple(float(time) for time in times)
     return Motion(tuple(phases), len(phases), 1, (_PiecewiseLinear(ends, speeds, speeds),), (0.0,), ends)
 
 
-def _advance(w: Array) -> Array:
-    """Return J(w) (3, 3), by which a screw's turning bends its way."""
-    angle = float(np.linalg.norm(w))
-    cross = np.cross(np.eye(3), w)
-    if angle < SMALL:
-        return np.asarray(np.eye(3) + cross / 2 + cross @ cross / 6)
-    first, second = (1 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
-    return np.asarray(np.eye(3) + first * cross + second * cross @ cross)
-
-
-def _rounded(vector: Array) -> tuple[float, float, float]:
-    x, y, z = (float(c) + 0.0 for c in np.round(vector, 12))
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(c) for c in values)
     return x, y, z

@@ -23,7 +23,7 @@ def test_modes_are_the_dense_steps(assembled: Callable[..., Any]) -> None:
     fields, _ = np.linalg.qr(step.respond(random.normal(size=(body.owned, 12))))
     basis = ReducedBasis(body, body.initial(), np.asarray(fields))
     modes, rates = modal_basis(orthonormal(basis), step, DURATION)
-    dense, modal = ReducedField([step], loads, orthonormal(basis)), ModalField(step, loads, modes)
+    dense, modal = ReducedField([step], loads, orthonormal(basis)), ModalField([step], loads, modes)
     assert (rates >= 0).all()
     ends = []
     for field in (dense, modal):

@@ -93,6 +93,15 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "contact.friction={law='slippery'}",
         ),
     ),
+    "a cycle as a table": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "punch.loads=[]",
+            "motion={kind='cycle', columns=['time (s)', 'shift_x (um)', 'force_z (N)'], load={on='punch_top'}, "
+            "rows=[[0, -3, -120], [2e-4, 3, -118], [1e-3, -3, -120]]}",
+        ),
+    ),
     "in rings": (
         "ring-on-ring",
         ("geometry.parameters.across=4", "geometry.degree=2", "run.half_cycles=4", "run.integration='explicit'",

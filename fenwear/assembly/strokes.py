@@ -72,21 +72,12 @@ def make_sliding(case: Case, parts: int = 1) -> Sliding:
 def _sliding_field(case: Case, made: Motion) -> SlidingField:
     motion = case.motion
     if isinstance(motion, Cycle):
-        return _longest(made)
+        return made.longest
     if isinstance(motion, Oscillation | Rotation):
         return SlidingField(turn=_unit(motion.axis), centre=motion.centre)
     if motion.along is not None:
         return SlidingField(shift=_unit(motion.along))
     return ALONG_X if motion.axis == "x" else ALONG_Y
-
-
-def _longest(motion: Motion) -> SlidingField:
-    """Return the direction of the step that turns farthest, or of the longest one where none turns."""
-    fields = [phase.field for phase in motion.phases if phase.field is not None]
-    if any(any(one.turn) for one in fields):
-        farthest = max(fields, key=lambda one: float(np.linalg.norm(one.turn)))
-        return SlidingField(turn=_unit(farthest.turn), centre=farthest.centre)
-    return SlidingField(shift=_unit(max(fields, key=lambda one: float(np.linalg.norm(one.shift))).shift))
 
 
 def _closed_track(case: Case) -> float | None:

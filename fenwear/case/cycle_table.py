@@ -54,6 +54,11 @@ class CycleCourse:
     force: Array | None
     moment: Array | None
 
+    @property
+    def rests(self) -> bool:
+        """Whether the strip stays in its place."""
+        return bool((self.shift == self.shift[0]).all() and (self.turn == self.turn[0]).all())
+
 
 def with_cycle(data: Mapping[str, Any], folder: Path | None) -> dict[str, Any]:
     """Return the tables of a case with the files of its cycle, and of those of a program, read into columns and rows.
@@ -194,11 +199,9 @@ def _turns(table: Mapping[str, Array], body: str, order: str) -> Array:
 
 
 def _check_closed(turn: Array, shift: Array) -> None:
-    """Raise where a cycle does not end where it begins, or nothing moves in it."""
+    """Raise where a cycle does not end where it begins."""
     far = np.abs(shift - shift[0]).max()
     if np.abs(shift[-1] - shift[0]).max() > CLOSED * max(far, 1e-300) or np.abs(turn[-1] - turn[0]).max() > CLOSED:
         raise ValueError(
             "rows: expected a cycle that ends where it begins: the last row has another place of the strip"
         )
-    if far == 0 and np.abs(turn - turn[0]).max() == 0:
-        raise ValueError("columns: expected a motion: the strip stays in its place in all rows")

@@ -179,7 +179,9 @@ class Case(Part):
             leaving = [name for name in motion.column_names if name.endswith("shift_y")]
             why = "with heat: a plane model does not follow heat out of the plane"
             problems += [f"motion.columns: expected no column {name} {why}" for name in leaving]
-        if self.contact.solver == "full":
+        if motion.course.rests and not self.sticks:
+            problems.append("motion.columns: expected a motion: the strip stays in its place in all rows")
+        if self.contact.solver == "full" and not self.sticks:
             problems.append("contact.solver: expected 'condensed' with motion.kind = 'cycle'")
         return problems
 
@@ -188,6 +190,11 @@ class Case(Part):
         own: tuple[Load | CourseLoad, ...] = getattr(self, body).loads
         course = self._course_load if body == "punch" else None
         return own if course is None else (*own, course)
+
+    @property
+    def loading(self) -> tuple[Any, ...]:
+        """What its loads come from: equal of cases with the same loads."""
+        return self.punch.loads, self.strip.loads, self.motion if isinstance(self.motion, Cycle) else None
 
     @property
     def _course_load(self) -> CourseLoad | None:
@@ -380,13 +387,19 @@ class Case(Part):
     @property
     def against_stick(self) -> list[str]:
         """What does not go with contact with stick: a key and what it expects, each."""
+        table = isinstance(self.motion, Cycle)
+        columns = self.motion.column_names if isinstance(self.motion, Cycle) else ()
         wrong = {
             "contact.transverse_friction: expected 0": self.contact.transverse_friction != 0,
             "model.kind: expected a plane model or a solid": self.model.kind == "axisymmetric",
             "heat.operator: expected 'reduced'": self.heat is not None and self.heat.operator == "full",
             "heat.coupling: expected 'implicit'": self.heat is not None and self.heat.coupling == "split",
-            "motion.kind: expected a motion to and fro": isinstance(self.motion, OneWay | Rotation | Cycle),
-            "motion.axis: expected 'x'": not self.passes,
+            "motion.kind: expected a motion to and fro, or a cycle,": isinstance(self.motion, OneWay | Rotation),
+            "motion.axis: expected 'x'": not self.passes and not table,
+            "motion.columns: expected no column shift_y in a plane model, whose tractions lie in the plane,": (
+                table and self.model.kind == "plane" and any(name.endswith("shift_y") for name in columns)
+            ),
+            "stick.force: expected none in a cycle, whose forces are columns,": table and self.stick.force is not None,
             "contact.friction and wear: expected coefficients without cs and pm, which are of gross sliding,": any(
                 isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm"))
                 for one in (self.contact.friction, *(law.given_coefficient for law in self.wear.laws))

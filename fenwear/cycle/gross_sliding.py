@@ -32,7 +32,7 @@ from fenwear.assembly.cycle_shear import asks_for_cycle
 from fenwear.assembly.laws import GROSS
 from fenwear.assembly.tribosystem import answers_for, condense_bodies
 from fenwear.assembly.variants import same_conduction
-from fenwear.case import Case, Cycle
+from fenwear.case import Case
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat
 from fenwear.cycle.driver import Loading, Watch
 from fenwear.cycle.jump_error import ORDER
@@ -170,8 +170,7 @@ class GrossSliding:
         before, bodies, condensed, sliding = system.case, system.bodies, system.condensed, system.sliding
         if (before.motion, before.contact, before.wear) != (case.motion, case.contact, case.wear):
             sliding = make_sliding(case)
-        tables = [one.motion if isinstance(one.motion, Cycle) else None for one in (before, case)]
-        if (before.punch.loads, before.strip.loads, tables[0]) != (case.punch.loads, case.strip.loads, tables[1]):
+        if before.loading != case.loading:
             bodies = bodies.under(case)
         conducts_alike = same_conduction(before, case)
         if not conducts_alike:

@@ -1,8 +1,14 @@
-"""What is told of a cycle that is a table: ways, pressures and cross-shear over it, and wear per million cycles."""
+"""What is told of a cycle that is a table: ways, pressures and cross-shear over it, and wear per million cycles.
+
+Where surfaces slide as a whole the ways are those of the motion. Where nodes stick or slip by themselves they are their
+slips of the last cycle, time step by time step.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,41 +16,95 @@ from fenwear.arrays import Array
 from fenwear.assembly.cycle_shear import sliding_tensor, sliding_tensor_of_strip
 from fenwear.cycle import Block
 from fenwear.cycle.state import known_pressures
+from fenwear.interface.placement import in_space
+from fenwear.results.steps import steps_of
 from fenwear.sliding.cross_shear import SlidingTensor
+from fenwear.sliding.wear import WornDepths
+
+if TYPE_CHECKING:
+    from fenwear.stick.coulomb import Steps
 
 MILLION = 1e6
 
 
+@dataclass(frozen=True)
+class TableCycle:
+    """The last cycle of a block.
+
+    Attributes:
+        ways: What each contact node slides in it (n,), mm.
+        pressure: Of its phases or time steps (m, n), MPa.
+        worn: What it wears off both bodies.
+        tensors: Of the sliding of the punch's and the strip's material, of the work.
+    """
+
+    ways: Array
+    pressure: Array
+    worn: WornDepths
+    tensors: tuple[SlidingTensor, SlidingTensor]
+
+
+def table_cycle(last: Block) -> TableCycle | None:
+    """Return the last cycle of a block; None where it is no table, or where not all of it is known."""
+    system = last.system
+    if not system.motion.steps:
+        return None
+    if system.sticks:
+        return _of_time_steps(last, steps_of(last)[-1])
+    pressure = known_pressures(last.end.contacts)
+    if pressure is None:
+        return None
+    end = last.end
+    states = [
+        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=pressure)
+        for k, own in enumerate(pressure)
+    ]
+    tensors = sliding_tensor(system, pressure), sliding_tensor_of_strip(system, pressure)
+    return TableCycle(system.path.sum(axis=0), pressure, system.wear.phases(states).worn(pressure), tensors)
+
+
+def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
+    """Return the cycle of time steps, in which nodes that are open slide nothing."""
+    records, problem, pair = steps.records, last.system.law_state.problem, last.system.pair
+    slip = np.where(records.pressure[:, :, None] > 0, records.slip, 0.0)
+    ways, values, on_strip = np.linalg.norm(slip, axis=2), [], np.zeros((len(pair.strip.weights), 9))
+    for k, own in enumerate(slip):
+        place = problem.program.steps[(steps.first + k) % len(problem.program.steps)].offset
+        position = problem.interface.position(place)
+        vectors = in_space(np.einsum("nmc,nm->nc", position.frame[:, 1:], own))
+        scale = np.divide(records.pressure[k], ways[k], out=np.zeros_like(ways[k]), where=ways[k] > 0)
+        values.append(scale[:, None, None] * vectors[:, :, None] * vectors[:, None, :])
+        back = in_space(position.pair.placement.back(vectors if pair.punch.dim == 3 else vectors[:, [0, 2]]))
+        squares = scale[:, None, None] * back[:, :, None] * back[:, None, :]
+        on_strip += position.pair.wear_projection @ squares.reshape(-1, 9)
+    tensors = SlidingTensor(np.sum(values, axis=0)), SlidingTensor(on_strip.reshape(-1, 3, 3))
+    return TableCycle(ways.sum(axis=0), records.pressure, steps.wear, tensors)
+
+
 def sliding_numbers(last: Block) -> dict[str, float]:
     """Return those of the last cycle for the sheet, or nothing where it is no table."""
-    pressure = known_pressures(last.end.contacts)
-    if not last.system.motion.steps or pressure is None:
+    cycle = table_cycle(last)
+    if cycle is None:
         return {}
-    ways = last.system.path.sum(axis=0)
+    areas = last.system.pair.weights * (cycle.pressure.max(axis=0) > 0 if last.system.sticks else 1.0)
     return {
-        "mean_way_of_cycle_mm": float(last.system.pair.weights @ ways / last.system.pair.weights.sum()),
-        "largest_way_of_cycle_mm": float(ways.max()),
-        "largest_pressure_of_cycle_MPa": float(pressure.max()),
+        "mean_way_of_cycle_mm": float(areas @ cycle.ways / areas.sum()),
+        "largest_way_of_cycle_mm": float(cycle.ways.max()),
+        "largest_pressure_of_cycle_MPa": float(cycle.pressure.max()),
     }
 
 
 def body_numbers(last: Block, body: str) -> dict[str, float]:
     """Return those of a body that wears, "punch" or "strip", by the wear of the last cycle; or nothing."""
-    system, pressure = last.system, known_pressures(last.end.contacts)
-    if not system.motion.steps or pressure is None:
+    cycle, pair = table_cycle(last), last.system.pair
+    if cycle is None:
         return {}
-    end, surface = last.end, system.pair.punch if body == "punch" else system.pair.strip
-    states = [
-        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=pressure)
-        for k, own in enumerate(pressure)
-    ]
-    depth: Array = getattr(system.wear.phases(states).worn(pressure), body)
-    areas = system.bodies.punch.thickness * (system.pair.weights if body == "punch" else surface.weights)
-    tensor = sliding_tensor(system, pressure) if body == "punch" else sliding_tensor_of_strip(system, pressure)
+    depth: Array = getattr(cycle.worn, body)
+    areas = last.system.bodies.punch.thickness * (pair.weights if body == "punch" else pair.strip.weights)
     return {
         "worn_volume_per_million_cycles_mm3": MILLION * float(areas @ depth),
         "depth_per_million_cycles_mm": MILLION * float(depth.max()),
-        **_cross_shear(tensor, areas),
+        **_cross_shear(cycle.tensors[body == "strip"], areas),
     }
 
 

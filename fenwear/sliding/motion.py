@@ -26,7 +26,7 @@ from fenwear.arrays import Array
 from fenwear.case import Cycle, Motions, OneWay, Oscillation, Reciprocating, Rotation, Tabulated
 from fenwear.errors import CaseError, InputError
 from fenwear.interface.placement import HERE, Placement, Vector
-from fenwear.sliding.field import SlidingField
+from fenwear.sliding.field import ALONG_X, SlidingField
 from fenwear.sliding.screw import Screw, Slide, Way
 
 DEFAULT_POSITIONS = 9  # in a half-cycle where the strip wears; odd, so that one is the middle of the stroke
@@ -175,6 +175,19 @@ class Motion:
         return max(abs(phase.offset) for phase in self.phases)
 
     @property
+    def longest(self) -> SlidingField:
+        """The direction of the step of a table that turns farthest, or of the longest one where none turns.
+
+        Either of both ways, the one along the first axis on which it goes.
+        """
+        fields = [phase.field for phase in self.phases if phase.field is not None]
+        if any(any(one.turn) for one in fields):
+            farthest = max(fields, key=lambda one: float(np.linalg.norm(one.turn)))
+            return SlidingField(turn=_unit(farthest.turn), centre=farthest.centre)
+        shift = max((one.shift for one in fields), key=lambda shift: float(np.linalg.norm(shift)))
+        return SlidingField(shift=_unit(shift)) if any(shift) else ALONG_X  # where nothing moves: any
+
+    @property
     def one_way(self) -> bool:
         """Whether the strip's material goes one way without end, and not through a cycle."""
         return not self.steps and len(set(self.directions)) == 1
@@ -204,6 +217,17 @@ class Motion:
         shares = np.arange(parts) / parts
         inner = [a + share * (b - a) for a, b in itertools.pairwise(self._ends) for share in shares]
         return [float(time) for time in (*inner, self._ends[-1])]
+
+    def as_one(self, field: SlidingField) -> Motion:
+        """Return a measured table as one phase, in which all of it is slid: of laws that follow its steps themselves.
+
+        Args:
+            field: Of the phase, for a millimetre of it.
+        """
+        whole = Phase(1, 0.0, self.period, sum(phase.distance for phase in self.phases), 0.5, field)
+        speed = (whole.speed,)
+        ends = (0.0, self.period)
+        return Motion((whole,), 1, 1, (_PiecewiseLinear(ends, speed, speed),), (0.0,), ends)
 
     @property
     def steps(self) -> bool:
@@ -404,6 +428,12 @@ def _table_motion(description: Cycle, *, moves: bool) -> Motion:
     speeds = tuple(phase.speed for phase in phases)
     ends = tuple(float(time) for time in times)
     return Motion(tuple(phases), len(phases), 1, (_PiecewiseLinear(ends, speeds, speeds),), (0.0,), ends)
+
+
+def _unit(vector: Vector) -> Vector:
+    size = np.linalg.norm(vector)
+    first = next(c for c in vector if abs(c) > 1e-9 * size)
+    return _vector(np.array(vector) / np.copysign(size, first))
 
 
 def _vector(values: Array) -> Vector:

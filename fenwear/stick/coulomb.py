@@ -30,12 +30,12 @@ from fenwear.cycle.state import RunState, beginning
 from fenwear.cycle.totals import MILLIGRAM, SUMS, Totals, approach
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.field import HeatState
-from fenwear.sliding.motion import make_motion
+from fenwear.sliding.motion import Motion, make_motion
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
 from fenwear.stick.final import FinalShape, final_shape
 from fenwear.stick.fineness import Ends, Fineness, fine_enough, same_steps, with_ends
-from fenwear.stick.interface import meshed
+from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.jump import FrettingCycle, first_cycle, jumped
 from fenwear.stick.setup import heated, unheated_problem
 
@@ -135,7 +135,7 @@ class Coulomb:
         """Return the system of another case that shares the bodies that the change leaves; collective."""
         before = system.case
         bodies, condensed = system.bodies, (system.condensed.punch, system.condensed.strip)
-        if (before.punch.loads, before.strip.loads) != (case.punch.loads, case.strip.loads):
+        if before.loading != case.loading:
             bodies = bodies.under(case)
             condensed = condensed[0].under(bodies.punch), condensed[1].under(bodies.strip)
         if (before.heat, before.punch.temperatures, before.strip.temperatures) != (
@@ -209,7 +209,7 @@ def system_of(
     """
     problem = unheated_problem(case, bodies, fresh=fresh, condensed=condensed)
     interface, fineness = meshed(problem.interface), None
-    sliding = replace(interface.sliding, motion=make_motion(case.motion.model_copy(update={"positions": 1})))
+    sliding = replace(interface.sliding, motion=_motion_at_rest(interface, case))
     placed = place_at_rest(bodies, sliding, interface.middle.pair, law, case)
     system = joined(placed, Condensed(interface.punch, interface.strip, interface.moves))
     if ends is not None:
@@ -221,6 +221,15 @@ def system_of(
             ends = fineness.ends
     exchange = None if problem.heat is None else problem.heat.exchange
     return replace(system, exchange=exchange, law_state=StickSetup(problem, fineness, _told_apart(bodies), ends))
+
+
+def _motion_at_rest(interface: StickInterface, case: Case) -> Motion:
+    """Return the motion with a phase for each half-cycle."""
+    sliding, pair = interface.sliding, interface.middle.pair
+    if not sliding.motion.steps:
+        return make_motion(case.motion.model_copy(update={"positions": 1}))
+    rate = pair.weights @ sliding.field.rate(pair.opposite, pair.normal) / pair.weights.sum()
+    return sliding.measured_on(pair).motion.as_one(sliding.field.over(float(rate)))
 
 
 def _told_apart(bodies: Bodies) -> float:

@@ -12,10 +12,12 @@ import numpy as np
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.interface import ContactPair
+from fenwear.interface.placement import HERE, Placement, in_model
 from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS
 from fenwear.layers.memory import Held
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.screw import Screw
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
@@ -203,7 +205,7 @@ class PartialSlipProblem:
         friction: Array,
         watch: Callable[[], object] = lambda: None,
         heat: StickHeat | None = None,
-        expanded: Callable[[LoadEffect, float], LoadEffect] = lambda loaded, _: loaded,
+        expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded,
         laws: LocalLaws | None = None,
     ) -> None:
         self.expanded, self.laws = expanded, laws
@@ -231,7 +233,7 @@ class PartialSlipProblem:
     def kept_at(self, heat: StickHeat, temperature: Array) -> PartialSlipProblem:
         """Return the same at a temperature (dim,) that stays as it is."""
 
-        def expanded(loaded: LoadEffect, offset: float) -> LoadEffect:
+        def expanded(loaded: LoadEffect, offset: float | Placement) -> LoadEffect:
             return heat.expanded(loaded, temperature, offset)
 
         return self._with(heat=None, expanded=expanded)
@@ -303,14 +305,30 @@ class PartialSlipProblem:
         between = self.interface.layers.opening(worn.between)
         return position.pair.initial_gap + position.pair.opening(rest.punch, rest.strip) + between
 
-    def imposed(self, step: TimeStep, worn: WornDepths, load: float = 1.0) -> tuple[Position, Imposed]:
-        """Return the place of the strip in a time step, and what is imposed at its end; collective."""
-        interface = self.interface
+    def imposed(self, step: TimeStep, at: PartialSlipState) -> tuple[Position, Imposed]:
+        """Return the place of the strip in the time step after a state, and what is imposed at its end; collective."""
+        interface, worn, load = self.interface, at.worn, at.load
         position = interface.position(step.offset)
         given = interface.loaded(step.fraction if step.fraction is not None else 0.0).times(load)
         opening, loaded = self.opening(position, worn), self.expanded(given, step.offset)
         duration = 0.0 if step.fraction is None else step.duration  # before the cycle begins nothing creeps
-        return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration)
+        beside = self._beside(position, step, at.imposed)
+        return position, Imposed(loaded, opening, step.displacement, step.force, step.strain, duration, beside)
+
+    def _beside(self, position: Position, step: TimeStep, before: Imposed) -> Array | None:
+        """Return what the strip's supports are moved by beside the displacement at the end of a step (n, d), mm.
+
+        Near its place every point of the strip keeps the one opposite: it is moved by the screw that leads from there
+        to its place, and a cycle brings it back. Going far, others come: it is moved on by what slides past them.
+        """
+        if step.way is None:
+            return None
+        x, field, now = position.pair.punch.x, self.interface.field, step.displacement or 0.0
+        if not position.far:
+            moved = Screw(HERE, step.way.last).field.velocity(x) - now * field.velocity(x)
+            return np.asarray(in_model(moved, x.shape[1]))
+        on = step.way.field.velocity(x) - (now - (before.displacement or 0.0)) * field.velocity(x)
+        return np.asarray((0.0 if before.beside is None else before.beside) + in_model(on, x.shape[1]))
 
     def step(self, at: PartialSlipState, step: TimeStep) -> tuple[PartialSlipState, TimeStepRecords]:
         """Return the state after a time step, and its record; the shape stays; collective."""
@@ -361,7 +379,7 @@ class PartialSlipProblem:
     def _advanced(self, at: PartialSlipState, step: TimeStep, friction: Array) -> PartialSlipState:
         """Return the state after a time step with friction mu (n,)."""
         self.watch()
-        position, imposed = self.imposed(step, at.worn, at.load)
+        position, imposed = self.imposed(step, at)
         if self.heat is None or at.temperature is None or at.heating is None:
             state = advance(self.interface, at.contact, at.imposed, imposed, friction, position, at.near)
             return self._after(at, state, imposed, step)
@@ -435,7 +453,7 @@ class PartialSlipProblem:
         strip = np.zeros(len(pair.strip.weights))
         if self.wear.strip is not None:
             places = [steps[(first + k) % len(steps)].offset for k in range(len(records))]
-            for place in sorted(set(places)):
+            for place in dict.fromkeys(places):
                 depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.interface.position(place).pair.wear_projection @ depth
         worn = WornDepths(records.punch_depth.sum(axis=0), strip)
@@ -522,6 +540,8 @@ class PartialSlipProblem:
         stored = np.vdot(force, on_punch) - np.vdot(back, on_strip)
         lowered = float(after.imposed.loaded.resultant @ (state.rigid - before.rigid))
         work = state.force * (state.displacement - before.displacement) + lowered
+        carried = position.beside(state.beside) - position.beside(before.beside)
+        work += float((f * position.weights) @ carried)
         stored += weights @ (state.pressure * closed)
         slipped = np.linalg.norm(state.slip, axis=1)
         punch, strip = wear.depths(state.pressure, slipped, step.duration)

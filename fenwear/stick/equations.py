@@ -95,6 +95,7 @@ class Step:
             now, old = now + apart(crept[0], crept[1]), old + apart(had[0], had[1])
             now[: self.n] += layer
             closed = closed + closed_before
+        now, old = now - position.beside(imposed.beside), old - position.beside(before.beside)
         old += position.modes @ before.rigid - position.drive * before.displacement
         self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
         self.approached = now[: self.n] - old[: self.n] - self.free[: self.n] - closed
@@ -247,6 +248,7 @@ class Step:
             iterations,
             unique,
             crept=crept,
+            beside=self.imposed.beside,
         )
 
     def _moved(self, f: Array) -> SurfaceDisplacement:

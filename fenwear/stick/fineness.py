@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.case import Case
+from fenwear.sliding.screw import Screw
 from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
-from fenwear.stick.program import Program, make_program
+from fenwear.stick.program import Program, make_program, steps_of
 from fenwear.stick.setup import with_steps
 
 HALVINGS = 4  # of a step at most
@@ -89,7 +90,7 @@ def same_steps(one: Case, other: Case) -> bool:
 
 
 def _finest(case: Case) -> Program:
-    return make_program(case, case.stick.steps * WHOLE)
+    return make_program(case, steps_of(case) * WHOLE)
 
 
 def _judged(
@@ -108,7 +109,12 @@ def merged(finest: Program, ends: Ends) -> Program:
     for end in ends:
         last = finest.steps[end]
         duration = sum(step.duration for step in finest.steps[begin : end + 1])
-        middle = last.offset
+        middle, first = last.offset, finest.steps[begin].way
+        if first is not None and last.way is not None:
+            way = Screw(first.first, last.way.last)
+            found.append(replace(last, duration=duration, offset=way.at(0.5), way=way))
+            begin = end + 1
+            continue
         if place is not None and last.displacement is not None:
             middle = (place + last.displacement) / 2
         found.append(replace(last, duration=duration, offset=middle))

@@ -27,9 +27,9 @@ from fenwear.heat.exchange import HeatExchange
 from fenwear.heat.field import ReducedBasis
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange
-from fenwear.sliding.motion import make_motion
+from fenwear.interface.placement import HERE, Placement
 from fenwear.stick.interface import LoadEffect, StickInterface
-from fenwear.stick.program import far_enough
+from fenwear.stick.program import far_enough, timed_motion
 
 NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die out
 
@@ -81,7 +81,7 @@ class StickHeat:
         self._stays = stays
         self.exchange, self.expansions, self._interface = exchange, expansions, interface
         self._split = len(exchange.bases[0])
-        self._seen: dict[float, csr_array] = {}
+        self._seen: dict[float | Placement, csr_array] = {}
 
     def initial(self) -> Array:
         """Return the temperatures at the start (dim,)."""
@@ -116,16 +116,16 @@ class StickHeat:
         friction, debris = terms.sum(axis=0)[:2]
         self.exchange.check_bounds(self.exchange.at(before), self.exchange.at(after), float(friction - debris))
 
-    def expanded(self, loaded: LoadEffect, temperature: Array, offset: float) -> LoadEffect:
-        """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset."""
+    def expanded(self, loaded: LoadEffect, temperature: Array, offset: float | Placement) -> LoadEffect:
+        """Return what the loads do and the expansion at temperatures (dim,), the strip moved by an offset, or there."""
         punch, strip = (
             expansion(part)
             for expansion, part in zip(self.expansions, np.split(temperature, [self._split]), strict=True)
         )
-        if self._stays and self._interface.moves and offset:
+        if self._stays and self._interface.moves and offset not in (0.0, HERE):
             if offset not in self._seen:
                 surface = self._interface.middle.pair.strip
-                self._seen[offset] = read_at(surface, self._interface.field.placement(offset).points(surface.trace))
+                self._seen[offset] = read_at(surface, self._interface.placement(offset).points(surface.trace))
             strip = self._seen[offset] @ strip
         return replace(loaded, on_punch=loaded.on_punch + punch, on_strip=loaded.on_strip + strip)
 
@@ -207,14 +207,13 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
     """Return the heat of a case with this many time steps in a half-cycle; None without heat; collective.
 
     Raises:
-        CaseError: half-cycles of unequal duration.
         HeatError: no basis gives temperatures that die out.
     """
     bodies = interface.bodies
     if case.heat is None or bodies.heat is None:
         return None
     middle = interface.middle.pair
-    motion = make_motion(case.motion.model_copy(update={"positions": steps}))
+    motion = timed_motion(case, steps)
     passage = None
     if case.stick.force is None and far_enough(case, middle.punch):
         passage = Passage(middle, interface.sliding.field, motion)

@@ -13,6 +13,7 @@ import numpy as np
 
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.fixed_point import fixed_point
+from fenwear.interface.placement import Placement
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.interface import LoadEffect
 from fenwear.stick.state import StickState
@@ -29,14 +30,14 @@ class StepStart:
     Attributes:
         number: In the cycle.
         duration: s.
-        offset: Of the strip, mm or rad.
+        offset: Of the strip, mm or rad, or its place.
         temperature: At its start (dim,).
         heating: Heat of friction of the nodes in the step before (n,), mW/mm².
     """
 
     number: int
     duration: float
-    offset: float
+    offset: float | Placement
     temperature: Array
     heating: Array
 

@@ -36,12 +36,13 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.frame import contact_frame
-from fenwear.interface.placement import in_model
+from fenwear.interface.placement import HERE, Placement, in_model
 from fenwear.layers import Layers, common_modulus, layers_of
 from fenwear.parallel import ALONE, Team
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import StickCreep
+from fenwear.stick.program import steps_of
 from fenwear.stick.whole import WholeBodies, whole_bodies
 
 
@@ -85,10 +86,12 @@ class Position:
     Attributes:
         interface: How their surfaces move against each other along e_n and the tangents of each node.
         drive: V (d n,), for a unit of the motion; along the tangents alone where the strip goes far.
+        far: Whether it goes so far: what it is moved by along e_n its place has in the gap.
     """
 
     interface: Interface
     drive: Array
+    far: bool = False
 
     @property
     def rigid(self) -> RigidEquilibrium:
@@ -147,6 +150,15 @@ class Position:
         """Return the components (d n,) of vectors (n, d)."""
         return np.einsum("nac,nc->an", self.frame, vectors).ravel()
 
+    def beside(self, moved: Array | None) -> Array:
+        """Return what the strip is moved by beside its motion (n, d) in the frame (d n,)."""
+        if moved is None:
+            return np.zeros(len(self.drive))
+        found = self.in_frame(moved)
+        if self.far:
+            found[: len(self.pair.weights)] = 0.0
+        return found
+
     def in_space(self, components: Array) -> Array:
         """Return vectors (n, d) of components (d n,)."""
         return np.einsum("nac,an->nc", self.frame, components.reshape(self.frame.shape[2], -1))
@@ -172,7 +184,7 @@ class OppositeBodies:
     ) -> None:
         self.punch, self.strip, self.field = punch, strip, field
         self._load = LoadEffect(rigid.resultant, punch.by_load, strip.by_load)
-        self._positions = {0.0: position_of(rigid, punch, strip, field)}
+        self._positions: dict[float | Placement, Position] = {0.0: position_of(rigid, punch, strip, field)}
         self.layers = Layers(len(rigid.pair.weights))  # what lies between the surfaces
 
     @property
@@ -185,7 +197,7 @@ class OppositeBodies:
         """Displacement of the strip at the nodes of its operator by a unit bulk strain (q, d), mm: none."""
         return np.zeros_like(self.strip.by_load)
 
-    def position(self, offset: float) -> Position:
+    def position(self, offset: float | Placement) -> Position:
         """Return the place of the strip moved by this amount of its motion: its one place."""
         del offset
         return self.middle
@@ -252,9 +264,9 @@ class StickInterface(OppositeBodies):
             self.needs = self._needs(len(middle.weights), onto.shape[1])
             self.punch, self.strip = condensed
         self.creep = self._creep()
-        self._positions: dict[float, Position] = {0.0: self._position(middle)}
+        self._positions = {0.0: self._position(middle)}
         self._loaded: dict[float | None, LoadEffect] = {}
-        self._whole: dict[float, WholeBodies] = {}
+        self._whole: dict[float | Placement, WholeBodies] = {}
 
     def _needs(self, nodes: int, on_strip: int) -> Resources:
         """Return what condensing both along all axes takes, with C of each position and Newton's matrix; collective.
@@ -264,7 +276,7 @@ class StickInterface(OppositeBodies):
             on_strip: What the strip is condensed onto.
         """
         d, both = self.dim, self.bodies
-        positions = 1 + (self.case.stick.steps if self.moves and self.case is not None else 0)
+        positions = 1 + (steps_of(self.case) if self.moves and self.case is not None else 0)
         punch, strip = (
             body_resources(body, count, d * count) for body, count in ((both.punch, nodes), (both.strip, on_strip))
         )
@@ -301,17 +313,24 @@ class StickInterface(OppositeBodies):
             found[:, 1] = -x[:, 1] * (materials[names.pop()].poisson if len(names) == 1 else 0.0)
         return found
 
-    def position(self, offset: float) -> Position:
+    def position(self, offset: float | Placement) -> Position:
         """Return the place of the strip moved by this amount of its motion; collective, or for rank 0 that leads."""
-        offset = round(offset, 12) if self.moves else 0.0
+        if not self.moves or offset == HERE:
+            offset = 0.0
+        elif not isinstance(offset, Placement):
+            offset = round(offset, 12)
         if offset not in self._positions:
             self.team.each(self, "prepare_position", offset)
         return self._positions[offset]
 
-    def prepare_position(self, offset: float) -> None:
+    def prepare_position(self, offset: float | Placement) -> None:
         """Make a new place of the strip; collective."""
         middle = self.middle.pair
-        self._positions[offset] = self._position(pair(middle.punch, middle.strip, self.field.placement(offset)))
+        self._positions[offset] = self._position(pair(middle.punch, middle.strip, self.placement(offset)))
+
+    def placement(self, offset: float | Placement) -> Placement:
+        """Return the place of the strip moved by this amount of its motion, or there by a table."""
+        return offset if isinstance(offset, Placement) else self.field.placement(offset)
 
     def whole(self, position: Position) -> WholeBodies:
         """Return both bodies with nothing condensed in a position of these; collective, or for rank 0 that leads."""
@@ -320,14 +339,14 @@ class StickInterface(OppositeBodies):
             self.team.each(self, "prepare_whole", offset)
         return self._whole[offset]
 
-    def prepare_whole(self, offset: float) -> None:
+    def prepare_whole(self, offset: float | Placement) -> None:
         """Make the bodies with nothing condensed for a place of the strip; collective."""
         self._whole[offset] = whole_bodies(self.bodies, self._positions[offset], moves=self.moves)
 
     def loaded(self, fraction: float | None) -> LoadEffect:
         """Return what the loads do at a fraction of the cycle, or their mean; collective, or for rank 0 that leads."""
-        loads = [] if self.case is None else [*self.case.punch.loads, *self.case.strip.loads]
-        constant = fraction is None or all(load.over_cycle is None for load in loads)
+        loads = [] if self.case is None else [load for body in ("punch", "strip") for load in self.case.loads_of(body)]
+        constant = fraction is None or all(load.steady for load in loads)
         key = None if constant or fraction is None else round(fraction, 12)
         if key not in self._loaded:
             self.team.each(self, "prepare_load", key)
@@ -387,4 +406,4 @@ def along_tangents(position: Position) -> Position:
     """Return the same for a strip that goes far: what it is moved by along e_n its place has in the gap."""
     drive = position.drive.copy()
     drive[: len(position.pair.weights)] = 0.0
-    return replace(position, drive=drive)
+    return replace(position, drive=drive, far=True)

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
+from fenwear.interface.placement import Placement
 from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS
 from fenwear.layers.memory import Held
@@ -318,7 +319,7 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
     remembered = _Remembered.of(problem, now, depths)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     A, found = np.zeros((total, total)), list[_Group]()
-    slid, groups = records.slip_magnitude, dict[tuple[float, bytes], list[int]]()
+    slid, groups = records.slip_magnitude, dict[tuple[float | Placement, bytes], list[int]]()
     fed = None if debris is None else debris.over(slid).fed
     for k in range(len(records)):
         place = steps[(now.first_step + k) % len(steps)].offset if problem.interface.moves else 0.0

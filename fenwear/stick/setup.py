@@ -8,7 +8,7 @@ from mpi4py import MPI
 from fenwear.assembly import Bodies, build_bodies, make_sliding
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
-from fenwear.case import Case, Oscillation
+from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
@@ -98,6 +98,8 @@ def _moves(case: Case, surface: ContactSurface) -> bool:
     """Return whether the strip's surface passes under the punch: by default where it wears, and moves far enough."""
     motion = case.motion
     positions = getattr(motion, "positions", None)
+    if isinstance(motion, Cycle) and positions is not None:
+        return positions == "steps"
     if case.stick.force is not None or isinstance(motion, Oscillation) or positions == 1:
         return False
     if positions is not None:

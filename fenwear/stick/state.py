@@ -24,6 +24,8 @@ class Imposed:
         force: Tangential force on the strip along the motion, N/mm or N; None where the displacement is.
         strain: Bulk strain eps_xx of the strip's surface.
         duration: Of the step, s: what creeps does so over it.
+        beside: What the strip's supports are moved by beside the displacement, at the contact nodes (n, d), mm; None
+            for nothing.
     """
 
     loaded: LoadEffect
@@ -32,6 +34,7 @@ class Imposed:
     force: float | None = None
     strain: float = 0.0
     duration: float = 0.0
+    beside: Array | None = None
 
     def towards(self, other: Imposed, share: float) -> Imposed:
         """Return what is imposed a share of the way to the other."""
@@ -46,7 +49,15 @@ class Imposed:
             between(self.force, other.force),
             self.strain + share * (other.strain - self.strain),
             share * other.duration,
+            _between(self.beside, other.beside, share),
         )
+
+
+def _between(one: Array | None, other: Array | None, share: float) -> Array | None:
+    """Return what is a share of the way from one to the other; None is zero."""
+    if one is None and other is None:
+        return None
+    return np.asarray((1 - share) * (0.0 if one is None else one) + share * (0.0 if other is None else other))
 
 
 @dataclass(frozen=True)
@@ -69,6 +80,7 @@ class StickState:
         unique: Whether Newton's method met pieces of one orientation only; else there may be other answers.
         parts: Of the step: more than one where it did not converge as a whole; `slip` and `approach` are their sums.
         crept: State of what creeps, see `fenwear.stick.creep`; empty where nothing does.
+        beside: What the strip's supports are moved by beside the displacement (n, d), mm; None for nothing.
     """
 
     pressure: Array
@@ -86,6 +98,7 @@ class StickState:
     unique: bool = True
     parts: int = 1
     crept: Array = field(default_factory=lambda: STIFF)
+    beside: Array | None = None
 
     @property
     def heat(self) -> NDArray[Any]:

@@ -82,33 +82,33 @@ def test_rows_of_unequal_times(assembled: Callable[..., Tribosystem]) -> None:
 
 @pytest.mark.mpi
 def test_steady_state_with_heat(assembled: Callable[..., Tribosystem]) -> None:
+    """Pressures and temperatures of the direct solution are where jumps end."""
     rows = [[0, 2, -4], [0.1, -1, -8], [0.2, -2, -10], [0.3, 2, -4]]
     columns = ["time (s)", "shift_x (mm)", "force_z (kN)"]
     motion = f"motion={{kind='cycle', columns={columns}, rows={rows}, load={{on='punch_load'}}}}"
-    settings = ("punch.loads=[]", "wear.punch={coefficient=1e-8}", motion)
+    settings = ("punch.loads=[]", "wear.punch={coefficient=1e-7}", "contact.friction=0.02", motion)
     system = assembled("example2-heat", *SMALL[:3], *settings)
     state = steady(system)
-    *_, last = jump(system, 200_000, tolerance=1e-3)
+    *_, last = jump(system, 40_000, tolerance=1e-2)
     ended = np.concatenate([contact.pressure for contact in last.end.contacts if contact])
-    np.testing.assert_allclose(ended, state.phase_pressure, atol=0.01 * state.phase_pressure.max())
+    np.testing.assert_allclose(ended, state.phase_pressure, atol=1e-6 * state.phase_pressure.max())
     assert state.heat is not None
     warm = system.exchange.contact_temperatures(last.end.temperature)[0]
-    np.testing.assert_allclose(warm, state.heat.punch[-1], atol=0.005 * warm.max())
+    np.testing.assert_allclose(warm, state.heat.punch[-1], atol=1e-6 * warm.max())
 
 
-HALF, RADIUS, PERIOD, CONDUCTIVITY, CAPACITY = 1.0, 0.7, 0.1, 3.0, 2.0
+HALF, PERIOD, CONDUCTIVITY, CAPACITY = 1.0, 0.1, 3.0, 2.0
+CORNERS = 0.7 * np.array([[np.cos(a), np.sin(a)] for a in np.linspace(0, 2 * np.pi, 7)])  # of the strip's way
 
 
-def round_case(elements: int, rows: int) -> Case:
-    """Return a square punch under which a wide block goes round on a circle, that alone takes the heat."""
+def round_case() -> Case:
+    """Return a square punch under which a wide block goes round in a hexagon, that alone takes the heat."""
     from fenwear_verify.solid import STEEL, describe
 
     sizes = {"width": 2 * HALF, "depth": 2 * HALF, "margin_x": 1.5, "margin_y": 1.5, "strip_height": 1.5, "growth": 1.3,
-             "across_x": elements, "across_y": elements, "margin_elements": 3 * elements // 4,
-             "strip_layers": elements // 2 + 1, "punch_layers": 1}  # fmt: skip
+             "across_x": 4, "across_y": 4, "margin_elements": 3, "strip_layers": 3, "punch_layers": 1}  # fmt: skip
     material = {**STEEL, "conductivity": CONDUCTIVITY, "heat_capacity": 2 * CAPACITY, "density": 0.5, "expansion": 0.0}
-    angles = np.linspace(0, 2 * np.pi, rows + 1)
-    places = [[float(PERIOD * a / (2 * np.pi)), float(RADIUS * np.cos(a)), float(RADIUS * np.sin(a))] for a in angles]
+    rows = [[PERIOD * k / 6, float(x), float(y)] for k, (x, y) in enumerate(CORNERS)]
     return describe(
         {"file": "solid_blocks.geo", "degree": 2, "parameters": sizes},
         {
@@ -119,8 +119,8 @@ def round_case(elements: int, rows: int) -> Case:
         {"supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
         materials=(material, material),
         contact={"friction": 0.3},
-        motion={"kind": "cycle", "columns": ["time (s)", "shift_x (mm)", "shift_y (mm)"], "rows": places},
-        heat=TO_STRIP,
+        motion={"kind": "cycle", "columns": ["time (s)", "shift_x (mm)", "shift_y (mm)"], "rows": rows},
+        heat={**TO_STRIP, "steps": 24},
     )
 
 
@@ -133,28 +133,27 @@ def half_space(x: Array, y: Array, flux: float) -> Array:
     total = np.zeros(len(x))
     for node, weight in zip(nodes, weights, strict=True):
         root = (node + 1) / 2 * np.sqrt(PERIOD)
-        angle = 2 * np.pi * (PERIOD - root**2) / PERIOD
-        middle = -RADIUS * np.array([np.cos(angle), np.sin(angle)])
+        share = 6 * (PERIOD - root**2) / PERIOD
+        middle = [-np.interp(share, range(7), corners) for corners in CORNERS.T]
         wide = np.sqrt(4 * CONDUCTIVITY / CAPACITY) * root
-        shape = [
-            (erf((c - m + HALF) / wide) - erf((c - m - HALF) / wide)) / 2 for c, m in zip((x, y), middle, strict=True)
-        ]
-        total += weight * np.sqrt(PERIOD) * flux / np.sqrt(np.pi * CONDUCTIVITY * CAPACITY) * shape[0] * shape[1]
+        ends = [[erf((c - m + side * HALF) / wide) for side in (1, -1)] for c, m in zip((x, y), middle, strict=True)]
+        shape = (ends[0][0] - ends[0][1]) * (ends[1][0] - ends[1][1]) / 4
+        total += weight * np.sqrt(PERIOD) * flux / np.sqrt(np.pi * CONDUCTIVITY * CAPACITY) * shape
     return total
 
 
 @pytest.mark.slow
 def test_a_source_that_goes_round() -> None:
     """A strip that goes round under a square punch is as warm as the half-space, at every node but those of the rim."""
-    rows = 24
-    system = assemble(round_case(4, rows))
+    system = assemble(round_case())
     exchange, pressure = system.exchange, np.ones(len(system.pair.weights))
     assert exchange is not None
     state = exchange.initial()
-    for phase in range(rows):
+    for phase in range(6):
         state, _ = exchange.half_cycle(state, phase, pressure, exchange.conductance(pressure))
-    found, x, weights = exchange.contact_temperatures(state, rows - 1)[1], system.pair.punch.x, system.pair.weights
-    expected = half_space(x[:, 0] - RADIUS, x[:, 1], 0.3 * 2 * np.pi * RADIUS / PERIOD)
+    found, x, weights = exchange.contact_temperatures(state, 5)[1], system.pair.punch.x, system.pair.weights
+    speed = 6 * np.linalg.norm(CORNERS[1] - CORNERS[0]) / PERIOD
+    expected = half_space(x[:, 0] - CORNERS[0, 0], x[:, 1] - CORNERS[0, 1], 0.3 * speed)
     inner = np.abs(x[:, :2]).max(axis=1) < 0.9 * HALF
     assert np.abs(found - expected)[inner].max() < 0.02 * expected.max()
     assert weights @ found == pytest.approx(weights @ expected, rel=0.005)
@@ -162,7 +161,7 @@ def test_a_source_that_goes_round() -> None:
 
 def test_a_shaft_that_turns_round() -> None:
     """Full turns of a shaft in its bore, in its own frame, are as hot as where its material moves through the mesh."""
-    rows, period, elements = 16, 0.1, 32
+    rows, period, elements = 16, 0.1, 24
     thermal = 'conductivity="50 W/(m*K)",heat_capacity="460 J/(kg*K)",density="7800 kg/m^3",expansion="1e-5 1/K"'
     settings = [f'materials.{name}={{young="210 GPa",poisson=0.3,{thermal}}}' for name in ("bronze", "steel")]
     settings += [f"heat.{key}={value}" for key, value in TO_STRIP.items()]
@@ -175,9 +174,7 @@ def test_a_shaft_that_turns_round() -> None:
         assemble(load_case("bushing", [*settings, motion]))
         for motion in (
             turning,
-            table([[period * k / rows, 360.0 * k / rows] for k in range(rows + 1)], "angle_y (deg)").replace(
-                "'steps'", "'middle'"
-            ),
+            table([[period * k / rows, 360.0 * k / rows] for k in range(rows + 1)], "angle_y (deg)"),
         )
     )
     x = through.pair.punch.x
@@ -194,20 +191,17 @@ def test_a_shaft_that_turns_round() -> None:
 
 def test_rings_that_oscillate() -> None:
     """Rings are as warm all around: by a table that turns them to and fro as by an oscillation."""
-    half, angle = 0.5, 1.0
-    times = np.linspace(0, 2 * half, 11)
-    rows = [[float(t), float(-angle * np.cos(np.pi * t / half))] for t in times]
-    small = ["heat.steps=5", "run.half_cycles=4"]
-    known = assemble(
-        load_case("ring-on-ring-heat", [*small, f"motion={{kind='oscillation',amplitude={angle},period={2 * half}}}"])
-    )
-    found = assemble(
-        load_case("ring-on-ring-heat", [*small, table(rows, "angle_z (rad)").replace("'steps'", "'middle'")])
+    small = ["run.half_cycles=4"]
+    turning = "motion={kind='oscillation',amplitude='1 rad',period='1 s',profile='triangular'}"
+    own = table([[0, -1], [0.5, 1], [1, -1]], "angle_z (rad)").replace("'steps'", "'middle'")
+    known, found = (
+        assemble(load_case("ring-on-ring-heat", [*small, motion, f"heat.steps={steps}"]))
+        for motion, steps in ((turning, 5), (own, 10))
     )
     one, other = list(march(known, 4))[-1].end, list(march(found, 2))[-1].end
     temperatures = [s.exchange.contact_temperatures(e.temperature) for s, e in ((known, one), (found, other))]
     for first, second in zip(*temperatures, strict=True):
-        np.testing.assert_allclose(second, first, rtol=1e-3)
+        np.testing.assert_allclose(second, first, rtol=1e-9)
 
 
 def test_out_of_the_plane() -> None:

@@ -35,7 +35,7 @@ def step_plans(
         count: Steps of each phase.
         moves: Whether the strip's material moves through its mesh.
     """
-    speeds: list[list[float]] = motion.mean_speeds(count).tolist()
+    speeds = [[float(v) for v in own] for own in motion.mean_speeds(count)]
     durations = [STAGE * duration / count for duration in motion.durations]
     taken = [
         [StageKind(duration, d * v if moves else 0.0) for v in own]

@@ -103,7 +103,7 @@ def tmp_path(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def unmatched(tmp_path_factory: pytest.TempPathFactory) -> Tribosystem:
     """Return Example 1 on meshes whose contact nodes do not match: the strip has two elements more on each half."""
-    from fenwear.bodies.mesh import meshes_folder
+    from fenwear.bodies.ready import meshes_folder
 
     text = (meshes_folder() / "punch_on_strip.geo").read_text("utf-8")
     old = "Transfinite Curve{a, b} = half_count + 1 Using Progression contact_ratio;"

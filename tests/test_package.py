@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 import fenwear
-from fenwear.bodies.mesh import meshes_folder
+from fenwear.bodies.ready import meshes_folder
 
 ROOT = Path(fenwear.__file__).parents[1]
 Run = Callable[..., Any]
@@ -106,7 +106,7 @@ def test_installed_wheel_works_elsewhere(wheel: Path, run_python: Run, tmp_path:
     install = ("-m", "pip", "install", "--no-deps", "--no-index", "--target", target, wheel)
     done = run_python(*install)
     assert done.returncode == 0, done.stderr
-    where = "import fenwear, fenwear.bodies.mesh; print(fenwear.__file__); print(fenwear.bodies.mesh.meshes_folder())"
+    where = "import fenwear, fenwear.bodies.ready; print(fenwear.__file__); print(fenwear.bodies.ready.meshes_folder())"
     found = run_python("-c", where, cwd=elsewhere, PYTHONPATH=str(target)).stdout.split()
     assert [Path(f).is_relative_to(target) for f in found] == [True, True]
     arguments = ("-m", "fenwear", "optimum", "monotonic-lz20")

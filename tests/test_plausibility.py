@@ -16,7 +16,7 @@ from markupsafe import escape
 
 from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
 from fenwear.assembly import place_case
-from fenwear.bodies.mesh import meshes_folder
+from fenwear.bodies.ready import meshes_folder
 from fenwear.case import plausibility_warnings
 from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError

@@ -10,7 +10,7 @@ import pytest
 
 from fenwear import CaseError, load_case
 from fenwear.assembly import place_case
-from fenwear.bodies.mesh import meshes_folder
+from fenwear.bodies.ready import meshes_folder
 from fenwear.case.templates import template_names, write_case_of
 from fenwear.plausibility import size_warnings
 

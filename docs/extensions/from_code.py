@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import Any
 
 import typer
 from docutils import nodes
 from pydantic import BaseModel
 from sphinx.util.docutils import SphinxDirective
 
-from fenwear.bodies.mesh import meshes_folder
+from fenwear.bodies.ready import ready_geometries
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
@@ -158,20 +158,13 @@ class Cases(Written):
 class Geometries(Written):
     """The ready geometries with their parameters."""
 
-    PARAMETER: ClassVar[re.Pattern[str]] = re.compile(
-        r"^[ \t]*(\w+)[ \t]*=[ \t]*([^,\n/]+?)[ \t]*,?[ \t]*(?://[ \t]*(.*))?$", re.MULTILINE
-    )
-
     def lines(self) -> Iterable[str]:
         """Return a table for each geometry."""
-        for path in sorted(meshes_folder().glob("*.geo")):
-            text = path.read_text("utf-8")
-            about = " ".join(line.lstrip("/ ") for line in text.partition("\n//\n")[0].splitlines())
-            yield f"\n**`{path.name}`**: {_plain(about)}\n"
-            block = re.search(r"DefineConstant\[(.*?)\];", text, re.DOTALL)
-            rows = self.PARAMETER.findall(block[1]) if block else []
-            if rows:
-                yield from _table(("parameter", "default", "meaning"), ((_code(n), v, _plain(m)) for n, v, m in rows))
+        for geometry in ready_geometries().values():
+            yield f"\n**`{geometry.name}`**: {_plain(geometry.about)}\n"
+            if geometry.parameters:
+                rows = ((_code(name), value, _plain(meaning)) for name, value, meaning in geometry.parameters)
+                yield from _table(("parameter", "default", "meaning"), rows)
 
 
 class Combinations(Written):

@@ -26,6 +26,7 @@ from fenwear import compat
 from fenwear.arrays import Array, Mask
 from fenwear.bodies.constants import constants
 from fenwear.bodies.mesh_check import element_problems
+from fenwear.bodies.ready import meshes_folder
 from fenwear.case import Geometry, Kind
 from fenwear.case.names import BY_ROLE, ROLES, Names
 from fenwear.errors import CaseError, InputError, OutputError
@@ -113,13 +114,6 @@ def own_mesh(name: str, mesh: Mesh, groups: Mapping[str, Callable[[Array], Mask]
 def _known(groups: object) -> str:
     names = ", ".join(sorted(groups))  # type: ignore[call-overload]
     return f"; the geometry has {names}" if names else ""
-
-
-def meshes_folder() -> Path:
-    """Return the folder of the ready geometries, in an installed package or in a checkout."""
-    package = Path(__file__).parents[1]
-    installed = package / "meshes"
-    return installed if installed.is_dir() else package.parent / "meshes"
 
 
 def find_geometry(geometry: Geometry, folder: Path | None) -> Path:

@@ -18,7 +18,7 @@ def info_command(
         str | None,
         typer.Argument(
             metavar="KEY",
-            help="Explain this key of the case file, or this table.",
+            help="Explain this key of the case file, this table, or this ready geometry: bushing.geo.",
             autocompletion=suggestions.keys,
         ),
     ] = None,
@@ -26,15 +26,26 @@ def info_command(
 ) -> None:
     """Print the versions of the stack and the built-in cases; or explain a key of the case file."""
     from fenwear.bodies import kept
+    from fenwear.bodies.ready import ready_geometries
     from fenwear.case.keys import find_keys
     from fenwear.versions import versions
 
+    geometries = ready_geometries()
+    if key in geometries:
+        if as_json:
+            print_json({"geometry": asdict(geometries[key])})
+        else:
+            show(geometries[key].text())
+        return
     if key is not None:
         found = find_keys(key)
         if as_json:
             print_json({"keys": [asdict(k) for k in found]})
         else:
             show("\n".join(k.text() for k in found))
+            if key == "geometry.file":
+                ready = (f"  {name:22} {geometry.title}" for name, geometry in geometries.items())
+                show("\n".join(("ready ones (fenwear info NAME tells their parameters):", *ready)))
         return
     if as_json:
         print_json({"versions": versions(), "cases": builtin_cases(), "kept": kept.summary()})

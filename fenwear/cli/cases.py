@@ -86,8 +86,9 @@ def check_command(
     accuracy: Annotated[
         bool, typer.Option("--accuracy", help="Estimate how uncertain the numbers of the run will be.")
     ] = False,
+    full: Annotated[bool, typer.Option("--full", help="Print the case with all defaults, as a case file.")] = False,
 ) -> None:
-    """Validate a case with its geometry and print it with all defaults."""
+    """Validate a case with its geometry, and tell its size, what moves freely and what is hardly meant."""
     from fenwear.assembly import elastic, law_named, place_case, resources_of, resources_text, with_reduced_heat
     from fenwear.cycle import heat_gain, heat_warnings, stability_number
     from fenwear.law_choice import choose_law, with_law
@@ -96,7 +97,7 @@ def check_command(
 
     loaded = load(case, settings)
     if loaded.sticks:
-        _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy)
+        _check_stick(with_law(loaded, "coulomb"), accuracy=accuracy, full=full)
         return
     placed = place_case(loaded)
     wanted = resources_of(placed)
@@ -109,7 +110,7 @@ def check_command(
         loaded = with_law(loaded, choice.law)
         if choice.law == "coulomb":
             stuck = law_named(choice.law).of_bodies(loaded, system.bodies, heat="as set", fresh=False)
-            _check_stick(loaded, stuck, accuracy=accuracy)
+            _check_stick(loaded, stuck, accuracy=accuracy, full=full)
             return
         system = replace(system, made_from=loaded)
     from fenwear.optimum import motion_words
@@ -126,7 +127,8 @@ def check_command(
     warnings += [*heat_warnings(heat_gain(warm)), *fineness_warnings(warm)]
     for warning in warnings:
         log(f"warning: {warning}")
-    print_case(loaded)
+    if full:
+        print_case(loaded)
     if warm.exchange is not None:
         log(fineness_text(warm))
     log(f"the case is valid: {len(system.pair.x)} contact nodes, "
@@ -148,8 +150,8 @@ def _foresee(system: Tribosystem) -> None:
     log(f"foreseen for the end of the run, in {found.seconds:.2g} s: {shown.text(system, found)}")
 
 
-def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: bool) -> None:
-    """Print a case with stick with all defaults, and what its first cycle comes to."""
+def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: bool, full: bool) -> None:
+    """Tell what the first cycle of a case with stick comes to."""
     from fenwear.assembly import assemble
     from fenwear.cli.partial_slip import check_text
 
@@ -157,7 +159,8 @@ def _check_stick(case: Case, system: Tribosystem | None = None, *, accuracy: boo
     text = check_text(case, system)
     for warning in plausibility_warnings(case):
         log(f"warning: {warning}")
-    print_case(case)
+    if full:
+        print_case(case)
     log(text)
     if accuracy:
         _foresee(system)

@@ -158,7 +158,12 @@ def life_command(
     until: Annotated[str, typer.Option(help='A level: "depth 0.2 mm", "distance until volume 3 mm^3".')],
     scatters: Annotated[
         list[str],
-        typer.Option("--scatter", metavar="KEY=KIND(A, B)", help='"contact.friction=normal(0.25, 8 %)"; repeatable.'),
+        typer.Option(
+            "--scatter",
+            metavar="KEY=KIND(A, B)",
+            help='"contact.friction=normal(0.25, 8 %)"; repeatable. normal(mean, standard deviation), '
+            "lognormal(median, coefficient of variation), uniform(least, largest).",
+        ),
     ] = [],  # noqa: B006
     calibration: Annotated[
         Path | None, typer.Option("--from", metavar="DIR", help="Folder of a calibration whose result scatters.")

@@ -12,7 +12,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, steady
-from fenwear.bodies.mesh import BodyMesh, build_meshes, meshes_folder, write_msh
+from fenwear.bodies.mesh import BodyMesh, build_meshes, write_msh
+from fenwear.bodies.ready import meshes_folder
 from fenwear.case import Geometry
 from fenwear.case.quantities import Kind
 from fenwear.parallel import on_root

@@ -125,6 +125,9 @@ def test_commands(fenwear: Callable[..., Any]) -> None:
         'motion.amplitude (kind "reciprocating"): u0, to both sides of the middle',
         "    number, in mm where it has no unit; required",
     ]
+    ready = fenwear("info", "geometry.file").stdout
+    assert "\n  bushing.geo            A shaft in a bushing, a conformal contact\n" in ready
+    assert "    radius = 10   of the shaft\n" in fenwear("info", "bushing.geo").stdout
     wrong = fenwear("info", "motion.amplitud")
     assert (wrong.returncode, "did you mean motion.amplitude" in wrong.stderr) == (2, True)
     assert json.loads(fenwear("schema").stdout) == json_schema()

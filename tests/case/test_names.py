@@ -11,7 +11,7 @@ import pytest
 import xarray
 
 from fenwear.assembly import assemble
-from fenwear.bodies.mesh import meshes_folder
+from fenwear.bodies.ready import meshes_folder
 from fenwear.case import Case, changed_case, load_case
 from fenwear.case.names import Names
 from fenwear.errors import CaseError

@@ -1,0 +1,55 @@
+"""The ready geometries, by what they say of themselves: the head of each .geo, and its parameters."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+PARAMETER = re.compile(r"^[ \t]*(\w+)[ \t]*=[ \t]*([^,\n/]+?)[ \t]*,?[ \t]*(?://[ \t]*(.*))?$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class ReadyGeometry:
+    """A geometry that comes with fenwear.
+
+    Attributes:
+        name: Of its file.
+        about: What it is.
+        parameters: Name, default (lengths in mm, angles in degrees) and meaning of each.
+    """
+
+    name: str
+    about: str
+    parameters: tuple[tuple[str, str, str], ...]
+
+    @property
+    def title(self) -> str:
+        """The first words of what it is."""
+        return re.split(r"[.:;](?: |$)", self.about)[0]
+
+    def text(self) -> str:
+        """Return it in words, a line for each parameter."""
+        lines = (
+            f"    {name} = {value}" + (f"   {meaning}" * bool(meaning)) for name, value, meaning in self.parameters
+        )
+        return "\n".join((f"{self.name}: {self.about}", "geometry.parameters, in mm and degrees:", *lines))
+
+
+def meshes_folder() -> Path:
+    """Return the folder of the ready geometries, in an installed package or in a checkout."""
+    installed = PACKAGE / "meshes"
+    return installed if installed.is_dir() else PACKAGE.parent / "meshes"
+
+
+def ready_geometries() -> dict[str, ReadyGeometry]:
+    """Return all ready geometries by their names."""
+    return {path.name: _read(path) for path in sorted(meshes_folder().glob("*.geo"))}
+
+
+def _read(path: Path) -> ReadyGeometry:
+    text = path.read_text("utf-8")
+    about = " ".join(line.lstrip("/ ") for line in text.partition("\n//\n")[0].splitlines())
+    block = re.search(r"DefineConstant\[(.*?)\];", text, re.DOTALL)
+    return ReadyGeometry(path.name, about, tuple(PARAMETER.findall(block[1])) if block else ())

@@ -25,7 +25,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.contact.blocks import Columns, ManyNodes, PhaseBlock
 from fenwear.contact.gridded import GriddedPhases, Opened, PhasesGrid
 from fenwear.contact.inequality import Inequality
-from fenwear.contact.operators import Operator, Phases, Solve
+from fenwear.contact.operators import Operator, Phases, Shifted, Solve
 from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread import DistributedBlock, OwnRows, SpreadCompliance
 from fenwear.contact.spread_nodes import SpreadNodes
@@ -173,7 +173,7 @@ class CondensedContact:
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         upper, functions = np.full(m * size, np.inf), (self._residual, self._jacobian)
         self.inequality = Inequality(lower, upper, *functions, PREFIX, NAME, self._rounding)
-        self.inequality.sets_first = self._many
+        self.inequality.sets_first, self.inequality.by_digits = self._many, self._gridded
 
     def _slide(self, phases: Iterable[int]) -> None:
         """Take the friction of phases."""
@@ -306,6 +306,8 @@ class CondensedContact:
                 self._operator = self._as_phases(border=(left, slope * scale), layer=layer)
             elif self._many and self._coupling is None:
                 self._operator = self._of_nodes(slope * scale, last, layer)
+            elif m == 1 and self._coupling is None:
+                self._operator = Shifted(self._dense[0], slope[0] * scale + (0.0 if layer is None else layer[0]))
             else:
                 self._operator = self._as_phases(local=slope * scale, layer=layer)
         return self._operator or self._linear

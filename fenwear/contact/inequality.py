@@ -9,8 +9,11 @@ same ones: a start that is near is first taken on by Newton's method with its ow
 kept. Where the result fulfils all conditions it is the solution; where it does not, SNES starts. Where unknowns are
 many the sets themselves are gone through first: that of the next step holds what has come out below its bound, and lets
 go what is held with a residual of the wrong sign (M. Hintermueller, K. Ito, K. Kunisch, SIAM J. Optim. 13, 2003). It
-takes fewer of them than steps that are cut off at the bounds, but need not end. An operator whose solutions
-cost by their digits goes through sets itself, to some of them, and what it finds is taken on as it is.
+takes fewer of them than steps that are cut off at the bounds, but need not end. Where the derivative changes with the
+solution they are gone through in the same way, a step of each: by the factor of an earlier solve, which Broyden's
+updates correct (C. T. Kelley, Iterative Methods for Linear and Nonlinear Equations, SIAM 1995, 7.3) until they take
+so many steps that a new one pays. An operator whose solutions cost by their digits goes through sets itself, to some
+of them, and what it finds is taken on as it is.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
@@ -31,7 +35,9 @@ REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
 SETS = 30  # that are gone through before SNES starts
-CHORDS, FALLS = 12, 0.2  # steps where the derivative changes; fall of the residual by which its factor still serves
+CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor still serves
+SERVES = 3  # such steps, after which the next solve has a factor of its own
+MOST_SHARE = 0.5  # of a step along the last one, that is corrected
 STEPS = 4  # of Newton's method with the set of the start, before SNES looks for another one
 ROUNDS = 40  # of some digits each, where the derivative changes
 CLOSE = 1e-9  # of residuals, where solutions cost by their digits
@@ -119,7 +125,9 @@ class Inequality:
         self._bounded_above = bool((upper < np.inf).any())
         self._kept: _Kept | None = None
         self._operator: Operator | None = None
+        self._worn_out = False  # whether the factor took many steps
         self.curved = False  # whether the derivative changes with the solution
+        self.by_digits = False  # whether solutions may cost by their digits
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
         self.close = CLOSE  # residual that ends solves where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
@@ -195,10 +203,10 @@ class Inequality:
         Raises:
             ConvergenceError: SNES did not converge.
         """
-        if not line_search and isinstance(self._jacobian(start), Approximate):
+        if self.by_digits and not line_search and isinstance(self._jacobian(start), Approximate):
             x = self._improved(start)
             return self._by_snes(start, line_search) if x is None else x
-        x = self._on_set(start) if near else None
+        x = (self._by_chords(start) if self.curved else self._on_set(start)) if near else None
         if x is None and self.sets_first and not line_search:
             x = self._through_sets(start)
         return self._by_snes(start, line_search) if x is None else x
@@ -207,25 +215,17 @@ class Inequality:
         """Return the solution where it has the same free unknowns as the start, else None."""
         key, x = self._free(start), start.copy()
         try:
-            # Whatever is kept: what a solution is found with does not depend on what was solved before. But where the
-            # derivative changes with the solution a factor serves as long as it takes residuals down.
-            last, steps = self._kept, CHORDS if self.curved else STEPS
-            known = last is not None and self.curved and last.key == key
-            kept = last if last is not None and known else self._factor(self._jacobian(x), key)
-            before = np.inf
-            for iteration in range(steps + 1):
+            # Whatever is kept: what a solution is found with does not depend on what was solved before.
+            kept = self._factor(self._jacobian(x), key)
+            for iteration in range(STEPS + 1):
                 f = self._function(x)
                 rest = f[kept.free]
-                size = float(np.linalg.norm(rest))
                 if rest @ rest < (self._tolerance if iteration > 1 else TOLERANCE) ** 2:
                     break
-                if iteration == steps or (iteration and self._free(x) != key):
+                if iteration == STEPS or (iteration and self._free(x) != key):
                     return None
-                if size > FALLS * before if self.curved else iteration:
-                    before = np.inf if self.curved else size
+                if iteration:
                     kept = self._factor(self._jacobian(x), key)
-                else:
-                    before = size
                 x[kept.free] -= kept.solve(rest)
         except np.linalg.LinAlgError:
             return None
@@ -235,6 +235,56 @@ class Inequality:
             return None
         self.iterations, self.residual = iteration, f
         return x
+
+    def _by_chords(self, start: Array) -> Array | None:
+        """Return the solution from a start that is near, where the derivative changes with it; None if it is not."""
+        x, key, seen = start.copy(), self._free(start), set[bytes]()
+        steps: list[Array] = []  # of Broyden's method, since the last factor
+        last, before = self._kept, np.inf
+        try:
+            if last is None or last.key != key or self._worn_out:
+                last = self._factor(self._jacobian(x), key)
+            kept = last
+            for self.iterations in range(CHORDS):
+                f = self._function(x)
+                wanted = self._wanted(x, f, key)
+                if wanted != key:
+                    if wanted in seen:
+                        return None
+                    seen.add(key)
+                    key, steps, before = wanted, [], np.inf
+                    self._onto_bounds(x, key)
+                    kept = self._factor(self._jacobian(x), key)
+                    f = self._function(x)
+                rest = f[kept.free]
+                size = float(np.linalg.norm(rest))
+                if size < TOLERANCE or (size > FALLS * before and size < self._tolerance):
+                    if self._free(x) != key or not self._holds(x, f, kept.bounded):
+                        return None
+                    self.residual, self._worn_out = f, self.iterations > SERVES
+                    return x
+                if size > FALLS * before:
+                    steps, kept = [], self._factor(self._jacobian(x), key)
+                before = size
+                steps.append(_broyden(-kept.solve(rest), steps))
+                x[kept.free] += steps[-1]
+        except np.linalg.LinAlgError:
+            pass
+        return None
+
+    def _wanted(self, x: Array, f: Array, key: bytes) -> bytes:
+        """Return which unknowns are free next: those within their bounds, and those that their residual lets go."""
+        free = np.frombuffer(key, dtype=bool)
+        wanted = np.where(free, x > self._lower, f < -TOLERANCE)
+        if self._bounded_above:
+            above = np.where(free, x < self._upper, f > TOLERANCE)
+            wanted = np.where(free, wanted & above, np.where(x >= self._upper, above, wanted))
+        return wanted.tobytes()
+
+    def _onto_bounds(self, x: Array, key: bytes) -> None:
+        """Put unknowns that are not free on the bound that is next."""
+        held = ~np.frombuffer(key, dtype=bool)
+        x[held] = np.where(x[held] >= self._upper[held], self._upper[held], self._lower[held])
 
     @property
     def _tolerance(self) -> float:
@@ -312,6 +362,16 @@ class Inequality:
         self.iterations = snes.getIterationNumber()
         self.residual = self._function(x)
         return x
+
+
+def _broyden(step: Array, before: list[Array]) -> Array:
+    """Return a step of Broyden's method from that of the factor alone, and the steps since it was made."""
+    for one, other in pairwise(before):
+        step = step + other * ((one @ step) / (one @ one))
+    if not before:
+        return step
+    share = float(before[-1] @ step) / float(before[-1] @ before[-1])
+    return step / (1 - share) if share < MOST_SHARE else step
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

@@ -256,6 +256,26 @@ class Dense:
         return eliminate(self.matrix[np.ix_(kept, kept)])
 
 
+@dataclass(frozen=True)
+class Shifted:
+    """A matrix of numbers (size, size) with others (n,) added to the first of its diagonal."""
+
+    matrix: Array
+    added: Array
+
+    def multiply(self, x: Array) -> Array:
+        """Return the matrix times x."""
+        found: Array = self.matrix @ x
+        found[: len(self.added)] += self.added * x[: len(self.added)]
+        return found
+
+    def factor(self, kept: Indices) -> Solve:
+        """Return the solution operator of the rows and columns `kept`."""
+        part, first = self.matrix[np.ix_(kept, kept)], np.searchsorted(kept, len(self.added))
+        part.flat[: first * (len(kept) + 1) : len(kept) + 1] += self.added[kept[:first]]
+        return eliminate(part)
+
+
 def eliminate(matrix: Array) -> Solve:
     """Return the solution operator of a matrix, for one right-hand side or columns of them.
 

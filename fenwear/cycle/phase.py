@@ -24,6 +24,7 @@ COEFFICIENTS_FAIL = (
     "a weaker dependence on p, or a smoother table may help: the coefficients of friction and wear and the pressure "
     "they depend on did not come together"
 )
+ONWARDS = ((1,), (2, -1), (3, -3, 1), (4, -6, 4, -1))  # shares of the last cycles in the next, by polynomials
 _Solved = tuple[ContactState, HeatState | None, HalfCycleHeat | None, LayerEvolution]
 
 
@@ -59,6 +60,7 @@ class PhaseStep:
         wear = system.wear.phases([conditions], [phase])
         self._passing = system.passing(wear, [phase])
         self._flowed: Array | None = None  # beyond the hardness, in the last solve
+        self._known: list[ContactState] = []  # of the last cycles, the last one first
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
     def solve(
@@ -92,9 +94,11 @@ class PhaseStep:
         if self._thermal is not None and temperature is not None:
             temperature = self._thermal.exchange.own(temperature)
         gap = self.system.gap(self.phase, worn, passing=True)
-        start = before or near
+        start = self._extrapolated(before) or near
         if self._constant:
-            return self._end(*self._solve(temperature, gap, start, self._passing, worn), before, self._passing, worn)
+            end = self._solve(temperature, gap, start, self._passing, worn)
+            self._remember(before, end[0])
+            return self._end(*end, before, self._passing, worn)
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
@@ -115,7 +119,28 @@ class PhaseStep:
             COEFFICIENTS_FAIL,
             team=self.system.team,
         )
+        self._remember(before, contact)
         return self._end(contact, after, heat, before, passing, worn)
+
+    def _remember(self, before: ContactState | None, contact: ContactState) -> None:
+        """Keep the contacts of the last cycles, where the next one is extrapolated from them."""
+        if self.system.layers.curved:
+            follows = before is not None and bool(self._known) and before is self._known[0]
+            self._known = [contact, *self._known[: len(ONWARDS) - 1]] if follows else [contact]
+
+    def _extrapolated(self, before: ContactState | None) -> ContactState | None:
+        """Return the contact that goes on as over the last cycles, where its iterations depend on their start.
+
+        The same nodes touch: which others will is for the inequality to find.
+        """
+        known = self._known
+        if before is None or len(known) < 2 or before is not known[0]:
+            return before
+        hardness, shares = self.system.layers.hardness, ONWARDS[len(known) - 1]
+        further = sum(share * one.pressure for share, one in zip(shares, known, strict=True))
+        kept = (before.pressure > 0) & (further > 0) & (before.pressure < hardness) & (further < hardness)
+        rigid = sum(share * one.rigid for share, one in zip(shares, known, strict=True))
+        return replace(before, pressure=np.where(kept, further, before.pressure), rigid=np.asarray(rigid))
 
     def _update(
         self,

@@ -35,7 +35,7 @@ class Zone:
     Attributes:
         nodes: Across it along each coordinate (c,).
         spacing: Mean distance of its neighbouring nodes along each (c,), mm.
-        free: At how many of both ends along each coordinate it ends before the surface does (c,).
+        free: At how many of both ends along each coordinate it ends before its own part of the surface does (c,).
     """
 
     nodes: Array
@@ -85,8 +85,10 @@ class ContactNet:
         spacing = np.ptp(self.coordinates[cells], axis=1).mean(axis=0)
         inside = self.coordinates[piece]
         slack = spacing / 2
-        free = (inside.min(axis=0) > self.coordinates.min(axis=0) + slack).astype(np.int64)
-        free += inside.max(axis=0) < self.coordinates.max(axis=0) - slack
+        part = self.surface.part
+        own = self.coordinates[part == part[piece.argmax()]]  # another contact's ends are not this one's
+        free = (inside.min(axis=0) > own.min(axis=0) + slack).astype(np.int64)
+        free += inside.max(axis=0) < own.max(axis=0) - slack
         return Zone(1 + np.ptp(inside, axis=0) / spacing, spacing, free)
 
     def numbers(self, pressure: Array) -> dict[str, Any]:

@@ -34,6 +34,20 @@ def test_nodes_across_a_line_contact() -> None:
     assert net.zone(np.zeros(count)) is None
 
 
+def test_ends_are_those_of_its_own_contact() -> None:
+    """A pad in full contact ends nowhere within its surface, whatever other pads are there; one that tips does."""
+    net = net_of(place_case(load_case("drum-brake", [])))
+    right = net.surface.nodes_of("right")
+    for own in (right, ~right):
+        zone = net.zone(np.where(own, 1.0, 0.0))
+        assert zone is not None
+        assert zone.free[0] == 0
+        along = net.coordinates[:, 0]
+        zone = net.zone(np.where(own & (along > np.median(along[own])), 1.0, 0.0))
+        assert zone is not None
+        assert zone.free[0] == 1
+
+
 @pytest.mark.parametrize("degree", [1, 2])
 def test_nodes_across_a_point_contact(degree: int) -> None:
     """An ellipse of nodes on an even grid is as many wide as it covers lines of the grid, along and across."""

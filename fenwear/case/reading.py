@@ -168,9 +168,10 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
         CaseError: lists every unknown key, wrong unit and impossible value.
     """
     data = with_profiles(with_program(with_cycle(data, folder), folder), folder)
-    open_end = isinstance(data.get("program"), Mapping) and "half_cycles" not in data.get("run", {})
-    if open_end and isinstance(data.get("run", {}), Mapping):  # a program tells itself how far a run goes
-        data["run"] = {**data.get("run", {}), "half_cycles": PLACEHOLDER}
+    run = data.get("run", {})
+    open_end = isinstance(data.get("program"), Mapping) and isinstance(run, Mapping) and "half_cycles" not in run
+    if open_end:
+        data["run"] = {**run, "half_cycles": PLACEHOLDER}  # a program tells itself how far a run goes
     try:
         case = Case.model_validate(data)
     except pydantic.ValidationError as error:
@@ -178,8 +179,7 @@ def make_case(data: Mapping[str, Any], folder: Path | None = None) -> Case:
         found = [e for e in error.errors() if e["type"] != "too_short" or e["ctx"]["actual_length"] == len(e["input"])]
         raise CaseError([p for e in found for p in problems_of(e, data)]) from None
     if open_end:
-        run = case.run.model_copy(update={"half_cycles": half_cycles_of(case)})
-        case = case.model_copy(update={"run": run})
+        case = case.model_copy(update={"run": case.run.model_copy(update={"half_cycles": half_cycles_of(case)})})
     check_length(case)
     return case.at(folder, written(data, case.resolved()))
 

@@ -358,6 +358,8 @@ class CondensedContact:
         begun = np.zeros((m, self._offset.shape[1] - n)) if start is None else start.rigid
         opened = [phase.interface.rigid.rigid_normal @ own for phase, own in zip(self.phases, begun, strict=True)]
         self._offset[:, :n] = (gap + self._loads + np.array(opened)) / self._gap_scale
+        if not np.isfinite(self._offset).all():
+            raise ConvergenceError(f"{self.inequality.name}: the gap between the bodies is beyond all numbers")
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._wearing = wearing

@@ -15,6 +15,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
@@ -206,7 +207,7 @@ def _material(parts: Sequence[Patch], transfer: csr_array) -> csr_array:
     if len(strip.nodes) == len(strip.s):
         return transfer
     if strip.cell != "triangle":  # a node on the axis of rings stands for nothing: it takes its neighbour's value
-        nearest = np.abs(strip.s - strip.s[strip.nodes].T).argmin(axis=1)
+        nearest = cKDTree(strip.s[strip.nodes]).query(strip.s)[1]
         to_trace = csr_array((np.ones(len(nearest)), (np.arange(len(nearest)), nearest)))
         return csr_array(transfer @ to_trace)
     # On the vertices alone: linear on each facet.

@@ -54,6 +54,11 @@ def test_in_words_of_case_files(setting: str, expected: str) -> None:
     assert problems(setting) == [expected]
 
 
+def test_a_run_of_a_program_is_a_table() -> None:
+    """Without its end, which the program tells, it was looked into before it was known to be one."""
+    assert problems("program={steps=[{cycles=1}]}", "run=3") == ["run: expected a table, got 3"]
+
+
 def test_from_python() -> None:
     """Objects that no case file can hold."""
     tables: dict[str, Any] = copy.deepcopy(tomllib.loads(load_case("example1").to_toml()))

@@ -11,6 +11,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple
 
 MEMORY = 8 << 30  # bytes of address space of a worker
+CASES = 1000  # of a worker, after which another takes its place: every law of a case is compiled, and stays loaded
 PATIENCE = 1800.0  # s by the clock, for what hangs without computing
 
 
@@ -43,9 +44,10 @@ class _Worker:
         self.process = context.Process(target=_work, args=(task, theirs, seconds), daemon=True)
         self.process.start()
         theirs.close()
-        self.seconds = seconds
+        self.seconds, self.left = seconds, CASES
 
     def answer(self, seed: int) -> Verdict:
+        self.left -= 1
         try:
             return Verdict(*self.connection.recv())
         except EOFError:
@@ -91,7 +93,7 @@ def verdicts(
             # Otherwise none has answered for so long.
             verdict = worker.answer(seed) if ready else Verdict(seed, "hang", f"no answer for {patience:g} s")
             yield verdict
-            if verdict.kind in ("crash", "hang"):
+            if verdict.kind in ("crash", "hang") or worker.left <= 0:
                 worker.end()
                 worker = _Worker(task, seconds)
             give(worker)

@@ -130,14 +130,20 @@ class CondensedContact:
 
     Attributes:
         blocks: Of the phases, where nodes are many.
+        most: The largest pressure, MPa.
     """
 
     def __init__(
-        self, phases: Sequence[SlidingContact], remedies: Remedies | None = None, team: Team | None = None
+        self,
+        phases: Sequence[SlidingContact],
+        remedies: Remedies | None = None,
+        team: Team | None = None,
+        most: float = np.inf,
     ) -> None:
         """Take the phases, where to note that a contact was solved in another way than usual, and ranks that have it.
 
-        By default every rank has a contact of its own, unless they share its rows.
+        By default every rank has a contact of its own, unless they share its rows. Of one phase of few nodes no
+        pressure exceeds `most`, MPa: there the surfaces flow, and the gap is what they have to, below zero.
         """
         self.phases = list(phases)
         self._remedies = remedies or Remedies()
@@ -172,6 +178,8 @@ class CondensedContact:
         self._operator: Operator | None = None
         lower = np.tile(np.concatenate([np.zeros(n), np.full(r, -np.inf)]), m)
         upper, functions = np.full(m * size, np.inf), (self._residual, self._jacobian)
+        self.most = np.inf if self._many or m > 1 else most
+        upper[:n] = self.most / self._pressure_scale
         self.inequality = Inequality(lower, upper, *functions, PREFIX, NAME, self._rounding)
         self.inequality.sets_first, self.inequality.by_digits = self._many, self._gridded
 
@@ -370,6 +378,7 @@ class CondensedContact:
         x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale
         pressure[x[:, :n] <= ZERO] = 0.0
+        pressure[x[:, :n] >= self.most / self._pressure_scale] = self.most
         gaps = f.reshape(m, -1)[:, :n] * self._gap_scale
         return ContactState(pressure, gaps, begun + x[:, n:] * self._rigid_scale, iterations)
 

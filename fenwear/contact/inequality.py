@@ -206,7 +206,8 @@ class Inequality:
         if self.by_digits and not line_search and isinstance(self._jacobian(start), Approximate):
             x = self._improved(start)
             return self._by_snes(start, line_search) if x is None else x
-        x = (self._by_chords(start) if self.curved else self._on_set(start)) if near else None
+        stepwise = self.curved or self._bounded_above  # sets change more often, or there is more than one factor's step
+        x = (self._by_chords(start) if stepwise else self._on_set(start)) if near else None
         if x is None and self.sets_first and not line_search:
             x = self._through_sets(start)
         return self._by_snes(start, line_search) if x is None else x
@@ -247,8 +248,9 @@ class Inequality:
             kept = last
             for self.iterations in range(CHORDS):
                 f = self._function(x)
-                wanted = self._wanted(x, f, key)
-                if wanted != key:
+                wanted = self._wanted(x, f, key) if self.iterations else key
+                same = wanted == key
+                if not same:
                     if wanted in seen:
                         return None
                     seen.add(key)
@@ -258,9 +260,8 @@ class Inequality:
                     f = self._function(x)
                 rest = f[kept.free]
                 size = float(np.linalg.norm(rest))
-                if size < TOLERANCE or (size > FALLS * before and size < self._tolerance):
-                    if self._free(x) != key or not self._holds(x, f, kept.bounded):
-                        return None
+                small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
+                if small and same and self._wanted(x, f, key) == key:
                     self.residual, self._worn_out = f, self.iterations > SERVES
                     return x
                 if size > FALLS * before:

@@ -8,7 +8,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, heating_friction
-from fenwear.contact import CondensedContact, ContactState
+from fenwear.contact import CondensedContact, ContactSolver, ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
@@ -16,7 +16,7 @@ from fenwear.cycle.thermal import ThermalContact
 from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
-from fenwear.layers import LayerEvolution
+from fenwear.layers import LayerEvolution, LayerStep
 from fenwear.sliding.wear import WornDepths
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -124,7 +124,7 @@ class PhaseStep:
 
     def _remember(self, before: ContactState | None, contact: ContactState) -> None:
         """Keep the contacts of the last cycles, where the next one is extrapolated from them."""
-        if self.system.layers.curved:
+        if self.system.layers.closure is not None:
             follows = before is not None and bool(self._known) and before is self._known[0]
             self._known = [contact, *self._known[: len(ONWARDS) - 1]] if follows else [contact]
 
@@ -175,19 +175,68 @@ class PhaseStep:
         passing: LayerEvolution,
         worn: WornDepths,
     ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
-        wearing, near = passing.step(worn, implicit=self.implicit), start
+        contact = self._contact
+        if isinstance(contact, CondensedContact) and contact.most < np.inf:
+            try:
+                return self._capped(temperature, gap, start, passing, worn)
+            except ConvergenceError:  # so much flows that too little else carries on the way to the solution
+                contact = self.system.passed_contact(self.phase, capped=False)
+                if isinstance(contact, CondensedContact):
+                    contact.press(self._load)
+                    contact.slide([self._friction_ratio])
+        return self._flowing(contact, temperature, gap, start, passing, worn)
+
+    def _capped(
+        self,
+        temperature: HeatState | None,
+        gap: Array,
+        start: ContactState | None,
+        passing: LayerEvolution,
+        worn: WornDepths,
+    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+        """Return the end of a phase whose contact lets no pressure beyond the hardness."""
+        wearing = passing.step(worn, implicit=self.implicit, capped=True)
+        contact, after, heat = self._pressed(self._contact, self._thermal, temperature, gap, start, wearing)
+        self._flowed = self.system.layers.flowed(contact.pressure[0], contact.gap[0])
+        return replace(contact, gap=contact.gap + self._flowed), after, heat
+
+    def _flowing(
+        self,
+        solver: ContactSolver,
+        temperature: HeatState | None,
+        gap: Array,
+        start: ContactState | None,
+        passing: LayerEvolution,
+        worn: WornDepths,
+    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+        """Return the end of a phase whose contact flows by and by."""
+        wearing, near, thermal = passing.step(worn, implicit=self.implicit), start, self._thermal
+        if thermal is not None and solver is not self._contact:
+            thermal = ThermalContact(self.system, thermal.exchange, self.phase, solver)
+            thermal.slide(heating_friction(self.system, self._mu, self.phase))
 
         def solve(flowed: Array) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
             nonlocal near
-            if self._thermal is None or temperature is None:
-                near = self._contact.solve(gap + flowed, near, wearing)
-                return near, None, None
-            found = self._thermal.solve(temperature, gap + flowed, near, wearing)
+            found = self._pressed(solver, thermal, temperature, gap + flowed, near, wearing)
             near = found[0]
             return found
 
         found, self._flowed = self.system.layers.flowing(solve, lambda found: found[0].pressure)
         return found
+
+    def _pressed(
+        self,
+        solver: ContactSolver,
+        thermal: ThermalContact | None,
+        temperature: HeatState | None,
+        gap: Array,
+        start: ContactState | None,
+        wearing: LayerStep | None,
+    ) -> tuple[ContactState, HeatState | None, HalfCycleHeat | None]:
+        """Return contact, and the heat that goes with it."""
+        if thermal is None or temperature is None:
+            return solver.solve(gap, start, wearing), None, None
+        return thermal.solve(temperature, gap, start, wearing)
 
     def _end(
         self,

@@ -3,9 +3,11 @@
     gap = bodies + winkler p + delta(p) - t + D,    p <= hardness
 
 with the linear closure, that of a law (`closure`), the thickness of debris (`debris`) and the plastic depth D, which
-grows where the pressure is at the hardness. In a solve the surface gives way by SOFT (p / hardness - 1) beyond it; what
-it has given way by is put into the gap, and solved again: the excess falls to a part of itself each time, to nothing
-(augmented Lagrangians; M. R. Hestenes, J. Optim. Theory Appl. 4, 1969, 303). What is linear in the pressure belongs to
+grows where the pressure is at the hardness. In one phase that is an upper bound of the inequality, and D grows by what
+the gap would be below zero (0 <= dD, p <= hardness, dD (p - hardness) = 0). Where phases flow together, in jumps, or
+nodes are many, the surface gives way in a solve by SOFT (p / hardness - 1) beyond it; what it has given way by is put
+into the gap, and solved again: the excess falls to a part of itself each time, to nothing (augmented Lagrangians;
+M. R. Hestenes, J. Optim. Theory Appl. 4, 1969, 303). What is linear in the pressure belongs to
 the compliance of the bodies (`fenwear.interface.Interface`), so that every study has it.
 """
 
@@ -131,18 +133,25 @@ class Layers:
             found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
 
-    def closing(self, pressure: Array) -> Array:
-        """Return by how much pressures (m, n) close what gives way in a step by laws that are not linear, mm."""
-        found = np.zeros_like(pressure) if self.closure is None else self.closure.closure(pressure)
-        return found if self.hardness == np.inf else found + self.flow(pressure)
+    def closing(self, pressure: Array, *, capped: bool = False) -> Array:
+        """Return by how much pressures (m, n) close what gives way in a step by laws that are not linear, mm.
 
-    def slope(self, pressure: Array) -> Array | None:
+        Where pressures are `capped` at the hardness what flows is left out.
+        """
+        found = np.zeros_like(pressure) if self.closure is None else self.closure.closure(pressure)
+        return found if capped or self.hardness == np.inf else found + self.flow(pressure)
+
+    def slope(self, pressure: Array, *, capped: bool = False) -> Array | None:
         """Return the derivative of `closing` (m, n), mm/MPa; None where nothing gives way so."""
         found = None if self.closure is None else self.closure.slope(pressure)
-        if self.hardness == np.inf:
+        if capped or self.hardness == np.inf:
             return found
         soft = np.where(pressure > self.hardness, SOFT / self.hardness, 0.0)
         return soft if found is None else found + soft
+
+    def flowed(self, pressure: Array, gap: Array) -> Array:
+        """Return what surfaces have flown (n,), mm, whose pressures were capped at the hardness, from the gap left."""
+        return np.where(pressure >= self.hardness, np.maximum(-gap, 0.0), 0.0)
 
     def flow(self, pressure: Array) -> Array:
         """Return by how much more the surfaces have to flow at pressures (m, n), mm."""

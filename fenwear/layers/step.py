@@ -91,16 +91,18 @@ class LayerEvolution:
             return None
         return (self.debris.fed * self.wear.taken(pressure)).sum(axis=0) / self.debris.loss
 
-    def step(self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True) -> LayerStep | None:
+    def step(
+        self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
+    ) -> LayerStep | None:
         """Return what the pressures of a step open in it; explicitly what gives way alone, None where nothing does.
 
         Args:
             before, cycles: As of `worn`.
             implicit: Whether the wear of the step, and what becomes of it, opens its own gaps.
+            capped: Whether the contact itself lets no pressure beyond the hardness.
         """
-        if not implicit and not self.layers.curved:
-            return None
-        return LayerStep(self, before, cycles, implicit)
+        step = LayerStep(self, before, cycles, implicit, capped)
+        return step if implicit or step.curved else None
 
 
 @dataclass(frozen=True)
@@ -115,12 +117,14 @@ class LayerStep:
         before: Depths and state at the start.
         cycles: Of the step; None for the phases once.
         implicit: Whether wear opens the gaps of the step itself; else what gives way alone.
+        capped: Whether the contact itself lets no pressure beyond the hardness.
     """
 
     passing: LayerEvolution
     before: WornDepths
     cycles: float | None
     implicit: bool = True
+    capped: bool = False
 
     @property
     def _length(self) -> float:
@@ -139,7 +143,7 @@ class LayerStep:
                 found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
             filled = passing.filled(pressure, self.before, self.cycles)
             found = found if filled is None else found - self._length * filled
-        return found + passing.layers.closing(pressure)
+        return found + passing.layers.closing(pressure, capped=self.capped)
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
@@ -170,11 +174,12 @@ class LayerStep:
     @property
     def curved(self) -> bool:
         """Whether something gives way by a law that is not linear."""
-        return self.passing.layers.curved
+        layers = self.passing.layers
+        return layers.closure is not None if self.capped else layers.curved
 
     def layer(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in their own phase alone (m, n); None for none."""
-        return self.passing.layers.slope(pressure)
+        return self.passing.layers.slope(pressure, capped=self.capped)
 
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""

@@ -272,8 +272,6 @@ class Case(Part):
             problems.append(f"contact.solver: expected 'condensed' with contact.{lies[0]}")
         passes_on = one_way and self.passes
         problems += creep_problems(self.bodies, self.contact.layer, self.contact.solver, passes_on=passes_on)
-        if self.sticks and self.contact.hardness is not None:
-            problems.append("contact.hardness: expected contact.law = 'gross-sliding': with stick nothing flows yet")
         if self.contact.solver == "full" and (isinstance(self.contact.friction, Dependence) or self.varies):
             problems.append("contact.solver: expected 'condensed' where friction, wear or loads vary")
         several = not isinstance(motion, OneWay | Rotation | Cycle) and (motion.positions or 1) > 1

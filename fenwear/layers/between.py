@@ -124,6 +124,21 @@ class Layers:
         first = len(self.rows) - len(held.contact)
         return replace(worn, between=np.concatenate([worn.between[:first], held.contact]), carried=held.strip)
 
+    def flown(self, worn: WornDepths, flowed: Array | None) -> WornDepths:
+        """Return depths where surfaces have flown (n,) more, mm; None for nothing."""
+        if flowed is None:
+            return worn
+        state = worn.between.copy()
+        state[self.row(PLASTIC)] += flowed
+        return replace(worn, between=state)
+
+    def flown_as(self, worn: WornDepths, other: WornDepths) -> WornDepths:
+        """Return depths where surfaces have flown as at others."""
+        if self.hardness == np.inf:
+            return worn
+        row = self.row(PLASTIC)
+        return self.flown(worn, other.between[row] - worn.between[row])
+
     def opening(self, state: Array) -> Array | float:
         """Return the gap that a state opens (n,), mm."""
         if not len(state):

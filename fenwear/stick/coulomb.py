@@ -276,7 +276,8 @@ class _Run:
         at = replace(at, heating=None if warm is None else heating)
         while steps[at.next_step].half_cycle != state.half_cycle % self.strokes:  # a jump ends half a cycle later
             at, _ = self.problem.half_cycle(at)
-        return replace(self.problem.shaped(at, state.worn), temperature=warm)
+        worn = self.problem.interface.layers.flown_as(state.worn, at.worn)
+        return replace(self.problem.shaped(at, worn), temperature=warm)
 
     def half_cycle(
         self,
@@ -332,7 +333,7 @@ class HalfCycles(_Run):
         own = slice(first, first + len(records))
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
         lost = problem.worn_in(records, first, begin)
-        worn = replace(state.worn + lost, crept=at.contact.crept)
+        worn = replace(begin.worn + lost, crept=at.contact.crept)
         adds = self.meter(records, first)
         totals = state.totals + adds
         stroke, n = state.half_cycle % self.strokes, len(problem.weights)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple, TypeVar
@@ -14,7 +15,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import HERE, Placement, in_model
 from fenwear.layers import Evolution
-from fenwear.layers.between import DEBRIS
+from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.memory import Held
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.screw import Screw
@@ -58,6 +59,7 @@ class TimeStepRecords:
         conductance: Of each node (k, n), N/(mm s K); NaN where none conducts.
         coupling: Iterations of contact and heat (k,); 0 without heat.
         rigid: Amplitudes of the rigid modes at the end (k, r).
+        flowed: Depth that the surfaces have flown beyond the hardness (k, n), mm.
     """
 
     displacement: Array
@@ -81,6 +83,7 @@ class TimeStepRecords:
     conductance: Array
     coupling: Array
     rigid: Array
+    flowed: Array
 
     def __len__(self) -> int:
         return len(self.force)
@@ -238,6 +241,12 @@ class PartialSlipProblem:
 
         return self._with(heat=None, expanded=expanded)
 
+    def elastic(self) -> PartialSlipProblem:
+        """Return the same whose surfaces are as hard as they like."""
+        interface = copy(self.interface)
+        interface.layers = replace(interface.layers, hardness=np.inf)
+        return self._with(interface=interface)
+
     def with_heat(self, heat: StickHeat | None) -> PartialSlipProblem:
         """Return the same with the heat of friction."""
         return self._with(heat=heat)
@@ -283,10 +292,11 @@ class PartialSlipProblem:
         opening = self.opening(interface.middle, worn)
         state, before = untouched(interface), Imposed(loaded.times(0), opening)
         for k in range(1, program.pressing + 1):
-            imposed = Imposed(loaded.times(k / program.pressing), opening)
+            imposed = Imposed(loaded.times(k / program.pressing), self.opening(interface.middle, worn))
             if interface.creep is not None and len(worn.crept):  # creep comes with the loads
                 state = interface.creep.at(state, k / program.pressing * worn.crept)
             state, before = advance(interface, state, before, imposed, self.friction), imposed
+            worn = interface.layers.flown(worn, state.flowed)
         if program.steps[0].force is not None:
             before = replace(before, displacement=None, force=state.force)
         at = PartialSlipState(state, before, worn, load=load)
@@ -403,7 +413,8 @@ class PartialSlipProblem:
     def _after(self, at: PartialSlipState, state: StickState, imposed: Imposed, step: TimeStep) -> PartialSlipState:
         pressures, trials = at.then(state)
         following = (at.next_step + 1) % len(self.program.steps)
-        after = PartialSlipState(state, imposed, at.worn, following, pressures=pressures, trials=trials, load=at.load)
+        worn = self.interface.layers.flown(at.worn, state.flowed)
+        after = PartialSlipState(state, imposed, worn, following, pressures=pressures, trials=trials, load=at.load)
         if self.laws is None:
             return after
         slipped = np.linalg.norm(state.slip, axis=1)
@@ -470,6 +481,8 @@ class PartialSlipProblem:
             rows = [layers.row(name) for name in DEBRIS]
             thickness = now.between[rows[0]]
             changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
+        if layers.hardness < np.inf and not rate:  # what flows does so as the shape wants it, however long it takes
+            changes[layers.row(PLASTIC)] = records.flowed.sum(axis=0)
         found = replace(worn, between=changes)
         evolution = self.evolution(records, replace(before, next_step=first))
         if evolution is None:
@@ -565,6 +578,7 @@ class PartialSlipProblem:
             *self._heat_record(at, after),
             float(after.coupling),
             state.rigid,
+            np.zeros_like(state.pressure) if state.flowed is None else state.flowed,
         )
         return TimeStepRecords(*(np.asarray(value)[None] for value in values))
 

@@ -5,9 +5,14 @@ delta of the rig where its force is imposed. With the gap g and the slip s of th
 
     p = max(0, p - c g),        t = P(t - c s),        P: projection on abs(t) <= mu p,
 
-are Signorini's conditions and Coulomb's law (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Engrg. 92,
-1991), together with the balance of the rigid modes. Each Newton step solves the linear piece that its
-iterate lies in: open nodes carry nothing, sticking ones do not slip, slipping ones in the plane carry +-mu p.
+are Signorini's conditions and Coulomb's law (P. Alart and A. Curnier, Comput. Methods Appl. Mech. Engrg. 92, 1991),
+together with the balance of the rigid modes. With a hardness H
+
+    p = min(H, max(0, p - c g)):
+
+surfaces that are pressed by H flow by -g, which stays; the limit of their friction is mu H. Each Newton step solves
+the linear piece that its iterate lies in: open nodes carry nothing, flowing ones H, sticking ones do not slip,
+slipping ones in the plane carry +-mu p.
 Both laws stand in one system, so that the coupling of unlike bodies needs no outer iteration.
 
 Coulomb's law with large friction has pieces of opposite orientation: then the step has no or several
@@ -33,13 +38,17 @@ ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
 
 
 class ContactStatus(NamedTuple):
-    """What a Newton step takes each node for: closed (n,), slipping (n,), their trial (n, m), mu p and p there (n,)."""
+    """What a Newton step takes each node for: closed (n,), slipping (n,), their trial (n, m), mu p and p there (n,).
+
+    `flowing` are nodes whose pressure is the hardness (n,).
+    """
 
     closed: Mask
     slipping: Mask
     trial: Array
     radius: Array
     pressure: Array
+    flowing: Mask
 
 
 class SurfaceDisplacement(NamedTuple):
@@ -99,7 +108,7 @@ class Step:
         old += position.modes @ before.rigid - position.drive * before.displacement
         self.free = np.concatenate([imposed.opening + now[: self.n], now[self.n :] - old[self.n :]])
         self.approached = now[: self.n] - old[: self.n] - self.free[: self.n] - closed
-        self.closure = interface.layers.closure
+        self.closure, self.hardness = interface.layers.closure, interface.layers.hardness
         # Scales: c = 1 / scale of each node; lengths that belong to a unit of pressure; the area. One c for both
         # tangents: t = P(t - c s) turns slip against the traction only where c is a number, not a matrix.
         self.scale = np.abs(position.compliance.diagonal()).reshape(self.d, self.n)
@@ -164,6 +173,8 @@ class Step:
             self._give_way(A, b, status, closed)
         if m > 1:
             self._slide(A, b, status, own, len(closed))
+        flows = np.flatnonzero(status.flowing[closed])
+        A[flows], A[flows, flows], b[flows] = 0.0, 1.0, self.hardness
         balance = self.units / (self.length * self.area)
         fill(slice(k, k + r), self.position.balance * balance[:, None])
         b[k : k + r] = -self.imposed.loaded.resultant * balance
@@ -208,11 +219,12 @@ class Step:
         pressure, traction = found.f[:n], found.f[n:].reshape(self.m, n).T
         pushed = pressure - gap / self.scale[0]
         trial = traction - slip / self.scale[1:].T
-        kept = np.maximum(pushed, 0.0)
+        kept = np.clip(pushed, 0.0, self.hardness)
         radius = self.mu * kept
         wrong = max(np.abs(pressure - kept).max(), np.abs(traction - project(trial, radius)).max())
         slipping = (np.linalg.norm(trial, axis=1) > radius) & (pushed > 0)
-        status = ContactStatus(pushed > 0, slipping, trial, radius, np.maximum(pressure, 0.0))
+        flowing = pushed > self.hardness
+        status = ContactStatus(pushed > 0, slipping, trial, radius, np.maximum(pressure, 0.0), flowing)
         return status, float(wrong / max(pressure.max(), 1e-300))
 
     def state(self, found: StatusSolution, iterations: int, *, unique: bool) -> StickState:
@@ -220,8 +232,10 @@ class Step:
         n, position = self.n, self.position
         status, _ = self.status_of(found)
         gap, slip = self.jumps(found)
-        pressure = np.where(status.closed, np.maximum(found.f[:n], 0.0), 0.0)
+        pressure = np.where(status.closed, np.clip(found.f[:n], 0.0, self.hardness), 0.0)
+        pressure[status.flowing] = self.hardness
         traction = project(found.f[n:].reshape(self.m, n).T, self.mu * pressure)
+        flowed = np.where(status.flowing, np.maximum(-gap, 0.0), 0.0)
         gap = np.where(status.closed, 0.0, gap)
         rounding = ROUNDING * pressure.max() * self.scale[1:].T
         stuck = status.closed & (~status.slipping | (np.abs(slip) <= rounding).all(axis=1))
@@ -238,7 +252,7 @@ class Step:
             traction,
             gap,
             slip,
-            self.approached + gap,
+            self.approached + gap - flowed,
             found.rigid,
             found.displacement,
             float(position.pull @ f),
@@ -249,6 +263,7 @@ class Step:
             unique,
             crept=crept,
             beside=self.imposed.beside,
+            flowed=flowed if self.hardness < np.inf else None,
         )
 
     def _moved(self, f: Array) -> SurfaceDisplacement:

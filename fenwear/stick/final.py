@@ -32,6 +32,7 @@ import scipy.optimize
 from fenwear.arrays import Array, Mask
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.errors import ConvergenceError
+from fenwear.layers.between import PLASTIC
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.cycle import PartialSlipProblem, TimeStepRecords
 from fenwear.stick.edge import Edge, beside, stick_edges, zone_width
@@ -144,7 +145,23 @@ def final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None
         ConvergenceError: nothing sticks, so that wear goes on for ever; the contact did not converge.
         CaseError: the bodies lose no heat.
     """
-    return problem.led(partial(_with_heat, problem, stick))
+    return problem.led(partial(_without_flow, problem, stick))
+
+
+def _without_flow(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:
+    """Return the shape of bodies that nowhere flow: elsewhere it depends on the way there."""
+    layers = problem.interface.layers
+    if layers.hardness == np.inf:
+        return _with_heat(problem, stick)
+    at, _ = problem.cycle(problem.beginning())
+    if not at.worn.between[layers.row(PLASTIC)].any():
+        found = _with_heat(problem.elastic(), stick)
+        if found.pressures.max() <= layers.hardness:
+            return found
+    raise ConvergenceError(
+        f"no final shape without plastic flow exists: pressures reach contact.hardness = {layers.hardness:.4g} MPa, "
+        "and what has flown by then depends on the way there. Follow it by `run`"
+    )
 
 
 def _with_heat(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | None) -> FinalShape:

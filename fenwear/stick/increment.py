@@ -54,7 +54,7 @@ def advance(
     if near is not None:
         step = _step(interface, position, before, end, friction)
         try:
-            return _from(step, _status(*near, friction), FEW)
+            return _from(step, _status(*near, friction, step.hardness), FEW)
         except ConvergenceError:
             pass
     try:
@@ -115,7 +115,9 @@ def _advance(
     middle = start.towards(end, 0.5)
     try:
         first = _advance(interface, position, before, start, middle, friction, halvings - 1)
-        rest = replace(end, duration=end.duration - middle.duration)
+        flowed = 0.0 if first.flowed is None else first.flowed
+        middle = replace(middle, opening=middle.opening + flowed)
+        rest = replace(end, duration=end.duration - middle.duration, opening=end.opening + flowed)
         second = _advance(interface, position, first, middle, rest, friction, halvings - 1)
     except ConvergenceError as error:
         raise (whole if isinstance(whole, ManyAnswersError) else error) from None
@@ -126,6 +128,7 @@ def _advance(
         iterations=first.iterations + second.iterations,
         unique=first.unique and second.unique and not isinstance(whole, ManyAnswersError),
         parts=first.parts + second.parts,
+        flowed=None if second.flowed is None else flowed + second.flowed,
     )
 
 
@@ -135,9 +138,9 @@ def _newton(step: Step) -> StickState:
     Raises:
         ConvergenceError: none does.
     """
-    first = _status(step.before.pressure, step.before.trial, step.mu)
+    first = _status(step.before.pressure, step.before.trial, step.mu, step.hardness)
     none = np.zeros_like(first.closed)
-    starts = [first, first._replace(slipping=none), first._replace(closed=~none, slipping=none)]
+    starts = [first, first._replace(slipping=none), first._replace(closed=~none, slipping=none, flowing=none)]
     failure = ConvergenceError("the contact with stick did not converge")
     for status in starts:
         try:
@@ -152,12 +155,13 @@ def _newton(step: Step) -> StickState:
     raise failure
 
 
-def _status(pressure: Array, trial: Array, friction: Array) -> ContactStatus:
+def _status(pressure: Array, trial: Array, friction: Array, hardness: float) -> ContactStatus:
     """Return the contact status of a state of this pressure (n,) and trial (n, m)."""
     closed = pressure > 0
     closed = closed if closed.any() else ~closed
     limit = friction * pressure
-    return ContactStatus(closed, closed & (np.linalg.norm(trial, axis=1) > limit), trial, limit, pressure)
+    slipping = closed & (np.linalg.norm(trial, axis=1) > limit)
+    return ContactStatus(closed, slipping, trial, limit, pressure, pressure >= hardness)
 
 
 def _by_displacement(step: Step, status: ContactStatus, force: float) -> ContactStatus | None:
@@ -206,7 +210,7 @@ def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[Statu
         if wrong < CLOSE:
             return found, iteration, min(signs) > 0
         if not status.closed.any():
-            status = status._replace(closed=np.ones_like(status.closed))
+            status = status._replace(closed=np.ones_like(status.closed), flowing=np.zeros_like(status.closed))
     failed = (
         f"the contact with stick did not converge in {most} Newton steps, residual {wrong:.3g} of the largest pressure"
     )

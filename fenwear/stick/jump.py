@@ -24,10 +24,10 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.interface.placement import Placement
-from fenwear.layers import Evolution
+from fenwear.layers import Evolution, Layers
 from fenwear.layers.between import DEBRIS
 from fenwear.layers.memory import Held
 from fenwear.layers.step import NUDGE
@@ -130,6 +130,7 @@ def _rate(
         ConvergenceError: a time step did not converge, or contact and temperatures over the jump did not.
     """
     program, heat, own = problem.program, problem.heat, (problem.interface.layers.memory, problem.interface.creep)
+    worn = problem.interface.layers.flown_as(worn, at.worn)
     at = problem.shaped(at, worn)
     settled = heat is None and own == (None, None)  # what goes to and fro in a cycle is its own
     for _ in range(1 if program.half_cycles == 2 and settled else program.half_cycles):
@@ -156,13 +157,14 @@ def _rate(
 
 
 def _recorded(problem: PartialSlipProblem, at: PartialSlipState, worn: WornDepths, number: int) -> FrettingCycle:
-    at, creep = problem.shaped(at, worn), problem.interface.creep
+    layers, creep = problem.interface.layers, problem.interface.creep
+    at = problem.shaped(at, layers.flown_as(worn, at.worn))
     first, warm, begin = at.next_step, at.temperature, at
     at, parts = problem.cycle(at)
     rate = problem.worn_in(TimeStepRecords.joined(parts), first, begin, rate=True)
     if creep is not None:
         rate = replace(rate, crept=creep.rate(worn.crept, at.contact.crept, problem.program.period))
-    return FrettingCycle(number, worn, parts, rate, 0.0, first, at, warm=warm)
+    return FrettingCycle(number, layers.flown_as(worn, at.worn), parts, rate, 0.0, first, at, warm=warm)
 
 
 def _course(cycle: FrettingCycle, steps: int) -> HeatHistory:
@@ -323,10 +325,10 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
     fed = None if debris is None else debris.over(slid).fed
     for k in range(len(records)):
         place = steps[(now.first_step + k) % len(steps)].offset if problem.interface.moves else 0.0
-        groups.setdefault((place, (records.pressure[k] > 0).tobytes()), []).append(k)
+        groups.setdefault((place, _answering(layers, records.pressure[k]).tobytes()), []).append(k)
     for (place, _), members in groups.items():
         position = problem.interface.position(place)
-        closed = np.flatnonzero(records.pressure[members[0]] > 0)
+        closed = np.flatnonzero(_answering(layers, records.pressure[members[0]]))
         answer = _stiffness(problem, position, closed, records.pressure[members[0]])  # of pressure to depth
         left = np.zeros((total, len(closed)))
         slopes, kept = np.zeros((2, n)), np.zeros(n)
@@ -359,6 +361,12 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
         A[stored + at, stored + at] -= lost
         A[ejected + at, stored + at] += lost
     return (A if remembered is None else A + remembered.slopes(total)), found
+
+
+def _answering(layers: Layers, pressure: Array) -> Mask:
+    """Return the nodes whose pressure falls by a depth: they touch, and do not flow, but where all do."""
+    found = (pressure > 0) & (pressure < layers.hardness)
+    return found if found.any() else pressure > 0
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,7 @@ class StickState:
         parts: Of the step: more than one where it did not converge as a whole; `slip` and `approach` are their sums.
         crept: State of what creeps, see `fenwear.stick.creep`; empty where nothing does.
         beside: What the strip's supports are moved by beside the displacement (n, d), mm; None for nothing.
+        flowed: Depth that the surfaces have flown in the step (n,), mm; None without a hardness.
     """
 
     pressure: Array
@@ -99,6 +100,7 @@ class StickState:
     parts: int = 1
     crept: Array = field(default_factory=lambda: STIFF)
     beside: Array | None = None
+    flowed: Array | None = None
 
     @property
     def heat(self) -> NDArray[Any]:

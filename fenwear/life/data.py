@@ -10,8 +10,8 @@
 Lines that start with # may set keys of the case for this file (set KEY = VALUE), the amount of sliding
 after which all rows were measured (after), the worn body (body), the standard deviation of the
 measurement (sigma) and the density that turns a lost mass into a volume (density). Columns: x with depth or
-height (the profile of a worn surface; height is minus the depth), or after with volume, mass, depth, friction or
-temperature; sigma belongs to the measured column. Several profiles follow each other with a column after.
+height (the profile of a worn surface; height is minus the depth), or after with volume, mass, depth, scar_width,
+friction or temperature; sigma belongs to the measured column. Several profiles follow each other with a column after.
 """
 
 from __future__ import annotations
@@ -31,7 +31,10 @@ from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
 from fenwear.life.quantities import UNITS, Quantity, of_case, parse_amount
 
-MEASURED = {"depth": "mm", "height": "mm", "volume": "mm^3", "mass": "N*s^2/mm", "friction": "", "temperature": "K"}
+MEASURED = {
+    "depth": "mm", "height": "mm", "volume": "mm^3", "mass": "N*s^2/mm", "scar_width": "mm", "friction": "",
+    "temperature": "K",
+}  # fmt: skip
 PLACES = {"x": "mm"}
 DIRECTIVES = ("set", "after", "body", "sigma", "density")
 LEAST_ROWS = 3

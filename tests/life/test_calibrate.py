@@ -72,6 +72,20 @@ def test_volumes_of_a_ring_give_the_coefficient_that_made_them(small: Callable[.
 
 
 @pytest.mark.slow
+def test_scar_widths_give_the_coefficient() -> None:
+    """Of a cylinder on a ring, rigid: w^3 / (12 R) is worn off, a chord's segment, and sqrt(0.99) w wide scars show."""
+    tables = tomllib.loads((RING / "block_on_ring.toml").read_text("utf-8"))
+    tables["run"] |= {"jump_tolerance": 0.05}
+    case, made, after = make_case(tables), 2.4e-9, np.array([1800.0, 3600.0, 7200.0])
+    area = made * 65.0 / 6.0 * 500.0 * after  # k F s / b
+    widths = np.sqrt(0.99) * np.cbrt(12 * 20.0 * area)
+    series = Series("scar_width", "punch", None, after, "cycles", widths, np.full(3, 0.01), (1, 2, 3))
+    found = calibrate(case, [DataSet("widths", (), (series,))], [K])
+    element = 3.6 / 60  # mm, of which the mesh leaves the edge of a scar open by a half; w goes as the cube root of k
+    assert found.values[K] == pytest.approx(made, rel=3 * element / 2 / float(widths.mean()))
+
+
+@pytest.mark.slow
 def test_volumes_of_a_worn_bushing_give_the_coefficient() -> None:
     """Of a stiff bushing, worn in to psi to each side of the load: k P s / (R D) = psi / cos psi - sin psi.
 

@@ -372,7 +372,7 @@ def _broyden(step: Array, before: list[Array]) -> Array:
     if not before:
         return step
     share = float(before[-1] @ step) / float(before[-1] @ before[-1])
-    return step / (1 - share) if share < MOST_SHARE else step
+    return np.asarray(step / (1 - share)) if share < MOST_SHARE else step
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

@@ -1,4 +1,4 @@
-// Two pads on both faces of a whole disc, as in a caliper, or both on its front. Structured hexahedra.
+// Two pads on both faces of a whole disc, as in a caliper, or both on its front; or one alone. Structured hexahedra.
 //
 // Lengths in mm, angles in degrees; the disc turns about z, its upper (front) face is z = 0, the pads' middles lie on x.
 // Physical groups: every name starts with the body it belongs to, punch_ (the pads) or strip_ (the disc).
@@ -7,7 +7,7 @@ DefineConstant[
   inner_radius = 60,      // of the pads
   outer_radius = 100,
   front_angle = 50,       // of each pad, below 180
-  back_angle = 50,
+  back_angle = 50,        // 0: the front pad is alone
   same_face = 0,          // 1: the second pad lies on the front, too, opposite the first; it keeps its name
   pad_height = 10,
   disc_height = 20,
@@ -27,7 +27,7 @@ EndIf
 If(pad_height <= 0 || disc_height <= 0)
   Error("pad_height and disc_height must be positive");
 EndIf
-If(front_angle <= 0 || front_angle >= 180 || back_angle <= 0 || back_angle >= 180)
+If(front_angle <= 0 || front_angle >= 180 || back_angle < 0 || back_angle >= 180)
   Error("front_angle and back_angle must lie between 0 and 180");
 EndIf
 If(same_face && front_angle + back_angle >= 340)
@@ -39,7 +39,8 @@ EndIf
 
 // The pads: a line along the radius, turned and lifted.
 pads[] = {};
-For k In {0 : 1}
+two = (back_angle > 0);
+For k In {0 : two}
   behind = (k == 1 && !same_face) ? 1 : 0; turn = (k == 1 && same_face) ? -1 : 1;    // -1: half a turn about z
   angle = ((k == 0) ? front_angle : back_angle) * Pi / 180; z = behind ? -disc_height : 0;
   p = newp;
@@ -88,14 +89,19 @@ Coherence;
 
 Physical Volume("punch_pads") = pads[];
 Physical Surface("punch_contact_front") = rubbing_0;
-Physical Surface("punch_contact_back") = rubbing_1;
 Physical Surface("punch_front") = plate_0;
-Physical Surface("punch_back") = plate_1;
-Physical Surface("punch_sides") = {sides_0[], sides_1[]};
-Physical Surface("punch_ends") = {ends_0[], ends_1[]};
+If(two)
+  Physical Surface("punch_contact_back") = rubbing_1;
+  Physical Surface("punch_back") = plate_1;
+  Physical Surface("punch_sides") = {sides_0[], sides_1[]};
+  Physical Surface("punch_ends") = {ends_0[], ends_1[]};
+Else
+  Physical Surface("punch_sides") = sides_0[];
+  Physical Surface("punch_ends") = ends_0[];
+EndIf
 Physical Volume("strip_disc") = disc[];
 Physical Surface("strip_contact_front") = front[];
-If(same_face)
+If(same_face || !two)
   Physical Surface("strip_back") = back[];
 Else
   Physical Surface("strip_contact_back") = back[];

@@ -12,8 +12,8 @@ from fenwear_verify import VerificationCase, registered, run_cases
 # of others, which run on several ranks.
 ONE_RANK = {
     "bushing", "bushing-elastic", "cattaneo-mindlin", "flat-punch", "flat-punch-stick", "galin", "growing-cup",
-    "nafems-cylinder", "nafems-punch", "partial-slip-end", "pin-in-hole", "rounded-punch", "sliding-punch",
-    "sphere-mindlin", "sphere-spence", "sphere-wear-end", "two-bushings", "worn-ball",
+    "nafems-cylinder", "nafems-punch", "pads-apart", "partial-slip-end", "pin-in-hole", "rounded-punch",
+    "sliding-punch", "sphere-mindlin", "sphere-spence", "sphere-wear-end", "two-bushings", "worn-ball",
 }  # fmt: skip
 
 

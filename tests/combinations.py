@@ -85,6 +85,17 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
         ),
     ),
+    "all that lies between": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "contact.third_body={share=0.6, life='0.3 mm'}",
+            "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
+            "contact.hardness='550 MPa'",
+            "punch.creep={terms=[{compliance=0.2, time='2e-3 s'}]}",
+            "wear={punch={coefficient={law='filmed'}}}",
+        ),
+    ),
     "laws with memory": (  # registered in `test_combinations.py`
         "fretting-partial-slip",
         (
@@ -124,6 +135,7 @@ SLIDES = "what slides one way slips at every node after the first of it: gross s
 AROUND = "the model of rings has no displacement around the axis, along which they slide"
 PASSES = "changes as long as a run goes on: a cyclic steady state does not exist"
 DEEPENS = "to and fro the track of a strip that wears deepens for ever, most where every position touches"
+FLOWS = "what flows beyond the hardness depends on the way there: no end is known without it"
 STEPS = "taken anew in steps of a run: what comes of it is no smooth function of other keys"
 
 # Closed cells, by feature, law and way; None for all of them.
@@ -133,6 +145,7 @@ CLOSED: dict[tuple[str, str | None, str | None], str] = {
     ("in rings", "stick (Coulomb)", None): AROUND,
     ("wear by depth and distance", "gross sliding", "steady"): PASSES,
     ("both bodies worn", "gross sliding", "steady"): DEEPENS,
+    ("all that lies between", "stick (Coulomb)", "steady"): FLOWS,
     ("properties of T", None, "sensitivity"): STEPS,
     ("properties of T", None, "calibrate"): STEPS,
 }

@@ -192,7 +192,7 @@ class ContactSetup:
 
     @cached_property
     def sliding_directions(self) -> Array:
-        """Unit vectors of the sliding of each phase in space (m, n, 3), or zero."""
+        """Unit vectors of the sliding of each phase in space (m, n, 3), d e_v, or zero."""
         return np.array(
             [
                 phase.direction * self.field_of(k).direction(own.opposite, own.normal)
@@ -202,7 +202,9 @@ class ContactSetup:
 
     def friction_in_space(self, phase: int, mu: Array) -> Array:
         """Return tau of a phase in space (n, 3), as `phase_friction`."""
-        return self.friction.ratio(self.motion.phases[phase].direction, mu, self.pairs[phase], self.field_of(phase))
+        return self.friction.along(
+            self.sliding_directions[phase], mu, self.pairs[phase], self.motion.phases[phase].direction
+        )
 
     @cached_property
     def wear(self) -> Wear:

@@ -67,6 +67,7 @@ def parse_expression(text: str) -> Function:
     return _build(tree.body, text, DEEPEST)
 
 
+@lru_cache(maxsize=100)
 def variables_of(text: str) -> frozenset[str]:
     """Return which of the variables a valid expression depends on."""
     tree = ast.parse(text.strip(), mode="eval")

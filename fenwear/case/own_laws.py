@@ -211,12 +211,12 @@ def evaluate_of_state(name: str, function: Function, of: Iterable[str], now: Now
 
 
 def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: tuple[int, ...]) -> Array:
-    given = {key: np.array(np.broadcast_to(now[key], shape)) for key in of}
+    given = {key: np.array(np.broadcast_to(now[key], shape) if now[key].shape != shape else now[key]) for key in of}
     try:
         found = np.asarray(function(given))
         if np.iscomplexobj(found):
             raise ValueError("it gives complex numbers")
-        values = found.astype(float)
+        values = found.astype(float)  # a copy of what may be the user's own
     except KeyError as error:
         asked = f"asks for {error}, but is of {', '.join(sorted(given))}"
         raise ValueError(f"{what} {asked}: expected it among what `of` names") from error
@@ -224,4 +224,4 @@ def _called(what: str, function: Function, of: Iterable[str], now: Now, shape: t
         raise ValueError(f"{what} fails: {error}") from error
     if values.shape not in ((), shape):
         raise ValueError(f"{what} gives {values.shape} values; expected one for each of {shape[0]} nodes")
-    return np.broadcast_to(values, shape).copy()
+    return values if values.shape == shape else np.full(shape, values)

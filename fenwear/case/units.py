@@ -74,6 +74,7 @@ def convert(value: object, unit: str) -> float:
     return number
 
 
+@lru_cache(maxsize=500)
 def _convert_text(text: str, unit: str, expected: str) -> float:
     import pint
 

@@ -17,6 +17,7 @@ from fenwear.cycle.totals import PhaseMeter, Totals
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import LayerEvolution, LayerStep
+from fenwear.layers.memory import Held
 from fenwear.sliding.wear import WornDepths
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -60,6 +61,8 @@ class PhaseStep:
         wear = system.wear.phases([conditions], [phase])
         self._passing = system.passing(wear, [phase])
         self._flowed: Array | None = None  # beyond the hardness, in the last solve
+        # Explicitly, wear and what remembers follow the pressure, and do not change it.
+        self._wears_after = not self._constant and not implicit and system.friction.constant
         self._known: list[ContactState] = []  # of the last cycles, the last one first
         self._meter = PhaseMeter(system, phase, self._mu, wear)
 
@@ -99,6 +102,12 @@ class PhaseStep:
             end = self._solve(temperature, gap, start, self._passing, worn)
             self._remember(before, end[0])
             return self._end(*end, before, self._passing, worn)
+
+        if self._wears_after:
+            contact, after, heat = self._solve(temperature, gap, start, self._passing, worn)
+            passing = self._update(contact.pressure[0], temperature, worn, half_cycles, cycle, ended=True)
+            self._remember(before, contact)
+            return self._end(contact, after, heat, before, passing, worn)
 
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
@@ -149,23 +158,30 @@ class PhaseStep:
         worn: WornDepths,
         half_cycles: float,
         cycle: Array | None,
+        *,
+        ended: bool = False,
     ) -> LayerEvolution:
-        """Take friction and wear at this pressure, and at temperature and depths at the start of the phase."""
+        """Take friction and wear at this pressure, and at temperature and depths at the start of the phase.
+
+        Where it is that of the end, the states of laws are those at the end.
+        """
         system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
         conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle)
         evolution = system.evolution([conditions], worn, [self.phase])
+        end: Held | None = None
         if evolution is not None:  # coefficients are those of the states in the middle of the phase
-            (conditions,), _, _ = evolution.through(system.layers.held(worn))
+            (conditions,), end, _ = evolution.through(system.layers.held(worn))
         if not system.friction.constant and isinstance(self._contact, CondensedContact):
             mu = self._mu = system.friction.values(conditions)
             self._friction_ratio = system.phase_friction(self.phase, mu)
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
                 self._thermal.slide(heating_friction(system, mu, self.phase))
-        return system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
+        passing = system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
+        return replace(passing, ended=end) if ended else passing
 
     def _solve(
         self,

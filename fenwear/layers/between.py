@@ -117,7 +117,8 @@ class Layers:
         if self.memory is None or self.begun is None:
             return {}, {}
         held = held or (self.begun if worn is None else self.held(worn))
-        return self.memory.known(np.vstack([held.contact, held.strip @ pair.wear_interpolation.T]))
+        strip = held.strip @ pair.wear_interpolation.T if len(held.strip) else np.zeros((0, self.nodes))
+        return self.memory.known(np.vstack([held.contact, strip]))
 
     def with_held(self, worn: WornDepths, held: Held) -> WornDepths:
         """Return the depths with other states of laws."""

@@ -242,7 +242,10 @@ class Evolution:
         q, held, middles = len(self.memory.contact), start, []
         slopes = _Slopes(*(np.zeros((rows.shape[1], len(rows), len(rows))) for rows in (start.contact, start.strip)))
         for k, (pair, tau) in enumerate(zip(self.pairs, self.durations, strict=True)):
-            begin = np.vstack([held.contact, held.strip @ pair.wear_interpolation.T])
+            onto_nodes = (
+                held.strip @ pair.wear_interpolation.T if len(held.strip) else np.zeros((0, held.contact.shape[1]))
+            )
+            begin = np.vstack([held.contact, onto_nodes])
             middle, end, z = self._over(begin, float(tau), self._under(k))
             middles.append(replace(self.conditions[k], states=self.memory.known(middle)))
             strip, z_strip = held.strip, np.zeros_like(slopes.strip)
@@ -339,13 +342,15 @@ class Evolution:
     def _under(self, k: int) -> _Rates:
         """Return the rates at the contact's nodes in a phase."""
         memory, wears = self.memory, any(WEAR in state.of for state in self.memory.states)
+        conditions = self.conditions[k]
         of_contact: list[Side] = ["punch" if name in memory.of_punch else "mean" for name in memory.contact]
         bodies = [*of_contact, *(cast(Side, "strip") for _ in memory.strip)]
+        without = {body: conditions.of(body) for body in set(bodies)}
 
         def known(values: Array) -> list[Mapping[str, Array]]:
-            now = replace(self.conditions[k], states=memory.known(values))
-            worn = {WEAR: self.worn(k, now)} if wears else {}
-            views = {body: {**now.of(body), **worn} for body in set(bodies)}
+            punch, strip = states = memory.known(values)
+            worn = {WEAR: self.worn(k, replace(conditions, states=states))} if wears else {}
+            views = {body: {**own, **(strip if body == "strip" else punch), **worn} for body, own in without.items()}
             return [views[body] for body in bodies]
 
         return _Rates(list(zip(memory.names, memory.states, strict=True)), known)

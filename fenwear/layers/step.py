@@ -24,12 +24,14 @@ class LayerEvolution:
         wear: Of these phases.
         debris: What they do to it; None without.
         evolution: What they do to the states of laws; None without.
+        ended: States of laws at their end, where they are known.
     """
 
     layers: Layers
     wear: PhasesWear
     debris: DebrisCycle | None
     evolution: Evolution | None = None
+    ended: Held | None = None
 
     @classmethod
     def over(cls, layers: Layers, wear: PhasesWear, slid: Array, evolution: Evolution | None = None) -> LayerEvolution:
@@ -64,7 +66,10 @@ class LayerEvolution:
     def _evolved(self, pressure: Array, before: WornDepths, cycles: float | None) -> Held:
         """Return by how much the states of laws change, as `worn`."""
         assert self.evolution is not None
-        evolution, held = self.evolution.at(pressure), self.layers.held(before)
+        held = self.layers.held(before)
+        if cycles is None and self.ended is not None:
+            return self.evolution.memory.bounded(self.ended) - held
+        evolution = self.evolution.at(pressure)
         if cycles is None:
             return evolution.after(held) - held
         return (evolution.implicit(held, cycles) - held).times(1 / cycles)

@@ -111,15 +111,19 @@ class Friction:
             return mu.values(conditions.of("mean"), conditions.shape, 1.0, "contact.friction")
         return np.full(conditions.shape, float(mu))
 
-    def ratio(self, direction: int, mu: Array, pair: ContactPair, field: SlidingField | None = None) -> Array:
+    def ratio(self, direction: int, mu: Array, pair: ContactPair) -> Array:
         """Return tau, the traction of friction on the punch over the pressure, in space (n, 3).
 
         Args:
-            direction: d, the sign of the sliding.
+            direction: d, the sign of the sliding of the whole motion.
             mu: (n,).
             pair: The contact nodes.
-            field: Of the sliding; by default that of the whole motion.
         """
-        along = (field or self.field).direction(pair.opposite, pair.normal)
-        across = np.cross(in_space(pair.normal), along)
-        return direction * mu[:, None] * along - self.contact.transverse_friction * across
+        return self.along(direction * self.field.direction(pair.opposite, pair.normal), mu, pair, direction)
+
+    def along(self, sliding: Array, mu: Array, pair: ContactPair, direction: int) -> Array:
+        """Return the same where the sliding has the direction d e_v (n, 3)."""
+        if self.contact.transverse_friction == 0:
+            return mu[:, None] * sliding
+        across = direction * np.cross(in_space(pair.normal), sliding)
+        return mu[:, None] * sliding - self.contact.transverse_friction * across

@@ -48,7 +48,7 @@ from fenwear.plausibility import (
     uniques,
 )
 from fenwear.progress import How, Log, Progress
-from fenwear.results import checkpoint, steps
+from fenwear.results import checkpoint, coating, steps
 from fenwear.results.degrees import degrees_of
 from fenwear.results.fields import body_fields, write_fields
 from fenwear.results.history import (
@@ -305,6 +305,7 @@ class _Run:
             self._see_heat(block.system)
             self._see_heat(block.system, block.end)
         self.system = block.system
+        self.extremes |= coating.worn_through(block, self.state, self.extremes)
         self.last, self.state = block, block.end
         self._note("largest_equilibrium_error", block.equilibrium_error)
         self._note("largest_complementarity_error", block.complementarity_error)

@@ -96,6 +96,14 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "wear={punch={coefficient={law='filmed'}}}",
         ),
     ),
+    "a coating": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "wear={punch={coefficient='5e-7 1/MPa', coating={thickness='2e-8 mm', coefficient='1e-7 1/MPa', "
+            "friction=0.6}}}",
+        ),
+    ),
     "laws with memory": (  # registered in `test_combinations.py`
         "fretting-partial-slip",
         (

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Array
+from fenwear.assembly.coatings import check_coatings
 from fenwear.assembly.grids import lay_grids
 from fenwear.assembly.strokes import make_sliding
 from fenwear.bodies.contact_surface import profiled
@@ -150,6 +151,7 @@ def build_bodies(
         elastic_body(case, m, d, theta)
         for m, d, theta in zip(meshes, (case.punch, case.strip), warmed or (None, None), strict=True)
     )
+    check_coatings(case, punch, strip)
     lay_grids(case, make_sliding(case), punch, strip)
     regions = contact_regions(punch), contact_regions(strip)
     of_punch, of_strip = (

@@ -34,6 +34,7 @@ from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, la
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
+from fenwear.sliding.coating import coating_thickness, covering
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
@@ -213,7 +214,20 @@ class ContactSetup:
         for law in self.sliding.wear:
             exponent = 1.0 if law is None else law.speed_exponent
             slid.append(self.motion.sliding(exponent)[:, None] * self.sliding_ratio**exponent)
-        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction)
+        return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings)
+
+    @cached_property
+    def coatings(self) -> tuple[Array | None, Array | None]:
+        """Thickness of the coatings of punch and strip at their own contact nodes, mm; None for a body without.
+
+        Raises:
+            CaseError: it is negative somewhere.
+        """
+        punch, strip = self.sliding.wear
+        return (
+            coating_thickness(punch, self.pair.punch.unworn, "punch"),
+            coating_thickness(strip, self.pair.strip.unworn, "strip"),
+        )
 
     @cached_property
     def layers(self) -> Layers:
@@ -265,7 +279,8 @@ class ContactSetup:
         durations = np.array([self.motion.phases[k].duration for k in chosen])
 
         def wearing(k: int, at: ContactConditions) -> Array:
-            taken = self.wear.phases([at], [chosen[k]]).taken(at.pressure[None])[0]
+            own = self.wear.phases([at], [chosen[k]]).begun(self.unworn() if worn is None else worn)
+            taken = own.taken(at.pressure[None])[0]
             return np.asarray(taken / durations[k])
 
         depth = np.zeros(len(self.pair.strip.weights)) if worn is None else worn.strip
@@ -411,6 +426,7 @@ class ContactSetup:
             self._regions,
             cycle_shear(self, cycle),
             self.layers.known(pair, worn),
+            covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
         )
 
     def friction_ratio(self, direction: int) -> Array:

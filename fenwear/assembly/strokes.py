@@ -62,11 +62,18 @@ def make_sliding(case: Case, parts: int = 1) -> Sliding:
     return Sliding(
         motion,
         sliding_field,
-        Friction(case.contact, sliding_field),
+        friction_of(case, sliding_field),
         (case.wear.punch, case.wear.strip),
         _closed_track(case),
         case.passes and not one_way,
     )
+
+
+def friction_of(case: Case, field: SlidingField) -> Friction:
+    """Return the law of friction of a case, with that of its coatings."""
+    laws = (case.wear.punch, case.wear.strip)
+    punch, strip = (None if law is None or law.coating is None else law.coating.friction for law in laws)
+    return Friction(case.contact, field, (punch, strip))
 
 
 def _sliding_field(case: Case, made: Motion) -> SlidingField:

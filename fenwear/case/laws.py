@@ -12,7 +12,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from fenwear.arrays import Array
 from fenwear.case.dependence import UNITS, VARIABLES, evaluate, parse_expression, variables_of
 from fenwear.case.own_laws import State, check_law, evaluate_law, states_of_law, variables_of_law
-from fenwear.case.quantities import Force, Number, Part, Stress, Unit, quantity
+from fenwear.case.quantities import Force, Length, Number, Part, Stress, Unit, quantity
 from fenwear.case.units import convert, quantity_text
 from fenwear.errors import CaseError, InputError
 
@@ -167,6 +167,67 @@ class Stick(Part):
         return self
 
 
+class OfPlace(Part):
+    """A table whose dependent values depend on the place alone."""
+
+    @model_validator(mode="after")
+    def _place_alone(self) -> Self:
+        for name, unit in self.units().items():
+            value = getattr(self, name)
+            if not isinstance(value, Dependence):
+                continue
+            other = [one for one in VARIABLES if one not in ("x", "y", "z") and value.depends_on(one)]
+            if other or value.regions is not None or value.law is not None:
+                got = other[0] if other else "regions" if value.regions is not None else "a law"
+                raise ValueError(f"{name}: expected an expression or a table of the place x, y, z alone, got {got}")
+            try:
+                value.scale(unit)
+            except ValueError as error:
+                raise ValueError(f"{name}: unit: {error}") from None
+        return self
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {}
+
+
+class Coating(OfPlace):
+    """A coating above the base of a body: it wears by its own coefficient until it is worn through at a place."""
+
+    thickness: constant_or_dependence(Annotated[Length, Field(ge=0)]) = Field(  # type: ignore[valid-type]
+        description="above the base, on the body's own material; of the place where it is uneven; 0 where there is none"
+    )
+    coefficient: Annotated[float | None, Unit("")] = Field(
+        default=None, description="beta~ of the coating, in the unit of that of the base, whose exponents it has"
+    )
+    archard: Annotated[Number, Field(gt=0)] | None = Field(default=None, description="K of the coating")
+    hardness: Annotated[Stress, Field(gt=0)] | None = Field(default=None, description="H of the coating, with archard")
+    energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(gt=0)] | None = Field(
+        default=None, description="volume of the coating worn over the energy of friction"
+    )
+    friction: Annotated[Number, Field(ge=0)] | None = Field(
+        default=None,
+        description="mu of the coating, which over its last tenth goes over to contact.friction; by default that",
+    )
+
+    @model_validator(mode="after")
+    def _one_coefficient(self) -> Self:
+        given = [key for key in ("coefficient", "archard", "energy") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of coefficient, archard and energy, got {' and '.join(given) or 'none'}")
+        if (self.archard is None) != (self.hardness is None):
+            raise ValueError("hardness: expected together with archard, and only then")
+        if self.coefficient is not None and not (math.isfinite(self.coefficient) and self.coefficient > 0):
+            raise ValueError("coefficient: expected a finite number above zero")
+        return self
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {"thickness": "mm"}
+
+
 class WearLaw(Part):
     """Wear rate normal to the surface = beta~ p^b v^a, equation (1).
 
@@ -201,6 +262,9 @@ class WearLaw(Part):
         default=None, description="such as the hardness: more pressure than it wears no more"
     )
     speed_exponent: Annotated[Number, Field(gt=0)] = Field(default=1.0, description="a")
+    coating: Coating | None = Field(
+        default=None, description="above this base, which wears where it is worn through; by default none"
+    )
 
     @staticmethod
     def coefficient_unit(pressure_exponent: float, speed_exponent: float) -> str:
@@ -228,6 +292,13 @@ class WearLaw(Part):
                     converted[key] = convert(data[key], cls.coefficient_unit(*exponents))
                 except ValueError as error:
                     raise ValueError(f"{key}: {error}") from None
+        own = data.get("coating")
+        if isinstance(own, Mapping) and own.get("coefficient") is not None:
+            try:
+                unit = cls.coefficient_unit(*exponents)
+                converted["coating"] = {**own, "coefficient": convert(own["coefficient"], unit)}
+            except ValueError as error:
+                raise ValueError(f"coating.coefficient: {error}") from None
         return converted
 
     @model_validator(mode="after")
@@ -249,17 +320,31 @@ class WearLaw(Part):
             raise ValueError("pressure_cap: expected more than pressure_threshold")
         if (self.archard is None) != (self.hardness is None):
             raise ValueError("hardness: expected together with archard, and only then")
-        if (self.archard, self.energy, self.per_area) != (None, None, None) and (
-            self.pressure_exponent,
-            self.speed_exponent,
-        ) != (1.0, 1.0):
+        if (self.archard, self.energy, self.per_area) != (None, None, None) and self._exponents != (1.0, 1.0):
             raise ValueError(f"{given[0]}: expected with exponents of 1 only; give coefficient or beta")
         if isinstance(self.coefficient, Dependence):
             try:
                 convert(f"1 {self.coefficient.unit}" if self.coefficient.unit else 1.0, self.unit)
             except ValueError as error:
                 raise ValueError(f"coefficient: unit: {error}") from None
+        if self.coating is not None and self.per_area is not None:
+            raise ValueError("coating: expected without per_area")
+        if self.coating is not None and self.coating.coefficient is None and self._exponents != (1.0, 1.0):
+            raise ValueError("coating: expected a coefficient with other exponents than 1")
         return self
+
+    @property
+    def _exponents(self) -> tuple[float, float]:
+        return self.pressure_exponent, self.speed_exponent
+
+    @property
+    def of_coating(self) -> WearLaw | None:
+        """The law by which the coating wears; None without."""
+        own = self.coating
+        if own is None:
+            return None
+        changes = {key: getattr(own, key) for key in ("coefficient", "archard", "hardness", "energy")}
+        return self.model_copy(update={**changes, "beta": None, "coating": None})
 
     @property
     def cap(self) -> float:
@@ -291,6 +376,8 @@ class WearLaw(Part):
         for key in ("coefficient", "beta"):
             if isinstance(getattr(self, key), float):
                 data[key] = quantity_text(getattr(self, key), self.unit)
+        if self.coating is not None and self.coating.coefficient is not None:
+            data["coating"]["coefficient"] = quantity_text(self.coating.coefficient, self.unit)
         return data
 
 

@@ -3,44 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fenwear.case.creep import Creep
-from fenwear.case.dependence import VARIABLES
-from fenwear.case.laws import Dependence, constant_or_dependence
+from fenwear.case.laws import Dependence, OfPlace, constant_or_dependence
 from fenwear.case.quantities import Length, Number, Part, Stress, quantity
 
 STIFFNESS = "MPa/mm"
 
 
-class _OfPlace(Part):
-    """A table whose dependent values depend on the place alone."""
-
-    @model_validator(mode="after")
-    def _place_alone(self) -> Self:
-        for name, unit in self.units().items():
-            value = getattr(self, name)
-            if not isinstance(value, Dependence):
-                continue
-            other = [one for one in VARIABLES if one not in ("x", "y", "z") and value.depends_on(one)]
-            if other or value.regions is not None or value.law is not None:
-                got = other[0] if other else "regions" if value.regions is not None else "a law"
-                raise ValueError(f"{name}: expected an expression or a table of the place x, y, z alone, got {got}")
-            try:
-                value.scale(unit)
-            except ValueError as error:
-                raise ValueError(f"{name}: unit: {error}") from None
-        return self
-
-    @classmethod
-    def units(cls) -> Mapping[str, str]:
-        """Return the units of what may depend on the place, by key."""
-        return {}
-
-
-class ThirdBody(_OfPlace):
+class ThirdBody(OfPlace):
     """Debris that stays between the surfaces as a layer of thickness t >= 0, until it is lost.
 
     Over the sliding distance s of a place, dt/ds = share * (worn depth of both bodies)' - t / life: what is worn is
@@ -65,7 +39,7 @@ class ThirdBody(_OfPlace):
         return {"life": "mm"}
 
 
-class LinearLayer(_OfPlace):
+class LinearLayer(OfPlace):
     """A layer that closes by p / stiffness, after Winkler."""
 
     kind: Literal["linear"] = Field(description="closes in proportion to the pressure")
@@ -118,14 +92,14 @@ class RoughLayer(Part):
 Layers = LinearLayer | PowerLayer | ExponentialLayer | RoughLayer
 
 
-def place_values(value: Any, place: Mapping[str, Any], n: int, unit: str, key: str) -> Any:
+def place_values(value: Any, place: Mapping[str, Any], n: int, unit: str, key: str, least: float = 1e-300) -> Any:
     """Return a constant or what depends on the place at n nodes (n,), in a unit.
 
     Raises:
-        CaseError: it is not positive somewhere; names the key.
+        CaseError: it is less than `least` somewhere, by default not positive; names the key.
     """
     import numpy as np
 
     if isinstance(value, Dependence):
-        return value.values(place, (n,), value.scale(unit), key, least=1e-300)
+        return value.values(place, (n,), value.scale(unit), key, least)
     return np.full(n, float(value))

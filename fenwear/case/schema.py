@@ -20,7 +20,7 @@ from fenwear.case.course import Output, Program, Run
 from fenwear.case.creep import creep_problems
 from fenwear.case.cycle_table import PLACES
 from fenwear.case.diffusion import diffusion_of
-from fenwear.case.laws import Dependence, Stick, Wear
+from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Rotation
 from fenwear.case.names import Names, renamed
@@ -402,11 +402,25 @@ class Case(Part):
                 isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm"))
                 for one in (self.contact.friction, *(law.given_coefficient for law in self.wear.laws))
             ),
+            "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
+                law.coating is not None and not self._one_ratio(law) for law in self.wear.laws
+            ),
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)
             ),
         }
         return [problem for problem, so in wrong.items() if so]
+
+    def _one_ratio(self, law: WearLaw) -> bool:
+        """Return whether the coefficients of a base and its coating have a ratio that stays."""
+        above, given = law.of_coating, law.given_coefficient
+        if above is None or (isinstance(given, Dependence) and given.varies):
+            return False
+        own = law.coating is not None and law.coating.friction is not None
+        changes = own or (isinstance(self.contact.friction, Dependence) and self.contact.friction.varies)
+        changes = changes or any(one.coating is not None and one.coating.friction is not None for one in self.wear.laws)
+        by_friction = [(one.beta, one.energy) != (None, None) for one in (law, above)]
+        return not changes or by_friction[0] == by_friction[1]
 
     @property
     def varies(self) -> bool:

@@ -31,9 +31,9 @@ y_3 = y_2 + h f(y_3). In it such a node loses what its neighbours lose.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 
 import numpy as np
 
@@ -46,7 +46,7 @@ from fenwear.cycle.coupled import Coupled, DepthEvolution
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
 from fenwear.cycle.jump_error import Estimate, area, estimated
 from fenwear.cycle.state import RunState, beginning, joined, parted, present
-from fenwear.cycle.totals import PhaseMeter, Totals
+from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
 from fenwear.interface.pair import lagrange
 from fenwear.layers import Evolution
@@ -59,12 +59,16 @@ LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step c
 PARTS = 8  # of a cycle that does not converge as a whole
 ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which a jump is solved whole, and in halves
 
+# What is worn from depths on in so many cycles, and what they add to the totals, from what they add without coatings.
+ThroughCoatings = Callable[[WornDepths, float, Totals], tuple[WornDepths, Totals]]
+
 
 @dataclass(frozen=True)
 class _Stage:
     """A solved stage: contact of all phases, and what its cycle changes of temperature (dim,), depths and totals.
 
-    Its conductances (m, n) are those by which it is heated; None without heat.
+    Its conductances (m, n) are those by which it is heated; None without heat. What is worn through
+    coatings depends on where a step begins and how long it is: `coated` has that; None without.
     """
 
     contact: ContactState
@@ -72,6 +76,7 @@ class _Stage:
     worn: WornDepths
     adds: Totals
     conductances: Array | None
+    coated: ThroughCoatings | None = None
 
 
 @dataclass(frozen=True)
@@ -85,7 +90,11 @@ class _Moment:
     def after(self, stage: _Stage, cycles: float) -> _Moment:
         """Return the moment so many cycles as that of a stage later."""
         temperature = None if self.temperature is None else self.temperature + cycles * stage.heated
-        return _Moment(self.worn + stage.worn.times(cycles), temperature, self.totals + stage.adds.times(cycles))
+        lost, adds = stage.worn.times(cycles), stage.adds.times(cycles)
+        if stage.coated is not None:
+            own, adds = stage.coated(self.worn, cycles, adds)
+            lost = replace(lost, punch=own.punch, strip=own.strip)
+        return _Moment(self.worn + lost, temperature, self.totals + adds)
 
 
 class _Trend:
@@ -137,7 +146,8 @@ class Stepper:
         self._done, self._load = 0.0, 1.0  # half-cycles at the end of the stage, and the factor of all loads there
         self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
         self._trend = _Trend()  # of what was made last
-        self._follows = bool(system.passing_laws) or system.layers.memory is not None  # coefficients do, within a step
+        passing = bool(system.passing_laws) or system.friction.of_coatings != (None, None)
+        self._follows = passing or system.layers.memory is not None  # coefficients do, within a step
 
     def beginning(self) -> RunState:
         """Return the unworn bodies at their initial temperature."""
@@ -221,7 +231,7 @@ class Stepper:
         evolution = system.evolution(conditions, state.worn)
         if evolution is not None:
             conditions = evolution.around(system.layers.held(state.worn))
-        return system.wear.phases(conditions).worn(pressures)
+        return system.wear.phases(conditions).begun(state.worn).worn(pressures)
 
     def steps(self, state: RunState, cycles: float, count: int) -> RunState:
         """Return the state `cycles` cycles later, by that many equal steps."""
@@ -282,10 +292,10 @@ class Stepper:
         """Return how depths follow in a stage where coefficients depend on them."""
         if not self._follows:
             return None
-        return DepthEvolution(worn, cycles, self._wear, self._done)
+        return DepthEvolution(worn, cycles, partial(self._wear, worn, cycles), self._done)
 
-    def _wear(self, pressure: Array) -> WornDepths:
-        return self.wear.worn(pressure)  # as last taken
+    def _wear(self, before: WornDepths, cycles: float, pressure: Array) -> WornDepths:
+        return self.wear.begun(before, cycles).worn(pressure)  # as last taken
 
     def _press(self, half_cycle: int, cycles: float) -> None:
         """Take the time and the loads so many cycles after a half-cycle."""
@@ -327,7 +337,19 @@ class Stepper:
         creep = self._creep(before.worn, cycles)
         if creep is not None:
             worn = replace(worn, crept=creep.rate(contact.pressure))
-        return _Stage(contact, heated, worn, adds, solved.conductances)
+        return _Stage(contact, heated, worn, adds, solved.conductances, self._through_coatings(contact.pressure))
+
+    def _through_coatings(self, pressure: Array) -> ThroughCoatings | None:
+        """Return what is worn through coatings at pressures (m, n); None without coatings."""
+        wear = self.wear
+        if not wear.coated:
+            return None
+
+        def worn(before: WornDepths, cycles: float, adds: Totals) -> tuple[WornDepths, Totals]:
+            found = wear.begun(before, cycles).worn(pressure).times(cycles)
+            return found, with_coated(self.system, adds, found)
+
+        return worn
 
     def _solve(
         self, gap: Array, start: ContactState | None, begin: tuple[WornDepths, float], coupling: Array | None = None
@@ -380,6 +402,9 @@ class Stepper:
         depths, totals = [after.worn], [after.totals]
         adds = self._adds(np.concatenate([contact.pressure for contact in contacts]))
         phases = list(range(len(contacts)))
+        if self.wear.coated:
+            own_worn = [self._worn([k], contacts, after.worn) for k in phases]
+            adds = [with_coated(self.system, one, lost) for one, lost in zip(adds, own_worn, strict=True)]
         for stroke in reversed(range(1, motion.half_cycles)):
             own = phases[stroke * motion.positions : (stroke + 1) * motion.positions]
             depths.insert(0, depths[0] - self._worn(own, contacts, depths[0]))

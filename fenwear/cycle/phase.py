@@ -13,7 +13,7 @@ from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.cycle.thermal import ThermalContact
-from fenwear.cycle.totals import PhaseMeter, Totals
+from fenwear.cycle.totals import PhaseMeter, Totals, with_coated
 from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import LayerEvolution, LayerStep
@@ -272,7 +272,7 @@ class PhaseStep:
             if creep is not None:
                 crept = creep.change(self.phase, worn.crept, pressure, self._friction_ratio, self._load)
                 lost = replace(lost, crept=crept)
-            return meter(pressure), lost
+            return with_coated(self.system, meter(pressure), lost), lost
 
         adds, lost = self.system.team.lead(left)
         record = PhaseRecord(self.phase, contact, previous, adds, self._friction_ratio)

@@ -31,7 +31,7 @@ from fenwear.arrays import Array
 from fenwear.assembly import ContactSetup
 from fenwear.interface import RigidEquilibrium
 from fenwear.sliding.friction import ContactConditions
-from fenwear.sliding.wear import PhasesWear
+from fenwear.sliding.wear import PhasesWear, WornDepths
 
 SUMS = (
     "distance", "load_path", "load_distance", "drag_distance", "work", "volume_punch", "mass_punch", "volume_strip",
@@ -112,7 +112,7 @@ class PhaseMeter:
             weigh = np.array([areas, np.full(len(areas), np.nan) if density is None else MILLIGRAM * density * areas])
             if own is None:
                 self._rows[first + 1] = 0.0 * weigh[1]
-            elif own.law.linear:
+            elif own.linear:
                 self._rows[first : first + 2] = weigh * own.rate[0]
             else:
                 self._curved.append((slice(first, first + 2), weigh, own))
@@ -128,6 +128,29 @@ class PhaseMeter:
         for rows, weigh, body in self._curved:
             sums[rows] = weigh @ body.depth(pressure[None])[0]
         return Totals(sums, self._energy * pressure, self._share * pressure)
+
+
+def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Totals:
+    """Return what is added where bodies are coated: their worn volume and mass by the depths themselves.
+
+    Args:
+        system: The bodies.
+        totals: What is added otherwise.
+        lost: Depths worn meanwhile.
+    """
+    if all(one is None for one in system.coatings):
+        return totals
+    sums = totals.sums.copy()
+    rows = zip(
+        ("punch", "strip"), system.coatings, (system.pair.weights, system.pair.strip.weights),
+        (lost.punch, lost.strip), system.bodies.densities, strict=True,
+    )  # fmt: skip
+    for body, coating, weights, depth, density in rows:
+        if coating is not None:
+            areas, first = system.bodies.punch.thickness * weights, SUMS.index(f"volume_{body}")
+            mass = np.nan if density is None else float(MILLIGRAM * (areas * density) @ depth)
+            sums[first : first + 2] = float(areas @ depth), mass
+    return Totals(sums, totals.energy, totals.pressure)
 
 
 def _along_approach(system: ContactSetup, phase: int, mu: Array) -> Array:

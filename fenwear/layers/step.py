@@ -49,7 +49,7 @@ class LayerEvolution:
             cycles: Of a step that is implicit, for each of which changes are returned; None for the phases once.
             flowed: What is added to the plastic depth (n,), mm; by default nothing.
         """
-        worn = self.wear.worn(pressure)
+        worn = self.wear.begun(before, cycles).worn(pressure)
         if not len(before.between) and not len(before.carried):
             return worn
         changes = np.zeros_like(before.between)
@@ -85,7 +85,7 @@ class LayerEvolution:
         """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
         if self.debris is None:
             return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
-        taken, thickness = self.wear.taken(pressure), before.between[self.layers.row(DEBRIS[0])]
+        taken, thickness = self.wear.begun(before, cycles).taken(pressure), before.between[self.layers.row(DEBRIS[0])]
         if cycles is None:
             return self.debris.change(thickness, taken)
         return self.debris.rate(thickness, taken, cycles)
@@ -137,7 +137,11 @@ class LayerStep:
 
     @property
     def _wear(self) -> StepWear:
-        return StepWear(self.passing.wear, self._length)
+        return StepWear(self._worn, self._length)
+
+    @property
+    def _worn(self) -> PhasesWear:
+        return self.passing.wear.begun(self.before, self.cycles)
 
     def opening(self, pressure: Array) -> Array:
         """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
@@ -190,7 +194,7 @@ class LayerStep:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
         passing, found = self.passing, np.zeros_like(pressure)
         if passing.debris is not None:
-            found = passing.debris.slope(self.cycles) * passing.wear.taken_slope(pressure)
+            found = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
         filled = passing.filled(pressure, self.before, self.cycles) if self._fills else None
         if filled is None:
             return found

@@ -35,8 +35,8 @@ TEXTS = {
     "convergence": "(a) Largest change of pressure against one cycle ago, over the pressure scale (integral of p² "
     "over integral of p), and (b) share of the load that is carried elsewhere than in the optimum, over the {axis}.",
     "temperature": "Temperature along the contact surfaces of (a) the punch and (b) the strip at {chosen}.",
-    "between": "What lies between the surfaces along the contact at {chosen}: debris, plastic depth, and what laws "
-    "remember there, where there are any.",
+    "between": "What lies between the surfaces along the contact at {chosen}: debris, plastic depth, what is left "
+    "of coatings, and what laws remember there, where there are any.",
     "heat_balance": "Heat of each half-cycle over the {axis}: what friction makes is the sum of the others.",
     "boundary_temperature": "Temperature (a) round the punch from the middle of its contact on, corners by (x, z) in "
     "mm, and (b) along the strip's upper surface, grey under the punch, at half-cycle {last}.",

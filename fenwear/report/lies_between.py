@@ -1,4 +1,4 @@
-"""What lies between the surfaces along a contact: debris, plastic depth, states that laws remember."""
+"""What lies between the surfaces along a contact: debris, plastic depth, coatings, states that laws remember."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DEPTHS = {"debris_thickness": "thickness of the debris (µm)", "plastic_depth": "plastic depth (µm)"}
+DEPTHS |= {"coating": "coating left on the punch (µm)", "coating_strip": "coating left on the strip (µm)"}
 STATE, ON_STRIP = "state_", "_strip"
 
 

@@ -25,7 +25,7 @@ from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.results import creep, table_cycle
+from fenwear.results import coating, creep, table_cycle
 from fenwear.results.scar import ScarGeometry, scar_geometry
 from fenwear.results.zone import without_noise
 
@@ -250,6 +250,17 @@ LINES = {
     "stick_width_within_mm": Line("half the interval of that width", "mm"),
     "stick_area_mm2": Line("area that sticks all through it", "mm²"),
     "stick_area_within_mm2": Line("half the interval of that area", "mm²"),
+    **{
+        f"{body}_coating_{key}": Line(words.format(body), unit)
+        for body in ("punch", "strip")
+        for key, words, unit in (
+            ("first_through_half_cycle", "coating of the {} worn through first in half-cycle", ""),
+            ("first_through_at_x_mm", "... at x", "mm"),
+            ("first_through_at_y_mm", "... at y", "mm"),
+            ("first_through_at_z_mm", "... at z", "mm"),
+            ("last_through_half_cycle", "... last so far in half-cycle", ""),
+        )
+    },
     "plastic_volume_mm3": Line("plastic volume, apart from wear", "mm³"),
     "largest_plastic_depth_mm": Line("... depth, largest", "µm", 1e3),
     "debris_volume_mm3": Line("debris between the surfaces", "mm³"),
@@ -269,6 +280,8 @@ LINES = {
     "depth_per_million_cycles_mm": Line("largest depth per million cycles, last", "µm", 1e3),
     "mean_cross_shear": Line("cross-shear ratio, mean over the work of friction", ""),
     "largest_cross_shear": Line("... largest", ""),
+    "coating_worn_through": Line("coating worn through, share of it", "%", 100),
+    "least_coating_mm": Line("... least that is left", "µm", 1e3),
     "creep_volume_mm3": Line("crept volume, apart from wear", "mm³"),
     "largest_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
     "layer_creep_volume_mm3": Line("crept volume of the layer", "mm³"),
@@ -334,7 +347,7 @@ def sheet(last: Block) -> dict[str, Any]:
         own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
         if own:
             own |= _diameters(own) | table_cycle.body_numbers(last, body)
-        if own := own | creep.body_numbers(last, body):
+        if own := own | creep.body_numbers(last, body) | coating.body_numbers(last, body):
             found[body] = own
     return found
 

@@ -37,6 +37,8 @@ class ContactConditions:
         cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
             straight at the present pressure.
         states: That laws of one's own remember (n,), by their names: as those of punch and strip know them.
+        covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`; None
+            for a body without one, or where all is worn through.
     """
 
     pressure: Array
@@ -48,6 +50,7 @@ class ContactConditions:
     regions: tuple[Mapping[str, Array], Mapping[str, Array]]
     cycle: CycleShear | None = None
     states: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
+    covered: tuple[Array | None, Array | None] = (None, None)
 
     @classmethod
     def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
@@ -90,15 +93,18 @@ class Friction:
     Attributes:
         contact: mu and mu_d.
         field: Of the sliding.
+        of_coatings: mu of the coatings of punch and strip; None where there is none of its own.
     """
 
     contact: Contact
     field: SlidingField = ALONG_X
+    of_coatings: tuple[float | None, float | None] = (None, None)
 
     @property
     def constant(self) -> bool:
         """Whether mu depends on nothing but the place."""
-        return not (isinstance(self.contact.friction, Dependence) and self.contact.friction.varies)
+        varies = isinstance(self.contact.friction, Dependence) and self.contact.friction.varies
+        return not varies and self.of_coatings == (None, None)
 
     def values(self, conditions: ContactConditions) -> Array:
         """Return mu at the nodes (n,).
@@ -108,8 +114,13 @@ class Friction:
         """
         mu = self.contact.friction
         if isinstance(mu, Dependence):
-            return mu.values(conditions.of("mean"), conditions.shape, 1.0, "contact.friction")
-        return np.full(conditions.shape, float(mu))
+            found = mu.values(conditions.of("mean"), conditions.shape, 1.0, "contact.friction")
+        else:
+            found = np.full(conditions.shape, float(mu))
+        for of_coating, share in zip(reversed(self.of_coatings), reversed(conditions.covered), strict=True):
+            if of_coating is not None and share is not None:  # the punch's before the strip's, where both have one
+                found = found + share * (of_coating - found)
+        return found
 
     def ratio(self, direction: int, mu: Array, pair: ContactPair) -> Array:
         """Return tau, the traction of friction on the punch over the pressure, in space (n, 3).

@@ -18,6 +18,7 @@ from scipy.sparse import csr_array, diags_array
 from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
 from fenwear.interface import ContactPair
+from fenwear.sliding.coating import Shares, left_of, shares
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
 
@@ -69,14 +70,48 @@ class _BodyWear:
 
     rate: Array
     law: PressureLaw
+    coating: _CoatingWear | None = None
 
-    def depth(self, pressure: Array) -> Array:
-        """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes."""
-        return self.rate * self.law.value(pressure)
+    def depth(self, pressure: Array, worn: Shares | None = None) -> Array:
+        """Return the depths (m, n), mm, of pressures (m, n) at the interface nodes.
 
-    def slope(self, pressure: Array) -> Array:
+        Args:
+            pressure: MPa.
+            worn: What of coating and base there; by default of the base alone.
+        """
+        return self._rate(worn, slope=False) * self.law.value(pressure)
+
+    def slope(self, pressure: Array, worn: Shares | None = None) -> Array:
         """Return their derivatives to the pressures (m, n), mm/MPa."""
-        return self.rate * self.law.slope(pressure)
+        return self._rate(worn, slope=True) * self.law.slope(pressure)
+
+    def _rate(self, worn: Shares | None, *, slope: bool) -> Array:
+        if worn is None or self.coating is None:
+            return self.rate
+        of = (worn.by_coating, worn.by_base) if slope else (worn.coating, worn.base)
+        return self.coating.rate * of[0] + self.rate * of[1]
+
+    @property
+    def linear(self) -> bool:
+        """Whether wear is in proportion to the pressure."""
+        return self.law.linear and (self.coating is None or self.coating.left is None)
+
+
+@dataclass(frozen=True)
+class _CoatingWear:
+    """What a coating would lose in each phase: beta~ S (m, n), mm/MPa^b, as of `_BodyWear`.
+
+    Attributes:
+        rate: Of the coating.
+        thickness: At the body's own contact nodes, mm.
+        left: Of it where a step begins; None where it is worn through everywhere.
+        cycles: Length of the step, by which what is worn in a cycle is that of the whole step over it.
+    """
+
+    rate: Array
+    thickness: Array
+    left: Array | None = None
+    cycles: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -108,32 +143,81 @@ class PhasesWear:
     def some(self, phases: Sequence[int]) -> PhasesWear:
         """Return the wear of some of the phases."""
         chosen = list(phases)
-        punch, strip = (
-            None if body is None else replace(body, rate=body.rate[chosen]) for body in (self.punch, self.strip)
-        )
+        punch, strip = (None if body is None else _some(body, chosen) for body in (self.punch, self.strip))
         return PhasesWear(punch, strip, [self.pairs[k] for k in chosen])
+
+    @property
+    def coated(self) -> bool:
+        """Whether a body has a coating."""
+        return any(body is not None and body.coating is not None for body in (self.punch, self.strip))
+
+    def begun(self, worn: WornDepths, cycles: float | None = None) -> PhasesWear:
+        """Return the wear from these depths on, through the coatings that are left there.
+
+        Args:
+            worn: Depths where a step begins.
+            cycles: Of the step, of which each is worn the same; None for the phases once.
+        """
+        if not self.coated:
+            return self
+        parts = []
+        for body, depth in ((self.punch, worn.punch), (self.strip, worn.strip)):
+            if body is None or body.coating is None:
+                parts.append(body)
+                continue
+            left = left_of(body.coating.thickness, depth)
+            coating = replace(body.coating, left=left, cycles=1.0 if cycles is None else cycles)
+            parts.append(replace(body, coating=coating))
+        return replace(self, punch=parts[0], strip=parts[1])
+
+    def _shares(self, body: _BodyWear | None, pressure: Array) -> Shares | None:
+        """Return what is worn of coating and base of a body, at its own nodes; None where all is of the base."""
+        if body is None or body.coating is None or body.coating.left is None:
+            return None
+        felt, own = body.law.value(pressure), body.coating
+        if body is self.punch:
+            coating, base = (np.asarray((rate * felt).sum(axis=0)) for rate in (own.rate, body.rate))
+        else:
+            coating, base = (
+                np.sum([pair.wear_projection @ one for pair, one in zip(self.pairs, rate * felt, strict=True)], axis=0)
+                for rate in (own.rate, body.rate)
+            )
+        return shares(own.cycles * coating, own.cycles * base, own.left)
+
+    def _at_contact(self, pressure: Array) -> tuple[Shares | None, Shares | None]:
+        """Return what is worn of coatings and bases, at the contact's nodes."""
+        punch, strip = self._shares(self.punch, pressure), self._shares(self.strip, pressure)
+        return punch, None if strip is None else strip.at(self.pairs[0].wear_interpolation)
 
     def depth(self, pressure: Array) -> Array:
         """Return the depth worn off the punch in each phase (m, n), mm."""
-        return np.zeros_like(pressure) if self.punch is None else self.punch.depth(pressure)
+        if self.punch is None:
+            return np.zeros_like(pressure)
+        return self.punch.depth(pressure, self._shares(self.punch, pressure))
 
     def taken(self, pressure: Array) -> Array:
         """Return the depths worn off both bodies together at the contact nodes in each phase (m, n), mm."""
-        bodies = [body.depth(pressure) for body in (self.punch, self.strip) if body is not None]
-        return np.asarray(sum(bodies, np.zeros_like(pressure)))
+        bodies = zip((self.punch, self.strip), self._at_contact(pressure), strict=True)
+        depths = [body.depth(pressure, worn) for body, worn in bodies if body is not None]
+        return np.asarray(sum(depths, np.zeros_like(pressure)))
 
     def taken_slope(self, pressure: Array) -> Array:
         """Return the derivatives of `taken` to the pressures (m, n), mm/MPa."""
-        bodies = [body.slope(pressure) for body in (self.punch, self.strip) if body is not None]
-        return np.asarray(sum(bodies, np.zeros_like(pressure)))
+        slopes = [slope for slope in self.by_body(pressure) if slope is not None]
+        return np.asarray(sum(slopes, np.zeros_like(pressure)))
 
     def worn(self, pressure: Array) -> WornDepths:
         """Return what all phases wear off both bodies at pressures (m, n)."""
         first = self.pairs[0]
         strip = np.zeros(len(first.strip.weights))
         if self.strip is not None:
-            for pair, depth in zip(self.pairs, self.strip.depth(pressure), strict=True):
-                strip += pair.wear_projection @ depth
+            worn, coating = self._shares(self.strip, pressure), self.strip.coating
+            for k, (pair, depth) in enumerate(zip(self.pairs, self.strip.depth(pressure), strict=True)):
+                of_base = pair.wear_projection @ depth
+                if worn is not None and coating is not None:
+                    of_coating = pair.wear_projection @ (coating.rate[k] * self.strip.law.value(pressure[k]))
+                    of_base = worn.coating * of_coating + worn.base * of_base
+                strip += of_base
         return WornDepths(self.depth(pressure).sum(axis=0), strip)
 
     def opening(self, pressure: Array) -> Array:
@@ -153,33 +237,48 @@ class PhasesWear:
         strip = 0
         if self.punch is not None:
             nodes, strip = np.arange(n), n
-            right[:, nodes, nodes] = self.punch.slope(pressure)
+            right[:, nodes, nodes] = self.punch.slope(pressure, self._shares(self.punch, pressure))
         if self.strip is not None:
-            for k, slope in enumerate(self.strip.slope(pressure)):
-                right[k, strip:] = self.pairs[k].wear_projection.toarray() * slope
+            for k, slope in enumerate(self._strip_slopes(pressure)):
+                right[k, strip:] = slope.toarray()
         return self._left, right
+
+    def _strip_slopes(self, pressure: Array) -> list[csr_array]:
+        """Return the depth of the strip's nodes by unit pressures of each phase (n_strip, n), mm/MPa."""
+        assert self.strip is not None
+        worn, coating, found = self._shares(self.strip, pressure), self.strip.coating, list[csr_array]()
+        for k, slope in enumerate(self.strip.slope(pressure)):
+            onto = self.pairs[k].wear_projection
+            of_base = csr_array(onto @ diags_array(slope))
+            if worn is not None and coating is not None:
+                of_coating = onto @ diags_array(coating.rate[k] * self.strip.law.slope(pressure)[k])
+                of_base = csr_array(diags_array(worn.by_coating) @ of_coating + diags_array(worn.by_base) @ of_base)
+            found.append(of_base)
+        return found
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return what unit pressures wear off punch and strip at pressures (m, n), mm/MPa; None where one does not."""
-        punch, strip = (None if body is None else body.slope(pressure) for body in (self.punch, self.strip))
+        bodies = zip((self.punch, self.strip), self._at_contact(pressure), strict=True)
+        punch, strip = (None if body is None else body.slope(pressure, worn) for body, worn in bodies)
         return punch, strip
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes (m, n), mm/MPa; None where others open, too."""
         if self.strip is not None or self.punch is None:
             return None
-        return self.punch.slope(pressure)
+        return self.punch.slope(pressure, self._shares(self.punch, pressure))
 
     def slopes(self, pressure: Array) -> list[csr_array]:
         """Return the gap opened in the first phase by unit pressures of each phase (n, n), the same as L_1 R_k."""
         m, n = pressure.shape
         found = [csr_array((n, n)) for _ in range(m)]
         if self.punch is not None:
-            found = [csr_array(diags_array(slope)) for slope in self.punch.slope(pressure)]
+            slopes = self.punch.slope(pressure, self._shares(self.punch, pressure))
+            found = [csr_array(diags_array(slope)) for slope in slopes]
         if self.strip is not None:
             material = self.pairs[0].wear_interpolation
-            for k, slope in enumerate(self.strip.slope(pressure)):
-                found[k] = csr_array(found[k] + material @ (self.pairs[k].wear_projection @ diags_array(slope)))
+            for k, slope in enumerate(self._strip_slopes(pressure)):
+                found[k] = csr_array(found[k] + material @ slope)
         return found
 
     @cached_property
@@ -191,6 +290,12 @@ class PhasesWear:
         if self.strip is not None:
             parts.append(np.array([pair.wear_interpolation.toarray() for pair in self.pairs]))
         return np.concatenate(parts, axis=2)
+
+
+def _some(body: _BodyWear, phases: list[int]) -> _BodyWear:
+    """Return the wear of a body in some of the phases."""
+    coating = None if body.coating is None else replace(body.coating, rate=body.coating.rate[phases])
+    return replace(body, rate=body.rate[phases], coating=coating)
 
 
 @dataclass(frozen=True)
@@ -242,6 +347,7 @@ class Wear:
         sliding: Of each body S, the integral of v^a over each phase at each node, (m, n) each, mm^a s^(1-a).
         pairs: The surfaces opposite each other in each phase.
         friction: Enters where the case gives beta or the energy of friction.
+        coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
     """
 
     punch: WearLaw | None
@@ -249,11 +355,13 @@ class Wear:
     sliding: tuple[Array, Array]
     pairs: Sequence[ContactPair]
     friction: Friction
+    coatings: tuple[Array | None, Array | None] = (None, None)
 
     @property
     def constant(self) -> bool:
         """Whether no coefficient depends on more than the place."""
-        laws = [law for law in (self.punch, self.strip) if law is not None]
+        both = [law for law in (self.punch, self.strip) if law is not None]
+        laws = [one for law in both for one in (law, law.of_coating) if one is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
         given = [law.given_coefficient for law in laws]
         dependent = any(isinstance(one, Dependence) and one.varies for one in given)
@@ -271,15 +379,19 @@ class Wear:
         """
         chosen = range(len(self.pairs)) if which is None else which
         bodies: list[_BodyWear | None] = []
-        for law, sliding, key in zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), strict=True):
+        given = zip((self.punch, self.strip), self.sliding, ("wear.punch", "wear.strip"), self.coatings, strict=True)
+        for law, sliding, key, thickness in given:
             if law is None:
                 bodies.append(None)
                 continue
-            rates = [
-                sliding[k] * coefficient(law, self.friction, state, key)
-                for k, state in zip(chosen, conditions, strict=True)
-            ]
-            bodies.append(_BodyWear(np.array(rates), PressureLaw.of(law)))
+
+            def rates(law: WearLaw, sliding: Array = sliding, key: str = key) -> Array:
+                numbered = zip(chosen, conditions, strict=True)
+                return np.array([sliding[k] * coefficient(law, self.friction, state, key) for k, state in numbered])
+
+            above = law.of_coating
+            coating = None if above is None or thickness is None else _CoatingWear(rates(above), thickness)
+            bodies.append(_BodyWear(rates(law), PressureLaw.of(law), coating))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
 
 

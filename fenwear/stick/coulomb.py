@@ -334,7 +334,7 @@ class HalfCycles(_Run):
         before = np.full_like(records.pressure, np.nan) if begin.pressures is None else begin.pressures[own]
         lost = problem.worn_in(records, first, begin)
         worn = replace(begin.worn + lost, crept=at.contact.crept)
-        adds = self.meter(records, first)
+        adds = self.meter(records, first, lost)
         totals = state.totals + adds
         stroke, n = state.half_cycle % self.strokes, len(problem.weights)
         stuck = _known_stuck(state.memory, self.strokes, n)
@@ -390,9 +390,9 @@ class Jumps(_Run):
         at_all = np.asarray(stuck.all(axis=0))
         made, contacts = [], []
         depths, sums = [then.worn], [totals]
-        adds = [self.meter(records, first) for first, records in parts]
         ended = replace(then.end, worn=then.worn, held=None)
         lost = [problem.worn_in(records, first, ended) for first, records in parts]
+        adds = [self.meter(records, first, own) for (first, records), own in zip(parts, lost, strict=True)]
         for k in reversed(range(1, strokes)):
             depths.insert(0, depths[0] - lost[k])
             sums.insert(0, sums[0] - adds[k])
@@ -425,7 +425,7 @@ class Jumps(_Run):
 
     def _adds(self, now: FrettingCycle, then: FrettingCycle, cycles: int) -> Totals:
         """Return what a jump adds: by the trapezoidal rule, but for the wear, which is that of its depths."""
-        adds = [self.meter(one.records, one.first_step) for one in (now, then)]
+        adds = [self.meter(one.records, one.first_step, one.rate) for one in (now, then)]
         found = (adds[0] + adds[1]).times(cycles / 2)
         return self.meter.with_wear(found, then.worn - now.worn)
 
@@ -469,8 +469,8 @@ class Meter:
         self.system, self.problem = system, problem
         self.thickness = system.bodies.punch.thickness
 
-    def __call__(self, records: TimeStepRecords, first: int) -> Totals:
-        """Return what time steps add, the first of them that of this number in the cycle."""
+    def __call__(self, records: TimeStepRecords, first: int, worn: WornDepths) -> Totals:
+        """Return what time steps add, the first of them that of this number in the cycle, which wear these depths."""
         problem, thick = self.problem, self.thickness
         slid, pressure = records.slip_magnitude, records.pressure
         forces = pressure @ problem.weights
@@ -491,7 +491,7 @@ class Meter:
         energy = records.dissipated.sum(axis=0)
         share = records.duration / records.duration.sum()
         found = Totals(np.array([sums[name] for name in SUMS]), energy, share @ pressure)
-        return self.with_wear(found, problem.worn_in(records, first))
+        return self.with_wear(found, worn)
 
     def with_wear(self, totals: Totals, worn: WornDepths) -> Totals:
         """Return the totals with the volumes and masses of these depths."""

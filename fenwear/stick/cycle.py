@@ -17,6 +17,7 @@ from fenwear.interface.placement import HERE, Placement, in_model
 from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.memory import Held
+from fenwear.sliding.coating import CoatedBody
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.screw import Screw
 from fenwear.sliding.wear import WornDepths
@@ -49,7 +50,8 @@ class TimeStepRecords:
         dissipated: Friction's work of each node over its area (k, n), N/mm.
         closing: Work of the pressure on gaps that close or open in the step (k,): of the step's size, it vanishes
             with it.
-        punch_depth, strip_depth: Worn off each body in the step, at the contact nodes (k, n), mm.
+        punch_depth, strip_depth: Worn off each body in the step, at the contact nodes (k, n), mm; of a coated one as if
+            all of it were of the coating.
         strain: Of the strip's surface opposite each node, along and across the sliding (k, n, m).
         iterations: Newton steps (k,).
         unique: Whether the answer was the only one near (k,).
@@ -198,6 +200,7 @@ class PartialSlipProblem:
         watch: Called before every time step: may raise InterruptedRunError.
         expanded: What loads do with a thermal expansion that stays as it is, at an offset of the strip.
         laws: Of friction and wear that change with the state of each node; None where `friction` and `wear` stay.
+        coatings: Of both bodies, whose `wear` is then that of the coating; None for a body without.
     """
 
     def __init__(
@@ -210,8 +213,9 @@ class PartialSlipProblem:
         heat: StickHeat | None = None,
         expanded: Callable[[LoadEffect, float | Placement], LoadEffect] = lambda loaded, _: loaded,
         laws: LocalLaws | None = None,
+        coatings: tuple[CoatedBody | None, CoatedBody | None] = (None, None),
     ) -> None:
-        self.expanded, self.laws = expanded, laws
+        self.expanded, self.laws, self.coatings = expanded, laws, coatings
         self.interface, self.program, self.wear, self.friction = interface, program, wear, friction
         self.weights, self.watch, self.heat = interface.middle.pair.weights, watch, heat
         self._gradient = surface_gradient(interface.middle.pair.punch)
@@ -222,7 +226,7 @@ class PartialSlipProblem:
 
     def _with(self, **changed: Any) -> PartialSlipProblem:
         """Return the same with other arguments."""
-        names = ("interface", "program", "wear", "friction", "watch", "heat", "expanded", "laws")
+        names = ("interface", "program", "wear", "friction", "watch", "heat", "expanded", "laws", "coatings")
         return PartialSlipProblem(**{**{name: getattr(self, name) for name in names}, **changed})
 
     def led(self, function: Callable[[], T]) -> T:
@@ -450,15 +454,16 @@ class PartialSlipProblem:
         return at, found
 
     def worn_in(
-        self, records: TimeStepRecords, first: int, before: PartialSlipState | None = None, *, rate: bool = False
+        self, records: TimeStepRecords, first: int, before: PartialSlipState, *, rate: bool = False
     ) -> WornDepths:
         """Return what the steps of a record wear off both bodies, and what becomes of what lies between.
 
         Args:
             records: Of steps one after the other.
             first: Number of the first of them in the cycle.
-            before: Where they began, with the state of what lies between; by default that is left out.
-            rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps.
+            before: Where they began, with the state of what lies between.
+            rate: Whether it is that of a cycle that goes on for ever, for jumps, not the change in these steps: of a
+                coated body then as if all of it were of the coating.
         """
         pair, steps = self.interface.middle.pair, self.program.steps
         strip = np.zeros(len(pair.strip.weights))
@@ -468,7 +473,34 @@ class PartialSlipProblem:
                 depth = records.strip_depth[[k for k, own in enumerate(places) if own == place]].sum(axis=0)
                 strip += self.interface.position(place).pair.wear_projection @ depth
         worn = WornDepths(records.punch_depth.sum(axis=0), strip)
-        return worn if before is None else self._with_between(worn, records, first, before, rate=rate)
+        return self._with_between(worn if rate else self.through(worn, before.worn), records, first, before, rate=rate)
+
+    def through(self, more: WornDepths, before: WornDepths) -> WornDepths:
+        """Return what is worn from depths on where coatings would lose so much more if they went on."""
+        punch, strip = self.coatings
+        if punch is not None:
+            more = replace(more, punch=punch.after(before.punch, more.punch))
+        return more if strip is None else replace(more, strip=strip.after(before.strip, more.strip))
+
+    def measured(self, worn: WornDepths) -> WornDepths:
+        """Return depths as what coatings would have lost if they went on: it grows evenly through their end."""
+        punch, strip = self.coatings
+        if punch is not None:
+            worn = replace(worn, punch=punch.measure(worn.punch))
+        return worn if strip is None else replace(worn, strip=strip.measure(worn.strip))
+
+    def slopes(self, worn: WornDepths) -> tuple[Array, Array]:
+        """Return the derivative of depths to what coatings would have lost, at the nodes of punch and strip."""
+        punch, strip = self.coatings
+        return (
+            np.ones_like(worn.punch) if punch is None else punch.slope(worn.punch),
+            np.ones_like(worn.strip) if strip is None else strip.slope(worn.strip),
+        )
+
+    def _taken(self, punch: Array, strip: Array, at: PartialSlipState) -> Array:
+        """Return what both bodies lose at the contact's nodes, by depths (..., n) of coatings that are those there."""
+        of_punch, of_strip = self.slopes(at.worn)
+        return np.asarray(punch * of_punch + strip * (self.interface.middle.pair.wear_interpolation @ of_strip))
 
     def _with_between(
         self, worn: WornDepths, records: TimeStepRecords, first: int, before: PartialSlipState, *, rate: bool
@@ -477,7 +509,8 @@ class PartialSlipProblem:
         layers, now = self.interface.layers, before.worn
         changes = np.zeros_like(now.between)
         if layers.debris is not None:
-            over, taken = layers.debris.over(records.slip_magnitude), records.punch_depth + records.strip_depth
+            over = layers.debris.over(records.slip_magnitude)
+            taken = self._taken(records.punch_depth, records.strip_depth, before)
             rows = [layers.row(name) for name in DEBRIS]
             thickness = now.between[rows[0]]
             changes[rows] = over.rate(thickness, taken, 0.0) if rate else over.change(thickness, taken)
@@ -504,7 +537,7 @@ class PartialSlipProblem:
         def wearing(k: int, at: ContactConditions) -> Array:
             tau = float(slips.duration[k])
             punch, strip = laws.wear_at(at).depths(at.pressure, slips.slid[k], tau)
-            return np.asarray((punch + strip) / tau)
+            return self._taken(punch, strip, before) / tau
 
         conditions, pairs = self._conditions(slips, before), self._pairs(slips, before)
         return Evolution(memory, conditions, slips.duration, pairs, wearing, before.worn.strip)

@@ -8,7 +8,8 @@ Rosenbrock method of second order (J. G. Verwer et al., SIAM J. Sci. Comput. 20,
 
 which is of second order for any matrix A, and stable for jumps far beyond the explicit limit where A is
 near dF/dy: the slip of each node, times its pressure's answer to depth while the contact stays as it is.
-What lies between goes on with the depths: y has its state, too.
+What lies between goes on with the depths: y has its state, too. Of coated bodies y has what their coatings would have
+lost if they went on, which grows evenly through their end (`fenwear.sliding.coating.CoatedBody`).
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
@@ -179,16 +180,21 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     n, depths = len(now.worn.punch), len(now.worn.punch) + len(now.worn.strip)
     between, layers = depths + now.worn.between.size, problem.interface.layers
     size = between + now.worn.carried.size
+    punch, strip = problem.coatings
 
     def parted(y: Array) -> WornDepths:
         shapes = now.worn.between.shape, now.worn.carried.shape
         state, carried = y[depths:between].reshape(shapes[0]), y[between:size].reshape(shapes[1])
+        if punch is not None:
+            y = np.concatenate([punch.depth(y[:n]), y[n:]])
+        if strip is not None:
+            y = np.concatenate([y[:n], strip.depth(y[n:depths]), y[depths:]])
         return layers.settled(WornDepths(y[:n], y[n:depths], state, y[size:], carried))
 
     def whole(worn: WornDepths) -> Array:
         return np.concatenate([worn.punch, worn.strip, worn.between.ravel(), worn.carried.ravel(), worn.crept])
 
-    begin, rate = whole(now.worn), whole(now.rate)
+    begin, rate = whole(problem.measured(now.worn)), whole(now.rate)
 
     def risen(y: Array) -> Array:
         return np.concatenate([np.maximum(y[:depths], begin[:depths]), y[depths:]])
@@ -200,14 +206,16 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     start = _slid_on(now, cycles)
     middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
     second = solve(whole(middle.rate) - 2 * first)
-    end = whole(parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
-    then = _rate(problem, replace(middle.end, slid=start.slid), parted(end), now.number + cycles, now)
+    worn = parted(risen(begin + cycles * (1.5 * first + 0.5 * second)))
+    end = whole(problem.measured(worn))
+    then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
     missing = solve(end - begin - cycles / 2 * (rate + whole(then.rate)))
     pair = problem.interface.middle.pair
     felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
     area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(len(begin) - depths - n * len(felt))])
-    scale = area @ np.abs(end - begin) + REST * (area @ end)
-    error = float(area @ np.abs(missing)) / max(float(scale), 1e-300)
+    scale = area @ np.abs(whole(worn) - whole(now.worn)) + REST * (area @ whole(worn))
+    opened = np.concatenate([*problem.slopes(worn), np.ones(len(begin) - depths)])
+    error = float(area @ (opened * np.abs(missing))) / max(float(scale), 1e-300)
     remembered = _Remembered.of(problem, now, depths)
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
     of_creep = _creep_error(problem, missing[size:], (end - begin)[size:], end[size:])
@@ -319,6 +327,7 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
     depths, layers = n + len(now.worn.strip), problem.interface.layers
     debris, total = layers.debris, depths + now.worn.between.size + now.worn.carried.size
     remembered = _Remembered.of(problem, now, depths)
+    of_punch, of_strip = problem.slopes(now.worn)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     A, found = np.zeros((total, total)), list[_Group]()
     slid, groups = records.slip_magnitude, dict[tuple[float | Placement, bytes], list[int]]()
@@ -332,19 +341,20 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
         answer = _stiffness(problem, position, closed, records.pressure[members[0]])  # of pressure to depth
         left = np.zeros((total, len(closed)))
         slopes, kept = np.zeros((2, n)), np.zeros(n)
+        lost = np.array([of_punch, position.pair.wear_interpolation @ of_strip])
         for row, law in enumerate((problem.wear.punch, problem.wear.strip)):
             if law is not None:
                 for k in members:
                     step = steps[(now.first_step + k) % len(steps)]
                     own = law.slope(records.pressure[k], slid[k], step.duration)
                     slopes[row] += own
-                    kept += 0.0 if fed is None else fed[k] * own
+                    kept += 0.0 if fed is None else fed[k] * own * lost[row]
         left[closed, np.arange(len(closed))] = slopes[0, closed]
         left[n:depths] = position.pair.wear_projection[:, closed].toarray() * slopes[1, closed]
-        right = [np.eye(n)[closed], position.pair.wear_interpolation[closed].toarray()]
+        right = [of_punch * np.eye(n)[closed], of_strip * position.pair.wear_interpolation[closed].toarray()]
         if debris is not None:
             left[stored + closed, np.arange(len(closed))] = kept[closed]
-            left[ejected + closed, np.arange(len(closed))] = (slopes.sum(axis=0) - kept)[closed]
+            left[ejected + closed, np.arange(len(closed))] = ((slopes * lost).sum(axis=0) - kept)[closed]
         between = np.zeros((len(closed), total - depths))
         if debris is not None:
             between[:, stored - depths : stored - depths + n] = -np.eye(n)[closed]

@@ -16,6 +16,7 @@ from fenwear.arrays import Array
 from fenwear.case import Dependence, WearLaw
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
+from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
 from fenwear.sliding.wear import WornDepths, coefficient
@@ -69,12 +70,14 @@ class LocalLaws:
         wear: The wear laws of punch and strip; None where a body does not wear.
         regions: Shares of the regions of punch and strip at the contact nodes (n,), by their names.
         initial: Temperature without heat, K.
+        coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
     """
 
     friction: Friction
     wear: tuple[WearLaw | None, WearLaw | None]
     regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     initial: float = 0.0
+    coatings: tuple[Array | None, Array | None] = (None, None)
 
     @property
     def constant(self) -> bool:
@@ -85,7 +88,7 @@ class LocalLaws:
         """Return whether friction changes with the state, or wear does."""
         if not of_wear:
             return not self.friction.constant
-        laws = [law for law in self.wear if law is not None]
+        laws = [one for law in self.wear if law is not None for one in (law, law.of_coating) if one is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
         dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
         return dependent or (of_friction and not self.friction.constant)
@@ -123,10 +126,11 @@ class LocalLaws:
             none if slid is None else slid,
             self.regions,
             states=states,
+            covered=covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
         )
 
     def wear_at(self, conditions: ContactConditions) -> LocalWear:
-        """Return the wear by local slip.
+        """Return the wear by local slip; of a coated body as if all of it were of the coating.
 
         Raises:
             CaseError: a coefficient is negative or not finite there.
@@ -134,7 +138,32 @@ class LocalLaws:
         found = [
             None
             if law is None
-            else BodyRate(coefficient(law, self.friction, conditions, key), PressureLaw.of(law), law.speed_exponent)
+            else BodyRate(
+                coefficient(law.of_coating or law, self.friction, conditions, key),
+                PressureLaw.of(law),
+                law.speed_exponent,
+            )
             for law, key in zip(self.wear, ("wear.punch", "wear.strip"), strict=True)
         ]
         return LocalWear(found[0], found[1])
+
+    def coated(self, pair: ContactPair, conditions: ContactConditions) -> tuple[CoatedBody | None, CoatedBody | None]:
+        """Return the coatings of both bodies with the ratio of their base's coefficient to theirs; None without.
+
+        Raises:
+            CaseError: a coefficient is negative or not finite there.
+        """
+        found: list[CoatedBody | None] = []
+        for law, key, thickness in zip(self.wear, ("wear.punch", "wear.strip"), self.coatings, strict=True):
+            above = None if law is None else law.of_coating
+            if law is None or above is None or thickness is None:
+                found.append(None)
+                continue
+            base, coating = (coefficient(one, self.friction, conditions, key) for one in (law, above))
+            if key == "wear.punch":
+                ratio = base / coating
+            else:
+                base, coating = (pair.wear_projection @ one for one in (base, coating))
+                ratio = np.divide(base, coating, out=np.ones_like(base), where=coating > 0)
+            found.append(CoatedBody(thickness, np.asarray(ratio)))
+        return found[0], found[1]

@@ -1,0 +1,134 @@
+"""A coating above the base of a body: what is worn while it lasts, in the step in which it ends, and behind that.
+
+With coefficients k_c of the coating and k_b of the base, a place would lose A = k_c E and B = k_b E in a step, with E
+what all its pressures and paths come to. Of a coating of which c is left there it loses
+
+    w = min(A, c) + B max(1 - c / A, 0):
+
+the base begins to wear in the share 1 - c / A of the step, with nothing stepped over. That is exact for a pressure that
+stays, and two such steps one after the other are the same as one of their length, however jumps are cut.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fenwear.arrays import Array
+from fenwear.case import WearLaw
+from fenwear.case.layers import place_values
+from fenwear.interface import ContactPair
+from fenwear.interface.placement import in_space
+
+FADES = 0.1  # of the thickness, over which the friction of a coating goes over to that of the base
+
+
+@dataclass(frozen=True)
+class Shares:
+    """What of A and B is worn at nodes (n,), w = coating A + base B, and the derivatives of w to A and B."""
+
+    coating: Array
+    base: Array
+    by_coating: Array
+    by_base: Array
+
+    def at(self, interpolation: Array) -> Shares:
+        """Return the same at other nodes, by a matrix that interpolates there."""
+        return Shares(*(interpolation @ one for one in (self.coating, self.base, self.by_coating, self.by_base)))
+
+
+def shares(coating: Array, base: Array, left: Array) -> Shares:
+    """Return what is worn of a coating and the base below it.
+
+    Args:
+        coating, base: A and B (n,), mm.
+        left: c (n,), mm.
+    """
+    through = (coating > left) | (left <= 0)
+    used = np.where(through, left / np.where(coating > 0, coating, 1.0), 1.0)
+    by_coating = np.where(through, used * base / np.where(coating > 0, coating, 1.0), 1.0)
+    return Shares(used, 1 - used, by_coating, 1 - used)
+
+
+def left_of(thickness: Array, depth: Array) -> Array:
+    """Return what is left of a coating (..., n), mm, of its thickness (n,) where such depths (..., n) are worn off."""
+    return np.asarray(np.maximum(thickness - depth, 0.0))
+
+
+def covered(thickness: Array, depth: Array) -> Array:
+    """Return how much of its friction a coating still has (n,): 1 until its last tenth, 0 where it is worn through."""
+    thick = thickness > 0
+    return np.where(thick, np.minimum(left_of(thickness, depth) / np.where(thick, FADES * thickness, 1.0), 1.0), 0.0)
+
+
+def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array | None:
+    """Return the thickness of a body's coating at its contact nodes (n,), mm; None without.
+
+    Args:
+        law: The wear law of the body.
+        x: The nodes (n, d), mm.
+        key: The body's name in the table wear.
+
+    Raises:
+        CaseError: it is negative somewhere.
+    """
+    if law is None or law.coating is None:
+        return None
+    place = dict(zip("xyz", in_space(x).T, strict=True))
+    name = f"wear.{key}.coating.thickness"
+    return np.asarray(place_values(law.coating.thickness, place, len(x), "mm", name, 0.0))
+
+
+def covering(
+    coatings: tuple[Array | None, Array | None], pair: ContactPair, depths: tuple[Array, Array] | None
+) -> tuple[Array | None, Array | None]:
+    """Return how much of the friction of both bodies' coatings is left at the contact's nodes (n,), from 1 to 0.
+
+    Args:
+        coatings: Thickness at the bodies' own nodes; None for a body without.
+        pair: The surfaces opposite each other.
+        depths: Worn off both bodies at their own nodes, mm; None where all is worn through.
+    """
+    if depths is None:
+        return None, None
+    punch, strip = (
+        None if thickness is None else covered(thickness, depth)
+        for thickness, depth in zip(coatings, depths, strict=True)
+    )
+    return punch, None if strip is None else pair.wear_interpolation @ strip
+
+
+@dataclass(frozen=True)
+class CoatedBody:
+    """A coated body whose coefficients go by a ratio: its depth by A, which grows evenly through the coating's end.
+
+    Attributes:
+        thickness: Of the coating at the body's own contact nodes (n,), mm.
+        ratio: k_b / k_c (n,).
+    """
+
+    thickness: Array
+    ratio: Array
+
+    def depth(self, measure: Array) -> Array:
+        """Return the depth (n,), mm, of what the coating's coefficient would have worn in all, A (n,), mm."""
+        return np.asarray(measure + (self.ratio - 1) * np.maximum(measure - self.thickness, 0.0))
+
+    def measure(self, depth: Array) -> Array:
+        """Return A of a depth; that of the end of the coating where the base does not wear."""
+        beyond = np.maximum(depth - self.thickness, 0.0)
+        further = np.divide(beyond, self.ratio, out=np.zeros_like(beyond), where=self.ratio > 0)
+        return np.asarray(np.minimum(depth, self.thickness) + further)
+
+    def slope(self, depth: Array) -> Array:
+        """Return the derivative of the depth to A at a depth (n,)."""
+        return np.where(depth < self.thickness, 1.0, self.ratio)
+
+    def after(self, depth: Array, more: Array) -> Array:
+        """Return by how much a depth grows with A."""
+        return np.asarray(self.depth(self.measure(depth) + more) - depth)
+
+    def at(self, interpolation: Array) -> CoatedBody:
+        """Return the same at other nodes, by a matrix that interpolates there."""
+        return CoatedBody(interpolation @ self.thickness, interpolation @ self.ratio)

@@ -1,0 +1,139 @@
+"""Coatings: worn through when a rigid limit says so, at every place for itself, however long the steps are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from combinations import SMALL as SMALLEST
+from combinations import STICK
+
+from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
+from fenwear.sliding.coating import shares
+
+Assemble = Callable[..., Tribosystem]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
+# One way, without friction: all pressures come to one that wears evenly.
+PLAIN = (*SMALL, "contact.friction=0", "motion={kind='one-way', direction='rightward', speed=100, duration=0.1}")
+MEAN = 1e4 / 600
+COATED = "wear.punch={coefficient=5e-6, coating={thickness=0.05, coefficient=1e-6}}"
+
+
+def test_shares() -> None:
+    """A step cut anywhere is the same; its derivatives are those of differences; no coating, none used."""
+    coating, base = np.array([0.1, 1.0, 3.0, 0.0, 2.0]), np.array([0.5, 5.0, 0.0, 0.0, 6.0])
+    left = np.array([0.4, 0.4, 0.4, 0.4, 0.0])
+
+    def worn(share: float, left: np.ndarray) -> np.ndarray:
+        found = shares(share * coating, share * base, left)
+        return np.asarray(share * (found.coating * coating + found.base * base))
+
+    np.testing.assert_allclose(worn(1.0, left), [0.1, 0.4 + 0.6 * 5, 0.4, 0.0, 6.0], rtol=1e-15)
+    for share in (0.1, 0.5, 0.9):
+        first = worn(share, left)
+        rest = np.maximum(left - first, 0.0)
+        np.testing.assert_allclose(first + worn(1 - share, rest), worn(1.0, left), rtol=1e-14)
+    slopes, size = shares(coating, base, left), 1e-7
+    change = (worn(1 + size, left) - worn(1 - size, left)) / (2 * size)
+    np.testing.assert_allclose(slopes.by_coating * coating + slopes.by_base * base, change, rtol=1e-7)
+
+
+def test_rigid_limit(assembled: Assemble) -> None:
+    """All worn through, the mean depth is t + k_2 / k_1 (k_1 p s - t) to rounding, however loose jumps are."""
+    system = assembled("example2", *PLAIN, COATED)
+    steps, weights = 750, system.pair.weights  # of 10 mm
+    exact = 0.05 + 5 * (1e-6 * MEAN * 10 * steps - 0.05)
+    *_, marched = march(system, steps, implicit=True, block=50)
+    errors = []
+    for tolerance in (3e-2, 1e-3):
+        *_, last = jump(system, steps, tolerance=tolerance)
+        errors.append(np.abs(last.wear[-1] - marched.wear[-1]).max() / exact)
+        assert weights @ last.wear[-1] / weights.sum() == pytest.approx(exact, rel=1e-13)
+        assert last.totals.of("volume_punch")[-1] == pytest.approx(10 * weights @ last.wear[-1], rel=1e-12)
+    assert weights @ marched.wear[-1] / weights.sum() == pytest.approx(exact, rel=1e-13)
+    assert errors[0] < 1e-5
+    assert errors[1] < errors[0]
+
+
+UNEVEN = "{expression='%g*(1 + 0.5 * x / 0.1)', unit='mm'}"
+PUNCH = "wear.punch={coefficient='5e-7 1/MPa', coating={thickness=%s, coefficient='1e-7 1/MPa'%s}}"
+STRIP = "wear.strip={coefficient='3e-7 1/MPa', coating={thickness='%g mm', coefficient='1e-7 1/MPa'}}"
+
+
+def coated(law: str, thickness: float, more: str = "", *both: str) -> Tribosystem:
+    stick = STICK if law == "coulomb" else ("stick={}",)
+    settings = [*SMALLEST, f"contact.law='{law}'", *stick, PUNCH % (UNEVEN % thickness, more), *both]
+    return assemble(load_case("fretting-partial-slip", settings))
+
+
+@pytest.mark.parametrize("bodies", ["punch", "both", "debris"])
+@pytest.mark.parametrize("law", ["gross-sliding", "coulomb"])
+def test_jumps_go_through_the_end_as_marches_do(law: str, bodies: str) -> None:
+    """At every place for itself: its pressure and its thickness differ from those beside it."""
+    thickness = 1e-4 if law == "gross-sliding" else 1e-6
+    more = {
+        "punch": (),
+        "both": (STRIP % (thickness / 2), "motion.positions=3"),
+        "debris": ("contact.third_body={share=0.6, life='0.3 mm'}",),
+    }[bodies]
+    system, cycles = coated(law, thickness, "", *more), 200
+    *_, marched = march(system, 2 * cycles)
+    for depth, thick in zip((marched.wear[-1], marched.wear_strip[-1]), system.coatings, strict=True):
+        if thick is not None:
+            assert 0.05 < (depth >= thick).mean() < 0.95
+    errors = []
+    for tolerance in (3e-2, 1e-3):
+        *_, last = jump(system, 2 * cycles, tolerance=tolerance)
+        pairs = ((last.wear, marched.wear), (last.wear_strip, marched.wear_strip))
+        apart = [np.abs(one[-1] - other[-1]).max() for one, other in pairs]
+        errors.append(max(apart) / marched.wear[-1].max())
+        for body, weights, depth in (
+            ("punch", system.pair.weights, last.wear[-1]),
+            ("strip", system.pair.strip.weights, last.wear_strip[-1]),
+        ):
+            volume = system.bodies.punch.thickness * weights @ depth
+            assert last.totals.of(f"volume_{body}")[-1] == pytest.approx(volume, rel=1e-12)
+    assert errors[0] < 5e-2
+    assert errors[1] < 5e-3
+
+
+def test_the_end_is_that_of_the_base(assembled: Assemble) -> None:
+    """Pressures of the steady state, friction of the coating or not; growth rates alike."""
+    own = "wear.punch={coefficient=5e-6, coating={thickness=0.05, coefficient=1e-6, friction=0.1}}"
+    coated, base = (steady(assembled("example2", *SMALL, more)) for more in (own, "wear.punch.coefficient=5e-6"))
+    np.testing.assert_allclose(coated.pressure, base.pressure, rtol=1e-9)
+    np.testing.assert_allclose(coated.wear_per_cycle, base.wear_per_cycle, rtol=1e-9)
+
+
+def test_friction_of_a_coating_holds_until_it_is_through(assembled: Assemble) -> None:
+    """Of the first half-cycle it is the coating's, of the last one the base's, in marches and in jumps."""
+    own = "wear.punch={coefficient=5e-6, coating={thickness=0.002, coefficient=1e-6, friction=0.1}}"
+    system = assembled("example2", *SMALL, own, "contact.friction=0.3")
+    for blocks in (march(system, 160, implicit=True), jump(system, 160, tolerance=1e-2)):
+        rows = list(blocks)
+        for block, row, friction in ((rows[0], 0, 0.1), (rows[-1], -1, 0.3)):
+            mu = block.adds.of("work")[row] / block.adds.of("load_path")[row]
+            assert mu == pytest.approx(friction, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ("{thickness=-1, coefficient=1e-9}", "wear.punch.coating.thickness"),
+        (
+            "{thickness={expression='x - 1', unit='mm'}, coefficient=1e-9}",
+            "wear.punch.coating.thickness: expected zero",
+        ),
+        ("{thickness={expression='p', unit='mm'}, coefficient=1e-9}", "place x, y, z alone, got p"),
+        ("{thickness='0.1 m', coefficient=1e-9}", r"wear.punch.coating.thickness: expected less than the body"),
+        ("{thickness=1e-3}", "wear.punch.coating: give one of coefficient, archard and energy, got none"),
+        ("{thickness=1e-3, coefficient=0}", "wear.punch.coating.coefficient: expected a finite number above zero"),
+        ("{thickness=1e-3, coefficient='1 mm'}", "coating.coefficient"),
+        ("{thickness=1e-3, archard=1e-3}", "wear.punch.coating.hardness"),
+    ],
+)
+def test_wrong_input_is_told_by_its_key(wrong: str, told: str) -> None:
+    """Before anything is computed."""
+    with pytest.raises(CaseError, match=told):
+        assemble(load_case("example2", [*SMALL, f"wear.punch={{coefficient=1e-8, coating={wrong}}}"]))

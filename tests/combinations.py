@@ -100,8 +100,8 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         "fretting-partial-slip",
         (
             *SMALL,
-            "wear={punch={coefficient='5e-7 1/MPa', coating={thickness='2e-8 mm', coefficient='1e-7 1/MPa', "
-            "friction=0.6}}}",
+            "wear={punch={coefficient='2e-7 1/MPa', coating={thickness='1e-7 mm', coefficient='1e-7 1/MPa', "
+            "friction=0.69}}}",
         ),
     ),
     "laws with memory": (  # registered in `test_combinations.py`

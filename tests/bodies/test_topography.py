@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from fenwear.assembly import assemble
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on, roughness
 from fenwear.case import Topography
+from fenwear.cycle import evolve
 
 GRID = RegularGrid((-0.5, -0.25), (0.01, 0.01), (101, 51), 2, 0.0)
 
@@ -88,8 +90,18 @@ def test_what_no_map_is(tmp_path: Path) -> None:
         Topography(file="map.npz", rms=1e-3, longest=1.0)
 
 
-def wavy(load: float) -> Case:
-    """Return a wavy block of E = 200 GPa on a hard one, plane strain, as half-planes over 20 waves."""
+LENGTH, HEIGHT, FULL = 0.05, 1e-4, np.pi * 2e5 / (1 - 0.3**2) * 1e-4 / 0.05  # lam, h, mm, and p* = pi E* h / lam, MPa
+
+
+def wavy(load: float, nodes: int = 1281, worn: float = 0.0, **run: Any) -> Case:
+    """Return a hard block on a wavy one of E = 200 GPa, plane strain, as half-planes over 20 waves.
+
+    Args:
+        load: Over the width, MPa.
+        nodes: Of the grid.
+        worn: Wear coefficient of the wavy one.
+        run: How far and how.
+    """
     return Case.model_validate(
         {
             "geometry": {"file": "blocks.geo", "degree": 2, "parameters": {"margin": 0.2}},
@@ -106,24 +118,40 @@ def wavy(load: float) -> Case:
                 "regions": {"strip_body": "steel"},
                 "supports": [{"on": "strip_far", "fix": ["x", "z"]}],
                 "operator": "half-space",
-                "topography": {"amplitude": 1e-4, "wavelength": [0.05]},
+                "topography": {"amplitude": HEIGHT, "wavelength": [LENGTH]},
             },
-            "grid": {"nodes": 1281, "size": [1.0]},
+            "grid": {"nodes": nodes, "size": [1.0]},
             "contact": {"friction": 0.0},
-            "wear": {"punch": {"coefficient": 0.0}},
+            "wear": {"strip": {"coefficient": worn}},
             "motion": {"kind": "reciprocating", "amplitude": 0.01, "period": 1.0},
-            "run": {"half_cycles": 2},
+            "run": {"half_cycles": 2, **run},
         }
     )
 
 
 def test_wavy_surface_in_part_contact() -> None:
     """Row 53 (Westergaard): 2 a / lam = (2 / pi) asin sqrt(p / p*), p* = pi E* h / lam, in the middle of 20 waves."""
-    full = np.pi * 2e5 / (1 - 0.3**2) * 1e-4 / 0.05
-    system = assemble(wavy(0.3 * full))
+    system = assemble(wavy(0.3 * FULL))
     pressure = system.phase_contact([0]).solve(system.gap(0, system.unworn())).pressure[0]
     x = system.pair.x
     middle = np.abs(x) <= 0.1 - 1e-9
     mean = pressure[middle].mean()
     share = (pressure[middle] > 0).mean()
-    assert share == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(mean / full)), abs=0.02)
+    assert share == pytest.approx(2 / np.pi * np.arcsin(np.sqrt(mean / FULL)), abs=0.02)
+
+
+def test_waviness_wears_off() -> None:
+    """Row 53: in full contact by a factor of e in a sliding of lam / (pi k E*); pointwise, the error as the spacing."""
+    slid, errors = 0.8, []
+    worn = LENGTH / (np.pi * 2e5 / (1 - 0.3**2) * slid)
+    for nodes in (321, 641):
+        system = assemble(wavy(2 * FULL, nodes, worn, half_cycles=40, integration="jump", jump_tolerance=1e-3))
+        *_, last = evolve(system, 40)
+        x, depth = system.pair.strip.x[:, 0], last.wear_strip[-1]
+        middle = np.abs(x) <= 2 * LENGTH  # away from the edges, where flat punches press most
+        x, depth = x[middle], depth[middle]
+        wave = HEIGHT * (1 - np.exp(-1)) * np.cos(2 * np.pi * x / LENGTH)
+        smooth = np.polynomial.Polynomial.fit(x, depth - wave, 4)  # the even part, more at the edges
+        errors.append(float(np.abs(depth - wave - smooth(x)).max()) / HEIGHT)
+    assert errors[1] < 2e-3
+    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.7)

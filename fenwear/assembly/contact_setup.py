@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.cycle_shear import cycle_shear
+from fenwear.assembly.cycle_shear import cycle_shear, squares
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
@@ -35,6 +35,7 @@ from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, opti
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
 from fenwear.sliding.coating import coating_thickness, covering
+from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.motion import Motion
@@ -200,6 +201,16 @@ class ContactSetup:
                 for k, (phase, own) in enumerate(zip(self.motion.phases, self.pairs, strict=True))
             ]
         )
+
+    @cached_property
+    def sliding_squares(self) -> Array:
+        """Products of their components (m, n, 9)."""
+        return squares(self.sliding_directions)
+
+    @cached_property
+    def _unknown_cycle(self) -> CycleShear | None:
+        """What coefficients know of a cycle whose pressures are not known."""
+        return cycle_shear(self, None)
 
     def friction_in_space(self, phase: int, mu: Array) -> Array:
         """Return tau of a phase in space (n, 3), as `phase_friction`."""
@@ -391,7 +402,7 @@ class ContactSetup:
         temperatures: tuple[Array, Array] | None = None,
         worn: WornDepths | None = None,
         half_cycles: float | None = None,
-        cycle: Array | None = None,
+        cycle: CycleShear | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
@@ -401,7 +412,7 @@ class ContactSetup:
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths, and states that laws remember; by default those at the start.
             half_cycles: Done since the start of the run; by default those before its motion.
-            cycle: Pressures of all phases (m, n), MPa; by default they are not known.
+            cycle: Of the pressures of all phases, by `cycle_shear`; by default they are not known.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
@@ -424,7 +435,7 @@ class ContactSetup:
             (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
-            cycle_shear(self, cycle),
+            self._unknown_cycle if cycle is None else cycle,
             self.layers.known(pair, worn),
             covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
         )

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
     from fenwear.assembly.contact_setup import ContactSetup
 
 
+def squares(along: Array) -> Array:
+    """Return the products of all components of directions (..., 3) with each other (..., 9)."""
+    return np.reshape(along[..., :, None] * along[..., None, :], (*along.shape[:-1], 9))
+
+
 def sliding_tensor(placed: ContactSetup, pressure: Array | None = None) -> SlidingTensor:
     """Return the tensor of a cycle's sliding at the punch's contact nodes.
 
@@ -21,18 +26,16 @@ def sliding_tensor(placed: ContactSetup, pressure: Array | None = None) -> Slidi
         placed: The bodies.
         pressure: Of all phases (m, n), MPa; None for the ways alone.
     """
-    weights, along = placed.path if pressure is None else placed.path * pressure, placed.sliding_directions
-    return SlidingTensor(np.einsum("mi,mia,mib->iab", weights, along, along, optimize=True))
+    weights = placed.path if pressure is None else placed.path * pressure
+    return SlidingTensor(np.einsum("mi,mic->ic", weights, placed.sliding_squares).reshape(-1, 3, 3))
 
 
 def sliding_tensor_of_strip(placed: ContactSetup, pressure: Array | None = None) -> SlidingTensor:
     """Return the same at the strip's contact nodes, of its own material that moves under the punch."""
     weights = placed.path if pressure is None else placed.path * pressure
-    directions, values = placed.sliding_directions, np.zeros((len(placed.pair.strip.weights), 9))
-    for k, facing in enumerate(placed.pairs):
-        back = facing.material_place.back(directions[k])
-        squares = weights[k][:, None, None] * back[:, :, None] * back[:, None, :]
-        values += facing.wear_projection @ squares.reshape(-1, 9)
+    values = np.zeros((len(placed.pair.strip.weights), 9))
+    for facing, way, along in zip(placed.pairs, weights, placed.sliding_directions, strict=True):
+        values += facing.wear_projection @ (way[:, None] * squares(facing.material_place.back(along)))
     return SlidingTensor(values.reshape(-1, 3, 3))
 
 

@@ -45,6 +45,7 @@ from fenwear.remedies import (
 T = TypeVar("T")
 PREFIX, NAME = "fenwear_contact_", "the contact of punch and strip"
 MANY = 400  # nodes from which on only what those near contact ask for is made
+SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
 EVEN = 0.3  # of all that an even pressure gives: what of it has to act against the loads for it to be a start
@@ -131,6 +132,8 @@ class CondensedContact:
     Attributes:
         blocks: Of the phases, where nodes are many.
         most: The largest pressure, MPa.
+        follows: Whether what wears changes a little from solve to solve, as with coefficients that are found with the
+            pressures: then the factor of an earlier one serves as long as it brings the residual down.
     """
 
     def __init__(
@@ -162,7 +165,7 @@ class CondensedContact:
         if self._shared:
             self._team.serve(self)
         gridded = interface.pair.punch.grid is not None and interface.cost is not None
-        self._many = n > MANY or self._shared or gridded
+        self._many = n > MANY or (n > SOME and m * n > TOGETHER) or self._shared or gridded
         self._tables: dict[bytes, Array] = {}  # of convolutions, by their traction
         self._dense: Array = np.zeros((m, 0 if self._many else size, size))
         self.blocks: list[PhaseBlock] = []
@@ -173,6 +176,7 @@ class CondensedContact:
         self._slide(range(m))
         self._coupling: Array | None = None
         self._wearing: WearCompliance | None = None
+        self.follows = False
         self._slopes: tuple[Array, Array | None] | None = None  # of what wears in the step, and of what gives way
         self._elastic: Operator | None = None
         self._operator: Operator | None = None
@@ -371,7 +375,7 @@ class CondensedContact:
         if coupling is not self._coupling:
             self._coupling, self._elastic, self._operator = coupling, None, None
         self._wearing = wearing
-        self.inequality.curved = wearing is not None and wearing.curved
+        self.inequality.curved = wearing is not None and (wearing.curved or (self.follows and not self._gridded))
         x, f, iterations = self._solve(start)
         if self._gridded and isinstance(operator := self._linear, GriddedPhases):
             x = operator.balanced(x, f)

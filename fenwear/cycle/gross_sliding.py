@@ -28,7 +28,7 @@ from fenwear.assembly import (
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.assembly.cycle_shear import asks_for_cycle
+from fenwear.assembly.cycle_shear import asks_for_cycle, cycle_shear
 from fenwear.assembly.laws import GROSS
 from fenwear.assembly.tribosystem import answers_for, condense_bodies
 from fenwear.assembly.variants import same_conduction
@@ -82,7 +82,8 @@ class HalfCycles:
         """Return the ends of the phases of a half-cycle, each solved as a whole."""
         worn, temperature = state.worn, state.temperature
         ends: list[PhaseEnd] = []
-        cycle = known_pressures(state.contacts) if self._of_cycle else None
+        known = known_pressures(state.contacts) if self._of_cycle else None
+        cycle = None if known is None else cycle_shear(self.system, known)
         for number, phase in enumerate(phases):
             if number:
                 self.watch()

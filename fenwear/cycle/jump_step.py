@@ -39,6 +39,7 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
+from fenwear.assembly.cycle_shear import cycle_shear
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.inequality import CLOSE
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
@@ -135,6 +136,8 @@ class Stepper:
         self.system = system = with_reduced_heat(system)
         self.tolerance, self.watch, self.loading = tolerance, watch, loading
         self.contact = system.phase_contact(range(len(system.motion.phases)))
+        if isinstance(self.contact, CondensedContact):
+            self.contact.follows = not system.constant_coefficients
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
         self.evolution = system.evolution([system.conditions(k) for k in range(len(self.ratios))])
@@ -222,10 +225,11 @@ class Stepper:
         """Return what a cycle wears at the depths, temperatures and pressures of a state."""
         system, surfaces = self.system, None
         pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
+        shear = cycle_shear(system, pressures)
         if self.coupled.heat is not None and state.temperature is not None:
             surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
         conditions: Sequence[ContactConditions] = [
-            system.conditions(k, pressure, surfaces, state.worn, half_cycles, pressures)
+            system.conditions(k, pressure, surfaces, state.worn, half_cycles, shear)
             for k, pressure in enumerate(pressures)
         ]
         evolution = system.evolution(conditions, state.worn)

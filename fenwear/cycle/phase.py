@@ -18,6 +18,7 @@ from fenwear.errors import ConvergenceError
 from fenwear.heat.field import HeatState
 from fenwear.layers import LayerEvolution, LayerStep
 from fenwear.layers.memory import Held
+from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.wear import WornDepths
 
 CLOSE = 1e-10  # change of pressure over its scale that ends the iterations of coefficients and pressure
@@ -74,7 +75,7 @@ class PhaseStep:
         load: float = 1.0,
         half_cycles: float = 0.0,
         near: ContactState | None = None,
-        cycle: Array | None = None,
+        cycle: CycleShear | None = None,
     ) -> PhaseEnd:
         """Return the end of the phase.
 
@@ -85,7 +86,7 @@ class PhaseStep:
             load: Factor of all loads.
             half_cycles: Done since the start of the run, in its middle.
             near: Where to start from in the first cycle, such as the phase before.
-            cycle: Pressures of all phases a cycle ago (m, n), MPa; None in the first cycle.
+            cycle: Cross-shear and pressures a cycle ago; None in the first cycle.
 
         Raises:
             ConvergenceError: contact, heat or the coefficients did not converge.
@@ -157,7 +158,7 @@ class PhaseStep:
         temperature: HeatState | None,
         worn: WornDepths,
         half_cycles: float,
-        cycle: Array | None,
+        cycle: CycleShear | None,
         *,
         ended: bool = False,
     ) -> LayerEvolution:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly.cycle_shear import sliding_tensor, sliding_tensor_of_strip
+from fenwear.assembly.cycle_shear import cycle_shear, sliding_tensor, sliding_tensor_of_strip
 from fenwear.cycle import Block
 from fenwear.cycle.state import known_pressures
 from fenwear.interface.placement import in_space
@@ -54,9 +54,9 @@ def table_cycle(last: Block) -> TableCycle | None:
     pressure = known_pressures(last.end.contacts)
     if pressure is None:
         return None
-    end = last.end
+    end, shear = last.end, cycle_shear(system, pressure)
     states = [
-        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=pressure)
+        system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
         for k, own in enumerate(pressure)
     ]
     tensors = sliding_tensor(system, pressure), sliding_tensor_of_strip(system, pressure)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from fenwear import CaseError, Tribosystem, load_case, march
+from fenwear import CaseError, Tribosystem, jump, load_case, march
 from fenwear.assembly.cycle_shear import sliding_tensor, sliding_tensor_of_strip
 from fenwear.case import WearLaw
 from fenwear.sliding.cross_shear import SlidingTensor
@@ -66,6 +66,17 @@ def test_laws_of_cross_shear_and_mean_pressure(assembled: Callable[..., Tribosys
     pressure = last.pressure[-1]
     depth = last.wear[-1] - last.wear[-2]
     np.testing.assert_allclose(depth, 1e-14 * pressure**2 * way, rtol=1e-6)
+
+
+def test_jumps_with_such_laws(assembled: Callable[..., Tribosystem]) -> None:
+    """On a circle, in many cycles at once, all wears as with the law that cs = 1/2 makes of it."""
+    ends = []
+    for law in ("coefficient={expression='1e-9*(1 + 10*cs)'}", "coefficient=6e-9"):
+        *_, last = jump(assembled("example1", *PATHS, circle(8), f"wear.punch={{{law}}}"), 1000, tolerance=1e-3)
+        ends.append(last.end)
+    depth = ends[1].worn.punch
+    np.testing.assert_allclose(ends[0].worn.punch, depth, rtol=0, atol=2e-4 * depth.max())
+    assert np.ptp(depth) > 0.01 * depth.max()
 
 
 def test_wear_per_area(assembled: Callable[..., Tribosystem]) -> None:

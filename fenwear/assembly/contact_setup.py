@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -30,7 +30,7 @@ from fenwear.interface import (
     rigid_equilibrium,
 )
 from fenwear.interface.placement import HERE, in_model, in_space
-from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, layers_of
+from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, conductance_of, layers_of
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
@@ -256,6 +256,10 @@ class ContactSetup:
             message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
             raise CaseError(InputError("contact.hardness", message))
         return found
+
+    def layer_conductance(self) -> Callable[[Array], Array] | None:
+        """Return h_c by the pressures (n,), where what lies between gives it; see `fenwear.layers.conductance`."""
+        return conductance_of(self.layers, self.made_from, self.bodies.regions)
 
     def passing(
         self, wear: PhasesWear, phases: Sequence[int] | None = None, evolution: Evolution | None = None

@@ -452,7 +452,7 @@ def with_exchange(
         keep=keep,
         fresh=fresh,
     )
-    return replace(system, exchange=exchange)
+    return replace(system, exchange=exchange.through(system.layer_conductance()))
 
 
 def with_reduced_heat(system: Tribosystem, *, keep: bool = False, fresh: bool = False) -> Tribosystem:
@@ -479,7 +479,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
     """
     if system.heat is None or system.bodies.heat is None:
         raise CaseError(InputError("heat", "missing, but required here"))
-    return prepare_steady(
+    exchange = prepare_steady(
         system.heat,
         system.bodies.heat,
         system.pair,
@@ -489,6 +489,7 @@ def steady_exchange(system: Tribosystem, velocities: Sequence[float]) -> HeatExc
         heating_friction(system),
         system.bodies.punch.thickness,
     )
+    return exchange.through(system.layer_conductance())
 
 
 def expansions(system: Tribosystem, *, in_middle: bool = False) -> tuple[Array, Array]:

@@ -451,6 +451,8 @@ class Case(Part):
                 problems.append("heat.inflow: expected none with heat.track, whose bulk comes in")
             if heat.operator != "reduced":
                 problems.append("heat.operator: expected 'reduced' with heat.track")
+        if heat.conductance == "layer" and self.contact.layer is None:
+            problems.append("heat.conductance: expected a table contact.layer for 'layer'")
         if heat.conductance_per_pressure is not None and heat.conductance != 0:
             problems.append("heat.conductance: give either conductance or conductance_per_pressure")
         return problems

@@ -12,23 +12,23 @@ from fenwear.case.units import convert, quantity_text, shown
 
 
 def _perfect_or_conductance(value: object) -> float | str:
-    """Convert a conductance, which may be perfect."""
-    if value == "perfect":
-        return "perfect"
+    """Convert a conductance, which may be perfect, or that of the layer."""
+    if value in ("perfect", "layer"):
+        return str(value)
     try:
         conductance = convert(value, CONDUCTANCE)
     except ValueError as error:
-        raise ValueError(f"{error}; or 'perfect'") from None
+        raise ValueError(f"{error}; or 'perfect' or 'layer'") from None
     if conductance < 0:
         raise ValueError(f"expected greater than or equal to 0, got {shown(value)}")
     return conductance
 
 
 PerfectOrConductance = Annotated[
-    float | Literal["perfect"],
+    float | Literal["perfect", "layer"],
     Unit(CONDUCTANCE),
     BeforeValidator(_perfect_or_conductance),
-    PlainSerializer(lambda value: value if value == "perfect" else quantity_text(value, CONDUCTANCE)),
+    PlainSerializer(lambda value: value if isinstance(value, str) else quantity_text(value, CONDUCTANCE)),
 ]
 
 
@@ -53,7 +53,7 @@ class Heat(Part):
     conductance: PerfectOrConductance = Field(
         default="perfect",
         description="h_c between punch and strip where they touch, 1 W/(m² K) = 0.001; "
-        "by default 0 where partition is given",
+        "by default 0 where partition is given; that of the asperities of contact.layer by 'layer'",
     )
     conductance_per_pressure: tuple[Annotated[float, *quantity("N/(mm*s*K*MPa)"), Field(gt=0)], ...] | None = Field(
         default=None, min_length=2, max_length=2, description="h_1, h_2: the conductance is p h_1 h_2 / (h_1 + h_2)"

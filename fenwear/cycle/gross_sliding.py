@@ -185,7 +185,8 @@ class GrossSliding:
             return joined(placed, condensed)
         if not conducts_alike or placed.motion != system.motion:
             return _with_heat_as(system, joined(placed, condensed))
-        return joined(placed, condensed, system.exchange.varied(case.heat, heating_frictions(placed)))
+        exchange = system.exchange.varied(case.heat, heating_frictions(placed))
+        return joined(placed, condensed, exchange.through(placed.layer_conductance()))
 
     def _placed(self, case: Case, bodies: Bodies, sliding: Sliding | None = None) -> ContactSetup:
         placed = place(bodies, sliding or make_sliding(case), case.heat, solver=case.contact.solver, case=case)

@@ -87,6 +87,7 @@ class HeatExchange:
             for side in sides
         ]
         self.fineness: Fineness | None = None  # of the steps, where it is known
+        self.of_layer: Callable[[Array], Array] | None = None  # conductance by pressure (n,), where a layer gives it
         self._forget()
         for basis in self.bases:
             self.team.serve(basis)
@@ -123,6 +124,12 @@ class HeatExchange:
         """Return the exchange at another mu (phases, n) with all else the same."""
         other = copy.copy(self)
         other.friction = friction
+        return other
+
+    def through(self, of_layer: Callable[[Array], Array] | None) -> HeatExchange:
+        """Return the exchange whose conductance a layer gives by the pressures (n,); None where none does."""
+        other = copy.copy(self)
+        other.of_layer = of_layer
         return other
 
     def varied(self, heat: Heat, friction: Array) -> HeatExchange:
@@ -188,7 +195,9 @@ class HeatExchange:
     def conductance(self, pressure: Array) -> Array:
         """Return h_c of each node (n,), N/(mm s K): infinite for perfect contact, NaN where none conducts."""
         value: NDArray[Any]
-        if self.heat.conductance_per_pressure is not None:
+        if self.of_layer is not None:
+            value = self.of_layer(pressure)
+        elif self.heat.conductance_per_pressure is not None:
             h1, h2 = self.heat.conductance_per_pressure
             value = np.maximum(pressure, 0.0) * (h1 * h2 / (h1 + h2))
         else:

@@ -28,6 +28,7 @@ from fenwear.heat.field import ReducedBasis
 from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.interface.placement import HERE, Placement
+from fenwear.layers import conductance_of
 from fenwear.stick.interface import LoadEffect, StickInterface
 from fenwear.stick.program import far_enough, timed_motion
 
@@ -237,6 +238,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
         fresh=interface.fresh,
     )
     expanded = expansions(interface, exchange, bodies, case.heat.initial)
+    exchange = exchange.through(conductance_of(interface.layers, case, bodies.regions))
     return StickHeat(heated_directly(exchange), expanded, interface, stays=passage is None)
 
 

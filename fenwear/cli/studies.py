@@ -155,7 +155,13 @@ def calibrate_command(
 @app.command("life")
 def life_command(
     case: CaseArgument,
-    until: Annotated[str, typer.Option(help='A level: "depth 0.2 mm", "distance until volume 3 mm^3".')],
+    until: Annotated[
+        list[str],
+        typer.Option(
+            help='A level: "depth 0.2 mm", "distance until volume 3 mm^3", "depth in left 5 um" of the contact left; '
+            "repeatable: until the first."
+        ),
+    ],
     scatters: Annotated[
         list[str],
         typer.Option(

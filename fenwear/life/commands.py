@@ -215,7 +215,7 @@ def _residual_table(found: Calibration) -> str:
 def run_life(
     case: Case,
     name: str,
-    until: str,
+    until: Sequence[str],
     scatters: Sequence[str],
     calibration: Path | None,
     samples: int,
@@ -230,7 +230,7 @@ def run_life(
 ) -> tuple[Lifetime, Path]:
     """Compute lives; write samples.csv, life.json and life.png; collective."""
     _need("openturns", "life")
-    quantity = parse_quantity(until, "--until", case.names)
+    quantities = [parse_quantity(one, "--until", case.names) for one in until]
     scatter: Scatter | None = None if calibration is None else load_scatter(calibration, case)
     for text in scatters:
         one = parse_scatter(case, text)
@@ -243,7 +243,7 @@ def run_life(
     _tell_of_stick(case, log, comm)
     if resume and output is None:
         raise CaseError(InputError("--resume", "expected the folder of the sampling to go on with, as -o DIR"))
-    level = None if wanted is None else _wanted(case, quantity.life, wanted)
+    level = None if wanted is None else _wanted(case, quantities[0].life, wanted)
     folder = output if resume and output is not None else _folder(output, "life", name, comm)
     if resume:
         on_root(comm, lambda: _check_folder(folder, case))
@@ -251,7 +251,7 @@ def run_life(
     for line in scatter.text:
         log(line)
     found = lifetime(
-        case, quantity, scatter, samples=samples, seed=seed, wanted=level, indices=indices, folder=folder,
+        case, quantities, scatter, samples=samples, seed=seed, wanted=level, indices=indices, folder=folder,
         resume=resume, comm=comm, progress=_counter(log, "samples"),
     )  # fmt: skip
 

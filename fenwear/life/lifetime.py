@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,9 @@ from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.errors import CaseError, ConvergenceError, FenwearError, InputError
 from fenwear.life.model import Model
-from fenwear.life.quantities import LIMIT, Quantity, evaluate, of_case, parse_quantity
-from fenwear.life.ranks import in_chunks
+from fenwear.life.quantities import LIMIT, Quantity, of_case, parse_quantity
+from fenwear.life.quantities import lives as lives_until
+from fenwear.life.ranks import everywhere, in_chunks
 from fenwear.life.scatter import Scatter
 from fenwear.life.sobol import LEVEL, SobolIndices, sobol_design, sobol_indices
 from fenwear.parallel import on_root
@@ -64,6 +65,8 @@ class Lifetime:
         sobol: Indices of the logarithm of the life; None where they were not asked for, or a part lives for ever.
         failures: What went wrong, by its sample.
         seed: Of the sample.
+        each: Of the levels that were asked for, and of the named contacts; empty for one level of one contact. The
+            lives above are then those until the first of all.
     """
 
     quantity: str
@@ -76,6 +79,15 @@ class Lifetime:
     sobol: SobolIndices | None
     failures: dict[int, str]
     seed: int
+    each: tuple[Lifetime, ...] = ()
+
+    @property
+    def first_share(self) -> list[float]:
+        """Of each level, in which share of the parts that reach any it is reached first."""
+        lives = np.array([one.lives for one in self.each])
+        lives = lives[:, np.isfinite(lives).any(axis=0)]
+        first = (lives == lives.min(axis=0, initial=np.inf)).sum(axis=1)
+        return [float(count) / max(lives.shape[1], 1) for count in first]
 
     def as_json(self) -> dict[str, Any]:
         """Return what --json prints and life.json holds."""
@@ -94,7 +106,12 @@ class Lifetime:
             "reliability": None if self.reliability is None else row(self.reliability, "wanted"),
             "sobol": None if self.sobol is None else self.sobol.as_json(),
             "seed": self.seed,
+            **self._each_as_json(),
         }
+
+    def _each_as_json(self) -> dict[str, Any]:
+        told = zip(self.each, self.first_share if self.each else (), strict=True)
+        return {"each": [{**one.as_json(), "first": share} for one, share in told]} if self.each else {}
 
     def text(self) -> str:
         """Return a table for people."""
@@ -119,6 +136,15 @@ class Lifetime:
                 f"    {name:36} {first:7.3f} ({a[0]:.3f} to {a[1]:.3f})  {total:7.3f} ({b[0]:.3f} to {b[1]:.3f})"
                 for name, first, total, a, b in self.sobol.rows()
             ]  # fmt: skip
+        if self.each:
+            lines.append(
+                f"  {'of each, reached before by a share of':40} {'1 %':>11} {'10 %':>12} {'50 %':>12}  is first"
+            )
+            for one, share in zip(self.each, self.first_share, strict=True):
+                known = {q.level: q.value for q in one.quantiles}
+                lines.append(
+                    f"    {one.quantity:36} {known[0.01]:13.5g} {known[0.1]:12.5g} {known[0.5]:12.5g} {share:9.0%}"
+                )
         return "\n".join(lines)
 
 
@@ -153,7 +179,7 @@ def reliability(lives: Array, wanted: float) -> Estimate:
 
 def lifetime(
     case: Case,
-    until: str | Quantity,
+    until: str | Quantity | Sequence[str | Quantity],
     scatter: Scatter,
     *,
     samples: int = 200,
@@ -170,7 +196,8 @@ def lifetime(
 
     Args:
         case: The problem.
-        until: Such as "depth 0.2 mm", or "distance until volume 3 mm^3".
+        until: Such as "depth 0.2 mm", or "distance until volume 3 mm^3"; of several, as of each named contact
+            ("depth in left 0.2 mm"), a part lives until the first. One level of all contacts is told of each, too.
         scatter: Distribution of keys.
         samples: Size n of the sample, a run for each.
         seed: Of the sample.
@@ -187,22 +214,65 @@ def lifetime(
         ConvergenceError: more than 5 % of the runs did not converge; their samples are in samples.csv.
         OutputError: samples.csv cannot be written.
     """
-    quantity = parse_quantity(until, "--until", case.names) if isinstance(until, str) else until
-    if quantity.kind != "life":
-        raise CaseError(
-            InputError("--until", f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}")
-        )
-    of_case(quantity, case, "--until")
+    asked = _asked(case, [until] if isinstance(until, str | Quantity) else until)
     if samples < 2:
         raise CaseError(InputError("--samples", f"expected two or more, got {samples}"))
     scatter.check(case)
     if indices and (len(scatter.keys) < 2 or scatter.correlated):
         raise CaseError(InputError("--sobol", "expected two or more keys that scatter independently of each other"))
     design = on_root(comm, lambda: _design(scatter, samples, seed, with_indices=indices))
-    record = _Record(folder, scatter.keys, quantity.text, design) if folder is not None else None
+    model = Model(case)
+    quantities = everywhere(comm, lambda: _of_contacts(model, asked))
+    names = [one.text for one in quantities]
+    record = _Record(folder, scatter.keys, names, design) if folder is not None else None
     done = on_root(comm, lambda: {} if record is None else record.begin(resume=resume))
-    lives, failures = _run(case, quantity, scatter.keys, design, done, record, limit, comm, progress)
-    return _summary(quantity, scatter.keys, design, lives, failures, samples, wanted, seed, with_indices=indices)
+    lives, failures = _run(model, quantities, scatter.keys, design, done, record, limit, comm, progress)
+
+    def summary(one: Quantity, own: Array, level: float | None, *, with_indices: bool = False) -> Lifetime:
+        return _summary(one, scatter.keys, design, own, failures, samples, level, seed, with_indices=with_indices)
+
+    whole = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
+    found = summary(whole, lives.min(axis=1), wanted, with_indices=indices)
+    told = zip(quantities, lives.T, strict=True)
+    each = tuple(summary(one, own, None) for one, own in told if len(asked) > 1 or one is not asked[0])
+    return replace(found, each=each)
+
+
+def _asked(case: Case, until: Sequence[str | Quantity]) -> list[Quantity]:
+    """Return the levels asked for.
+
+    Raises:
+        CaseError: one is none, or makes no sense; or they are not counted alike.
+    """
+    found = [parse_quantity(one, "--until", case.names) if isinstance(one, str) else one for one in until]
+    for quantity in found:
+        if quantity.kind != "life":
+            message = f"expected a quantity and its level such as 'depth 0.2 mm', got {quantity.text!r}"
+            raise CaseError(InputError("--until", message))
+        of_case(quantity, case, "--until")
+    if not found or len({one.life for one in found}) > 1:
+        raise CaseError(InputError("--until", "expected levels that are all counted in cycles, distance or time"))
+    return found
+
+
+def _of_contacts(model: Model, asked: Sequence[Quantity]) -> list[Quantity]:
+    """Return the levels asked for, and where it is one of all contacts that of each contact with a name besides.
+
+    Raises:
+        CaseError: a contact is not known.
+    """
+    pair = model.system().pair
+    surfaces = {"punch": pair.punch, "strip": pair.strip}
+    for one in asked:
+        names = [name for name in pair.punch.names if name in surfaces[one.body].names]
+        if one.contact and one.contact not in names:
+            known = f"known are {', '.join(names)}" if names else f"contacts of the {one.body} have no names"
+            raise CaseError(InputError("--until", f"{one.text!r}: no contact is called {one.contact!r}; {known}"))
+    whole = asked[0]
+    names = [name for name in pair.punch.names if name in surfaces[whole.body].names]
+    if len(asked) > 1 or whole.contact or whole.at is not None or len(names) < 2:
+        return list(asked)
+    return [whole, *(whole.within(name) for name in names)]
 
 
 def _design(scatter: Scatter, samples: int, seed: int, *, with_indices: bool) -> Array:
@@ -215,22 +285,21 @@ def _design(scatter: Scatter, samples: int, seed: int, *, with_indices: bool) ->
 
 
 def _run(
-    case: Case,
-    quantity: Quantity,
+    model: Model,
+    quantities: Sequence[Quantity],
     keys: Sequence[str],
     design: Array,
-    done: dict[int, tuple[float, str]],
+    done: dict[int, tuple[Array, str]],
     record: _Record | None,
     limit: int,
     comm: MPI.Comm,
     progress: Callable[[int, int], None],
 ) -> tuple[Array, dict[int, str]]:
-    """Compute what is not done yet; return lives and failures."""
-    model = Model(case)
-    lives = np.full(len(design), np.nan)
+    """Compute what is not done yet; return lives (n, q) and failures."""
+    lives = np.full((len(design), len(quantities)), np.nan)
     failures: dict[int, str] = {}
 
-    def note(number: int, life: float, trouble: str) -> None:
+    def note(number: int, life: Array, trouble: str) -> None:
         lives[number] = life
         if trouble:
             failures[number] = trouble
@@ -239,17 +308,17 @@ def _run(
         note(number, life, trouble)
     left = [number for number in range(len(design)) if number not in done]
 
-    def one(number: int) -> float:
+    def one(number: int) -> Array:
         values = dict(zip(keys, design[number].tolist(), strict=True))
-        return evaluate(model, quantity, values, limit=limit)[0]
+        return lives_until(model, quantities, values, limit)
 
     begin = 0
     progress(len(done), len(design))
     for outcomes in in_chunks(comm, left, one):
-        rows: list[tuple[int, float, str]] = []
+        rows: list[tuple[int, Array, str]] = []
         for number, outcome in zip(left[begin : begin + len(outcomes)], outcomes, strict=True):
             if isinstance(outcome, FenwearError):
-                rows.append((number, float("nan"), " ".join(str(outcome).split())))
+                rows.append((number, np.full(len(quantities), np.nan), " ".join(str(outcome).split())))
             else:
                 rows.append((number, outcome, ""))
         begin += len(outcomes)
@@ -263,11 +332,12 @@ def _run(
 class _Record:
     """samples.csv: heading, then a row for each sample as it is computed."""
 
-    def __init__(self, folder: Path, keys: Sequence[str], quantity: str, design: Array) -> None:
+    def __init__(self, folder: Path, keys: Sequence[str], quantities: Sequence[str], design: Array) -> None:
         self.folder, self.path, self.design = folder, folder / SAMPLES, design
-        self.heading = ["sample", *keys, quantity, "trouble"]
+        self.heading = ["sample", *keys, *quantities, "trouble"]
+        self.lives = len(quantities)
 
-    def begin(self, *, resume: bool) -> dict[int, tuple[float, str]]:
+    def begin(self, *, resume: bool) -> dict[int, tuple[Array, str]]:
         """Make the file, or read what it holds.
 
         Raises:
@@ -283,11 +353,11 @@ class _Record:
                 return {}
         return self._read()
 
-    def add(self, rows: Sequence[tuple[int, float, str]]) -> None:
+    def add(self, rows: Sequence[tuple[int, Array, str]]) -> None:
         """Append samples."""
         with writing(self.path):
             self._append(
-                [[number, *(repr(float(v)) for v in self.design[number]), repr(float(life)), trouble]
+                [[number, *(repr(float(v)) for v in (*self.design[number], *life)), trouble]
                  for number, life, trouble in rows]
             )  # fmt: skip
 
@@ -295,7 +365,7 @@ class _Record:
         with self.path.open("a", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows(rows)
 
-    def _read(self) -> dict[int, tuple[float, str]]:
+    def _read(self) -> dict[int, tuple[Array, str]]:
         try:
             text = self.path.read_bytes().decode("utf-8")
         except (OSError, UnicodeDecodeError):
@@ -305,10 +375,11 @@ class _Record:
         if not rows or rows[0] != self.heading:
             raise CaseError(InputError("--resume", f"{self.path} is of another sampling: expected the heading "
                                     f"{', '.join(self.heading)}"))  # fmt: skip
-        done: dict[int, tuple[float, str]] = {}
+        done: dict[int, tuple[Array, str]] = {}
         for line, row in enumerate(rows[1:], 2):
             try:
-                number, *values, life = int(row[0]), *map(float, row[1:-1])
+                number, numbers = int(row[0]), [float(cell) for cell in row[1:-1]]
+                values, life = numbers[: -self.lives], np.array(numbers[-self.lives :])
             except (ValueError, IndexError):
                 raise CaseError(
                     InputError("--resume", f"{self.path}: row {line}: is damaged; remove it and go on")

@@ -23,7 +23,8 @@ from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem
 from fenwear.cycle.coupled import cycle_heat, touching
 from fenwear.errors import ConvergenceError
-from fenwear.life.model import Snapshot, steady_snapshot
+from fenwear.life.model import steady_snapshot
+from fenwear.life.snapshot import Snapshot
 from fenwear.sliding.pressure_law import PressureLaw
 
 

@@ -24,6 +24,7 @@ from fenwear.cycle.totals import SUMS, Totals, cycle_totals
 from fenwear.errors import CaseError, InputError
 from fenwear.law_choice import check_decided
 from fenwear.life.keys import with_values
+from fenwear.life.snapshot import Snapshot, WornSurface, contacts_of
 from fenwear.plausibility.stroke import stroke_warnings
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import WornDepths
@@ -35,84 +36,6 @@ KEPT = 32  # runs whose ends are kept
 ONE_STEP = 10**12  # cycles: a jump reaches as far as the next stop
 WITHIN = 1e-9  # relative: what properties of the temperature may still change by in a steady state, for differences
 NEAR_THE_END = 0.01  # of the pressure scale: where the run-in is over
-
-
-@dataclass(frozen=True)
-class WornSurface:
-    """The worn surface of a body.
-
-    Attributes:
-        x: Nodes, ascending (n,), mm.
-        weights: Length that each stands for (n,), mm.
-        depth: Worn depth (n,), mm; None in a steady state, whose depth grows without end.
-        rate: Depth worn in a cycle (n,), mm.
-        volume: Worn off as the run has metered it, mm³: of a closed track all that is spread along it, where the
-            surface is a part of the track; None in a steady state.
-        volume_rate: The same of a cycle, mm³.
-    """
-
-    x: Array
-    weights: Array
-    depth: Array | None
-    rate: Array
-    volume: float | None
-    volume_rate: float
-
-    def later(self, cycles: float) -> WornSurface:
-        """Return the surface after cycles more, or less, at the rates of the last one."""
-        if self.depth is None or self.volume is None:
-            return self
-        return replace(self, depth=self.depth + self.rate * cycles, volume=self.volume + self.volume_rate * cycles)
-
-
-@dataclass(frozen=True)
-class Snapshot:
-    """The end of a cycle, or the cyclic steady state.
-
-    Attributes:
-        cycle: Its number; infinite for the steady state.
-        surfaces: Worn surface of each body.
-        x: Contact nodes (n,), mm.
-        weights: Length that each stands for (n,), mm.
-        pressure: In each phase of the motion (m, n), MPa.
-        temperature: Of the contact surfaces at the end of each phase that is known (phases, 2, n), K; None without
-            heat.
-        friction: Mean friction coefficient of the cycle, weighted by the pressure.
-        velocity: Rigid-body wear per cycle of each mode, mm and rad; empty in a run.
-        distance: Slid in a cycle, mm.
-        period: Duration of a cycle, s.
-    """
-
-    cycle: float
-    surfaces: Mapping[str, WornSurface]
-    x: Array
-    weights: Array
-    pressure: Array
-    temperature: Array | None
-    friction: float
-    velocity: Mapping[str, float]
-    distance: float
-    period: float
-
-    @property
-    def parts(self) -> bool:
-        """Whether the surfaces are apart at some nodes in some phase."""
-        return bool((self.pressure == 0).any())
-
-    def grown_from(self, first: Snapshot) -> bool:
-        """Return whether the edge of contact or scar has moved since, and lies within the mesh."""
-        masks = [(own.pressure > 0).any(axis=0) for own in (first, self)]
-        pairs = [(masks[0], masks[1])]
-        for body, own in self.surfaces.items():
-            before = first.surfaces[body].depth
-            if own.depth is not None and before is not None:
-                pairs.append((before > 0, own.depth > 0))
-        return any(bool((late & ~early).any()) and not bool(late.all()) for early, late in pairs)
-
-    def at_cycle(self, cycle: float) -> Snapshot:
-        """Return the snapshot with its depths and volumes carried on to a cycle nearby, at the rate of its last one."""
-        moved = {body: own.later(cycle - self.cycle) for body, own in self.surfaces.items()}
-        return replace(self, cycle=cycle, surfaces=moved)
 
 
 @dataclass(frozen=True)
@@ -363,7 +286,7 @@ def _of_final_shape(system: Tribosystem) -> Snapshot:
         surfaces[body] = replace(own, volume=thickness * float(own.weights @ own.depth))
     warm = None if found.temperature is None else found.temperature[None]
     return Snapshot(np.inf, surfaces, system.pair.x, system.pair.weights, found.pressures, warm, 0.0, {},
-                    _stroke(system), system.motion.period)  # fmt: skip
+                    _stroke(system), system.motion.period, contacts_of(system.pair.punch))  # fmt: skip
 
 
 def _stroke(system: Tribosystem) -> float:
@@ -394,6 +317,7 @@ def _of_steps(block: Block) -> Snapshot:
         {},
         _stroke(system),
         system.motion.period,
+        contacts_of(system.pair.punch),
     )
 
 
@@ -410,9 +334,12 @@ def _worn_surfaces(
         totals: So far.
     """
     facing = system.pair
-    nodes = {"punch": (facing.x, facing.weights), "strip": (facing.strip.abscissa, facing.strip.weights)}
+    nodes = {
+        "punch": (facing.punch, facing.x, facing.weights),
+        "strip": (facing.strip, facing.strip.abscissa, facing.strip.weights),
+    }
     surfaces = {}
-    for body, (x, weights) in nodes.items():
+    for body, (surface, x, weights) in nodes.items():
         order, volume = np.argsort(x, kind="stable"), f"volume_{body}"
         surfaces[body] = WornSurface(
             x[order],
@@ -421,6 +348,7 @@ def _worn_surfaces(
             getattr(rate, body)[order],
             None if totals is None else float(totals.of(volume)),
             float(adds.of(volume)),
+            {name: own[order] for name, own in contacts_of(surface).items()},
         )
     return surfaces
 
@@ -462,6 +390,7 @@ def _snapshot(
         velocity,
         float(adds.of("distance")),
         system.motion.period,
+        contacts_of(system.pair.punch),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -68,6 +69,13 @@ def life_figure(life: Lifetime) -> Figure:
     share = np.arange(1, len(known) + 1) / len(known)
     finite = np.isfinite(known)
     axes[0].step(known[finite], share[finite], where="post", color=BLUE)
+    for own, style in zip(life.each, itertools.cycle(("--", ":", "-.")), strict=False):
+        alone = np.sort(own.lives[np.isfinite(own.lives)])
+        height = np.arange(1, len(alone) + 1) / len(known)
+        axes[0].step(alone, height, where="post", color=GREY, linestyle=style, label=own.quantity)
+    if life.each:
+        axes[0].lines[0].set_label("the first")
+        axes[0].legend(frameon=False)
     for one in life.quantiles:
         if np.isfinite(one.value) and np.isfinite(one.high):
             axes[0].plot([one.low, one.high], [one.level, one.level], color=RED, linewidth=1.5)

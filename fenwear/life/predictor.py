@@ -9,8 +9,9 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.errors import CaseError, InputError
 from fenwear.life.data import DataSet, Series
-from fenwear.life.model import Model, Snapshot
+from fenwear.life.model import Model
 from fenwear.life.quantities import UNITS, Quantity, cycles_of
+from fenwear.life.snapshot import Snapshot
 
 
 class Predictor:

@@ -2,8 +2,8 @@
 
     depth of strip at 3 mm after 3600 m      steady pressure      cycles until depth 0.2 mm      run-in distance
 
-A quantity is written as: [steady] NAME [of punch|strip] [at X] [after AMOUNT], or
-cycles|distance|time until NAME [of punch|strip] [at X] LEVEL.
+A quantity is written as: [steady] NAME [of punch|strip] [in CONTACT] [at X] [after AMOUNT], or
+cycles|distance|time until NAME [of punch|strip] [in CONTACT] [at X to] LEVEL, where CONTACT is one that has a name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from fenwear.case import Case
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.case.units import convert
 from fenwear.errors import CaseError, InputError
-from fenwear.life.model import Model, Snapshot, WornSurface
+from fenwear.life.model import Model
+from fenwear.life.snapshot import Snapshot, WornSurface
 from fenwear.results.scar import extents
 
 LIMIT = 10_000_000  # cycles after which a level counts as never reached
@@ -51,6 +52,7 @@ MEANINGS = {
     "lambda_M": "rotation of the punch by wear in a cycle, of a steady state",
 }
 OF_A_BODY = ("depth", "volume", "scar_width", "volume_rate")
+IN_A_CONTACT = (*OF_A_BODY, "contact_width", "pressure", "temperature")
 AT_A_PLACE = ("depth", "pressure", "temperature")
 GROWING = ("depth", "volume", "scar_width")  # what a life can be counted to
 OF_RUNS = ("depth", "volume", "scar_width")  # grow without end: no steady state knows them
@@ -58,10 +60,12 @@ LIVES = {"cycles": "", "distance": "mm", "time": "s"}
 WHOLE = {"run-in cycles": "", "run-in distance": "mm", "critical speed": "mm/s"}
 
 _PLAIN = re.compile(
-    r"(?P<steady>steady )?(?P<name>[A-Za-z_]+)( of (?P<body>[\w-]+))?( at (?P<at>.+?))?( after (?P<after>.+))?"
+    r"(?P<steady>steady )?(?P<name>[A-Za-z_]+)( of (?P<body>[\w-]+))?( in (?P<contact>[\w-]+))?( at (?P<at>.+?))?"
+    r"( after (?P<after>.+))?"
 )
 _UNTIL = re.compile(
-    r"((?P<life>\w+) until )?(?P<name>\w+)( of (?P<body>[\w-]+))?( at (?P<at>.+?) to)? (?P<level>[\d.+-].*)"
+    r"((?P<life>\w+) until )?(?P<name>\w+)( of (?P<body>[\w-]+))?( in (?P<contact>[\w-]+))?"
+    r"( at (?P<at>.+?) to)? (?P<level>[\d.+-].*)"
 )
 Kind = Literal["snapshot", "steady", "life", "whole"]
 
@@ -80,6 +84,7 @@ class Quantity:
         after: Cycles, distance (mm) or time (s) at which it is taken, with what it is; None for the end of the run.
         level: Up to which a life counts.
         life: Whether that is counted in cycles, distance or time.
+        contact: The named contact that it is of; "" for all.
     """
 
     text: str
@@ -91,6 +96,7 @@ class Quantity:
     after: tuple[float, str] | None = None
     level: float = 0.0
     life: str = "cycles"
+    contact: str = ""
 
     @property
     def title(self) -> str:
@@ -103,11 +109,11 @@ class Quantity:
         Raises:
             CaseError: the snapshot does not know it.
         """
-        return _VALUES[self.name](self, snapshot)
+        return _VALUES[self.name](self, self._own(snapshot))
 
     def rate(self, snapshot: Snapshot) -> float:
         """Return its growth in a cycle, for depth and volume; NaN for what has no simple rate."""
-        surface = snapshot.surfaces[self.body]
+        surface = self._own(snapshot).surfaces[self.body]
         if self.name == "volume":
             return surface.volume_rate
         if self.name == "depth" and surface.depth is not None:
@@ -115,6 +121,22 @@ class Quantity:
                 return _at(surface.x, surface.rate, self.at, self.text)
             return float(surface.rate[int(np.argmax(surface.depth))])
         return float("nan")
+
+    def _own(self, snapshot: Snapshot) -> Snapshot:
+        """Return the snapshot of its contact.
+
+        Raises:
+            CaseError: there is none, or its body's surface has none of this name.
+        """
+        own = snapshot.within(self.contact, self.text)
+        if self.body not in own.surfaces and self.name in OF_A_BODY:
+            raise CaseError(InputError(self.text, f"the surface of the {self.body} is not named by contacts"))
+        return own
+
+    def within(self, contact: str) -> Quantity:
+        """Return the same of one named contact."""
+        text = re.sub(rf"\b{self.name}\b( of [\w-]+)?", lambda at: f"{at[0]} in {contact}", self.text, count=1)
+        return replace(self, text=text, contact=contact)
 
 
 def parse_amount(text: str, option: str) -> tuple[float, str]:
@@ -166,7 +188,8 @@ def parse_quantity(text: str, option: str = "--of", names: Names = BY_ROLE) -> Q
         raise CaseError(InputError(option, f"expected 'steady {name}', got {words!r}"))
     body, at = _place(name, match, words, option, names)
     after = None if match["after"] is None else parse_amount(match["after"], option)
-    return Quantity(words, name, "steady" if is_steady else "snapshot", UNITS[name], body, at, after)
+    kind: Kind = "steady" if is_steady else "snapshot"
+    return Quantity(words, name, kind, UNITS[name], body, at, after, contact=match["contact"] or "")
 
 
 def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quantity:
@@ -184,7 +207,7 @@ def _life(words: str, match: re.Match[str], option: str, names: Names) -> Quanti
         raise CaseError(InputError(option, f"expected a level with its unit, such as '0.2 mm', got {words!r}"))
     if level <= 0:
         raise CaseError(InputError(option, f"expected a level above zero, got {words!r}"))
-    return Quantity(words, name, "life", LIVES[life], body, at, None, level, life)
+    return Quantity(words, name, "life", LIVES[life], body, at, None, level, life, match["contact"] or "")
 
 
 def _place(name: str, match: re.Match[str], words: str, option: str, names: Names) -> tuple[str, float | None]:
@@ -195,6 +218,8 @@ def _place(name: str, match: re.Match[str], words: str, option: str, names: Name
                 option, names.told(f"expected 'of punch' or 'of strip' behind {', '.join(OF_A_BODY)}, got {words!r}")
             )
         )
+    if match["contact"] and name not in IN_A_CONTACT:
+        raise CaseError(InputError(option, f"expected a contact behind {', '.join(IN_A_CONTACT)} only, got {words!r}"))
     if match["at"] is None:
         return body, None
     if name not in AT_A_PLACE:
@@ -348,7 +373,8 @@ def evaluate(
     if quantity.kind == "whole":
         return _whole(model, quantity, values, settings, distance), Path()
     if quantity.kind == "life":
-        return _until(model, quantity, values, settings, path, limit, (distance, period))
+        found, path = _until(model, (quantity,), values, settings, path, limit, (distance, period))
+        return float(found[0]), path
     if quantity.after is None:
         half_cycles = model.system(values, settings).motion.half_cycles
         wanted = float(max(1, model.case.run.half_cycles // half_cycles))
@@ -374,34 +400,48 @@ def _whole(
     return cycles * distance if quantity.name == "run-in distance" else cycles
 
 
+def lives(model: Model, quantities: Sequence[Quantity], values: Mapping[str, float], limit: int = LIMIT) -> Array:
+    """Return the lives of one run until each of several levels (q,), for values of keys.
+
+    Raises:
+        CaseError: a value is not possible, or a contact is not known.
+        ConvergenceError: the run did not converge.
+    """
+    return _until(model, quantities, values, (), None, limit, model.cycle_measures(values))[0]
+
+
 def _until(
     model: Model,
-    quantity: Quantity,
+    quantities: Sequence[Quantity],
     values: Mapping[str, float],
     settings: Sequence[str],
     path: Path | None,
     limit: int,
     measures: tuple[float, float],
-) -> tuple[float, Path]:
-    """Run until the level is passed, and count to where a cubic through depths and rates meets it."""
-    taken: list[tuple[float, float, float]] = [(0.0, 0.0, float("nan"))]
+) -> tuple[Array, Path]:
+    """Run until all levels are passed, and count to where a cubic through values and rates meets each."""
+    taken = [[(0.0, 0.0, float("nan"))] for _ in quantities]
+    levels, passed = np.array([one.level for one in quantities]), np.zeros(len(quantities), dtype=int)
     sequence = None if path is None else path.sequence
-    passed, grows = 0, False
+    grows = False
     first: Snapshot | None = None
 
     def enough(_: Snapshot) -> bool:
-        return passed > 1  # one jump more, so that values nearby find their level on the same path
+        return bool((passed > 1).all())  # one jump more, so that values nearby find their level on the same path
 
     for snapshot in model.run(values, limit if path is None else path.sequence[-1], settings=settings,
                               sequence=sequence, until=enough):  # fmt: skip
-        taken.append((snapshot.cycle, quantity.of_snapshot(snapshot), quantity.rate(snapshot)))
-        passed += taken[-1][1] >= quantity.level
+        for rows, one in zip(taken, quantities, strict=True):
+            rows.append((snapshot.cycle, one.of_snapshot(snapshot), one.rate(snapshot)))
+        passed += np.array([rows[-1][1] for rows in taken]) >= levels
         first = first or snapshot
         grows = snapshot.grown_from(first)
-    made = Path(tuple(int(cycle) for cycle, _, _ in taken[1:]), grows)
-    cycles = _crossing(np.array(taken), quantity.level)
-    factor = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}[quantity.life]
-    return cycles * factor, made
+    made = Path(tuple(int(cycle) for cycle, _, _ in taken[0][1:]), grows)
+    factors = {"cycles": 1.0, "distance": measures[0], "time": measures[1]}
+    found = [
+        _crossing(np.array(rows), one.level) * factors[one.life] for rows, one in zip(taken, quantities, strict=True)
+    ]
+    return np.array(found), made
 
 
 def _crossing(taken: Array, level: float) -> float:

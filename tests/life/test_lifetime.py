@@ -11,9 +11,20 @@ import pytest
 from mpi4py import MPI
 from scipy import stats
 
-from fenwear import Case, CaseError
-from fenwear.life import Scatter, lifetime, load_scatter, parse_scatter, sobol_design, sobol_indices
+from fenwear import Case, CaseError, make_case
+from fenwear.life import (
+    Lifetime,
+    Model,
+    Scatter,
+    lifetime,
+    load_scatter,
+    parse_quantity,
+    parse_scatter,
+    sobol_design,
+    sobol_indices,
+)
 from fenwear.life.lifetime import quantile, reliability
+from tests.results.test_contacts import two_pads
 
 K = "wear.punch.coefficient"
 UNTIL = "volume 3 mm^3"
@@ -154,3 +165,37 @@ def test_a_joint_distribution_has_the_correlation_of_its_calibration() -> None:
     assert scatter.correlated
     with pytest.raises(CaseError, match="independent"):
         sobol_design(scatter.distribution, 10, 0)
+
+
+def test_each_contact_has_a_life(tmp_path: Path) -> None:
+    """Two pads of 300 and 900 N: N = V / (k F s) of each and of both, the first of those asked for; names are told."""
+    case = make_case(two_pads(tmp_path, named=1.0))
+    scatter = parse_scatter(case, f"{K}=lognormal({case.wear.punch.coefficient!r} 1/MPa, 50 %)")  # type: ignore[union-attr]
+    (distance, _), volume = Model(case).cycle_measures(), 1e-4
+
+    def exact(found: Lifetime, force: float) -> list[float]:
+        return list(volume / (found.samples[:, 0] * force * distance))
+
+    found = lifetime(case, f"volume {volume} mm^3", scatter, samples=3, comm=MPI.COMM_SELF)
+    assert found.lives == pytest.approx(exact(found, 1200.0), rel=1e-6)
+    assert [one.quantity for one in found.each] == [f"volume in {name} {volume} mm^3" for name in ("left", "right")]
+    for one, force in zip(found.each, (300.0, 900.0), strict=True):
+        assert one.lives == pytest.approx(exact(found, force), rel=1e-6)
+    assert found.first_share == [0.0, 1.0]
+    own = [f"volume in left {volume} mm^3", f"volume of punch in right {5 * volume} mm^3"]
+    several = lifetime(case, own, scatter, samples=3, comm=MPI.COMM_SELF, folder=tmp_path)
+    assert several.lives == pytest.approx(exact(several, 300.0), rel=1e-6)
+    assert several.each[1].lives == pytest.approx(exact(several, 180.0), rel=1e-6)
+    assert several.first_share == [1.0, 0.0]
+    again = lifetime(case, own, scatter, samples=3, comm=MPI.COMM_SELF, folder=tmp_path, resume=True)
+    np.testing.assert_array_equal(again.each[1].lives, several.each[1].lives)
+    assert "volume in left 0.0001 mm^3" in several.text()
+    assert several.as_json()["each"][0]["first"] == 1
+    depths = lifetime(case, "depth 0.1 um", scatter, samples=2, comm=MPI.COMM_SELF)
+    np.testing.assert_array_equal(depths.lives, np.min([one.lives for one in depths.each], axis=0))
+    with pytest.raises(CaseError, match="no contact is called 'middle'; known are left, right"):
+        lifetime(case, "depth in middle 1 um", scatter, comm=MPI.COMM_SELF)
+    with pytest.raises(CaseError, match="expected a contact behind depth, volume"):
+        parse_quantity("friction in left")
+    with pytest.raises(CaseError, match="all counted in cycles"):
+        lifetime(case, ["depth 1 um", "time until depth 1 um"], scatter, comm=MPI.COMM_SELF)

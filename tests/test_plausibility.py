@@ -15,9 +15,9 @@ import pytest
 from markupsafe import escape
 
 from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
-from fenwear.assembly import place_case
+from fenwear.assembly import place_case, with_case
 from fenwear.bodies.ready import meshes_folder
-from fenwear.case import plausibility_warnings
+from fenwear.case import changed_case, plausibility_warnings
 from fenwear.case.templates import write_case_of
 from fenwear.errors import MeshQualityError
 from fenwear.plausibility import (
@@ -233,6 +233,25 @@ def test_a_run_beyond_the_hardness(tmp_path: Path) -> None:
     summary, _ = run_case(make_case(tables), "run", tmp_path / "run", lambda message: None)
     (warning,) = summary["warnings"]
     assert "reaches 16.67 MPa, more than wear.punch.hardness, 10 MPa" in warning
+
+
+@pytest.mark.parametrize(("name", "factor"), [("fretting-partial-slip", 4.0), ("ball-on-flat", 4.7)])
+def test_shakedown(name: str, factor: float, assembled: Assembled) -> None:
+    """Told beyond 4 k in line contact and 4.7 k in point contact, k = Y / sqrt(3), without a hardness alone."""
+    small = {"fretting-partial-slip": "geometry.parameters.elements_along_contact=8"}.get(name, "geometry.degree=1")
+    settings = [small, "geometry.follow_wear=never", "contact.law='gross-sliding'"]
+    system = assembled(name, *settings, *(["stick={}"] if name.startswith("fretting") else []))
+    pressure = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure.max()
+    material = next(iter(system.case.used_materials))
+    for share, told in ((1.01, False), (0.99, True)):
+        yields = f"materials.{material}.yield_stress={share * float(pressure) / factor * 3**0.5!r}"
+        again = with_case(system, changed_case(system.case, yields))
+        texts = [text for text in initial_warnings(again) if "shakedown" in text]
+        assert bool(texts) == told
+        if told:
+            assert f"{factor:g} k by materials.{material}.yield_stress" in texts[0]
+            capped = with_case(again, changed_case(again.case, f"contact.hardness={10 * float(pressure)!r}"))
+            assert not [text for text in initial_warnings(capped) if "shakedown" in text]
 
 
 def test_molten() -> None:

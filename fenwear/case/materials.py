@@ -48,6 +48,10 @@ class Material(Part):
         description="linear thermal expansion alpha; where it depends on T, the mean from heat.initial to T",
     )
 
+    yield_stress: Annotated[Stress, Field(gt=0)] | None = Field(
+        default=None, description="in tension; where it is given pressures beyond the shakedown limit are told"
+    )
+
     @model_validator(mode="after")
     def _of_temperature_alone(self) -> Self:
         for name in self.dependent:

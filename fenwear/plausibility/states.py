@@ -20,6 +20,7 @@ from fenwear.plausibility.rim import ContactRim, contact_rim
 from fenwear.plausibility.size import size_warnings
 from fenwear.plausibility.stroke import stroke_warnings
 from fenwear.plausibility.thickness import thickness, worn_through
+from fenwear.results.shakedown import shakedown_text
 from fenwear.results.summary import net_of
 
 SHALLOW = 1e-3  # of the contact surface's extent: depths that no body is thin enough for
@@ -47,6 +48,9 @@ class StateMonitor:
         if self.chamfer is not None:
             found["chamfer"] = self.chamfer.text(self.chamfer.widened(self.system, block.end.worn))
         found["pressed"] = pressed(case, float(mean_pressures(block.pressure, weights).max()))
+        hardest = int(np.argmax(block.pressure.max(axis=1)))
+        when = f"in half-cycle {int(block.half_cycle[hardest]):,}"
+        found["shakedown"] = shakedown_text(block.system, float(block.pressure.max()), when)
         for name, elastic, depths in (
             ("punch", self.system.bodies.punch, block.wear),
             ("strip", self.system.bodies.strip, block.wear_strip),
@@ -181,6 +185,7 @@ def initial_warnings(system: Tribosystem) -> list[str]:
     contact = system.phase_contact((0,)).solve(system.gap(0, system.unworn()))
     pressure, weights, limits = contact.pressure[0], system.pair.weights, contact_limits(system)
     texts = [pressed(system.case, float(mean_pressures(pressure[None], weights)[0]))]
+    texts.append(shakedown_text(system, float(pressure.max()), "at the start"))
     error = complementarity_error(pressure, contact.gap[0], system.interface.elastic_length)
     texts.append(broken_text(float(error), "at the start"))
     texts.append(few_across(system, limits, pressure, "at the start"))
@@ -197,6 +202,7 @@ def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:
     weights, limits = system.pair.weights, contact_limits(system)
     texts = [*size_warnings(system.case, system.bodies, system.rigid), *layer_warnings(system)]
     texts.append(pressed(system.case, float(mean_pressures(state.phase_pressure, weights).max())))
+    texts.append(shakedown_text(system, float(state.phase_pressure.max()), "in the cyclic steady state"))
     texts.append(broken_text(state.complementarity_error, "in the cyclic steady state"))
     few = (few_across(system, limits, pressure, "in the cyclic steady state") for pressure in state.phase_pressure)
     texts.append(next((text for text in few if text), ""))

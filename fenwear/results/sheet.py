@@ -261,6 +261,7 @@ LINES = {
             ("last_through_half_cycle", "... last so far in half-cycle", ""),
         )
     },
+    "shakedown_limit_MPa": Line("shakedown limit of the largest pressure", "MPa"),
     "plastic_volume_mm3": Line("plastic volume, apart from wear", "mm³"),
     "largest_plastic_depth_mm": Line("... depth, largest", "µm", 1e3),
     "debris_volume_mm3": Line("debris between the surfaces", "mm³"),

@@ -14,6 +14,7 @@ from fenwear.results import between, creep, place, sheet, steps
 from fenwear.results.contacts import CONTACTS, contact_sheets
 from fenwear.results.degrees import degrees_of
 from fenwear.results.scar import conforming
+from fenwear.results.shakedown import shakedown_limit
 from fenwear.results.zone import ContactNet, contact_net, without_noise
 from fenwear.versions import versions
 
@@ -39,6 +40,7 @@ def summarise(system: Tribosystem, last: Block, extremes: dict[str, float], run:
         **(_plane_summary(system, last) if plane else _surface_summary(system, last)),
         **between.numbers(last),
         **creep.numbers(last),
+        **({} if (limit := shakedown_limit(system)) is None else {"shakedown_limit_MPa": limit[0]}),
         **steps.numbers(last),
         **({} if last.heat is None else _heat_summary(system, last, extremes[HOTTEST])),
         **({CONTACTS: contacts} if (contacts := contact_sheets(last)) else {}),

@@ -1,0 +1,46 @@
+"""The largest pressure that contacts between curved surfaces settle under elastically: their shakedown limit.
+
+Under a contact that rolls or slides to and fro, what yields at first leaves residual stresses by which the rest is
+carried elastically, as long as the largest pressure p_0 is at most 4 k in line contact and 4.7 k in point contact. k is
+the yield stress in shear, by von Mises that in tension over sqrt(3) (K. L. Johnson, Contact Mechanics, 1985, 9.1, 9.2;
+A. R. S. Ponter et al., J. Mech. Phys. Solids 33, 1985, 339). These are the limits without friction
+and hardening: friction lowers them, hardening raises them. Beyond them the surface flows in every cycle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenwear.assembly import ContactSetup
+from fenwear.results.scar import conforming
+
+LINE, POINT = 4.0, 4.7  # p_0 / k
+
+
+def shakedown_limit(placed: ContactSetup) -> tuple[float, str] | None:
+    """Return the limit, MPa, and the material that has it; None for conforming surfaces, or without a yield stress."""
+    case = placed.made_from
+    if case is None or conforming(placed.pair):
+        return None
+    bodies = zip((case.punch, case.strip), placed.bodies.regions, strict=True)
+    used = {body.regions[name] for body, shares in bodies for name, share in shares.items() if share.any()}
+    known = {name: case.materials[name].yield_stress for name in sorted(used)}
+    given = {name: value for name, value in known.items() if value is not None}
+    if not given:
+        return None
+    softest = min(given, key=lambda name: given[name])
+    factor = POINT if placed.pair.punch.dim == 3 else LINE
+    return float(factor * given[softest] / np.sqrt(3)), softest
+
+
+def shakedown_text(placed: ContactSetup, pressure: float, when: str) -> str:
+    """Say that a largest pressure, MPa, is beyond the limit; "" if it is not, or a hardness caps it."""
+    limit = None if placed.layers.hardness < np.inf else shakedown_limit(placed)
+    if limit is None or pressure <= limit[0]:
+        return ""
+    factor = POINT if placed.pair.punch.dim == 3 else LINE
+    return (
+        f"the largest pressure is {pressure:,.4g} MPa {when}, beyond the shakedown limit of {limit[0]:,.4g} MPa, "
+        f"{factor:g} k by materials.{limit[1]}.yield_stress: the surface flows in every cycle, and a linear-elastic "
+        "contact does not; expected less load, or contact.hardness"
+    )

@@ -14,6 +14,7 @@ from fenwear.plausibility.few import few_text
 from fenwear.plausibility.size import size_warnings
 from fenwear.plausibility.slip import law_warnings, unique_text
 from fenwear.results.degrees import CELSIUS, KELVIN, degrees_of
+from fenwear.results.shakedown import shakedown_text
 from fenwear.results.summary import net_of
 from fenwear.sliding.chart import sliding_chart
 from fenwear.stick.coulomb import touches
@@ -48,7 +49,8 @@ def check_text(case: Case, system: Tribosystem | None = None) -> str:
     if stuck == closed:
         regime = "full stick"
     few = few_text(case, net_of(system), records.pressure[0], "at the start")
-    warnings = (*sizes, *law_warnings(system), unique_text(records.unique.astype(bool)), few)
+    flows = shakedown_text(system, float(records.pressure.max()), "in the first cycle")
+    warnings = (*sizes, *law_warnings(system), unique_text(records.unique.astype(bool)), few, flows)
     return (
         f"{setup}\n"
         f"the case is valid: {len(weights)} contact nodes, {len(records)} time steps in a cycle; "

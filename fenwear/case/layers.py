@@ -9,9 +9,9 @@ from pydantic import Field
 
 from fenwear.case.creep import Creep
 from fenwear.case.laws import Dependence, OfPlace, constant_or_dependence
-from fenwear.case.quantities import Length, Number, Part, Stress, quantity
+from fenwear.case.quantities import Length, Number, Stress, quantity
 
-STIFFNESS = "MPa/mm"
+STIFFNESS, DENSITY = "MPa/mm", "1/mm^2"
 
 
 class ThirdBody(OfPlace):
@@ -54,39 +54,64 @@ class LinearLayer(OfPlace):
         return {"stiffness": STIFFNESS}
 
 
-class PowerLayer(Part):
+class PowerLayer(OfPlace):
     """A layer that closes by reference (p / pressure)^exponent, as ground joints of machine tools do."""
 
     kind: Literal["power"] = Field(description="closes by a power of the pressure")
-    reference: Annotated[Length, Field(gt=0)] = Field(description="closure at the pressure")
-    pressure: Annotated[Stress, Field(gt=0)] = Field(description="that closes it by the reference")
+    reference: constant_or_dependence(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="closure at the pressure"
+    )
+    pressure: constant_or_dependence(Annotated[Stress, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="that closes it by the reference"
+    )
     exponent: Annotated[Number, Field(gt=0, le=1)] = Field(
         default=0.5, description="of the pressure; 0.5 of ground joints"
     )
 
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {"reference": "mm", "pressure": "MPa"}
 
-class ExponentialLayer(Part):
+
+class ExponentialLayer(OfPlace):
     """A layer whose pressure grows by p = pressure (exp(closure / length) - 1)."""
 
     kind: Literal["exponential"] = Field(description="its pressure grows by an exponential of the closure")
-    length: Annotated[Length, Field(gt=0)] = Field(
+    length: constant_or_dependence(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
         description="closure by which the pressure grows e times, as of rough surfaces: 0.3 to 0.5 of their rms height"
     )
-    pressure: Annotated[Stress, Field(gt=0)] = Field(description="scale of the pressure, reached at 0.69 lengths")
+    pressure: constant_or_dependence(Annotated[Stress, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="scale of the pressure, reached at 0.69 lengths"
+    )
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {"length": "mm", "pressure": "MPa"}
 
 
-class RoughLayer(Part):
+class RoughLayer(OfPlace):
     """Rough surfaces after Greenwood and Williamson: round asperities of one radius and Gaussian heights."""
 
     kind: Literal["rough"] = Field(description="asperities after Greenwood and Williamson")
-    roughness: Annotated[Length, Field(gt=0)] = Field(
+    roughness: constant_or_dependence(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
         description="Sa of both surfaces together, the root of the sum of both squares; their rms height is 1.2533 Sa"
     )
-    asperity_radius: Annotated[Length, Field(gt=0)] = Field(description="mean radius of the asperities' tips")
-    asperity_density: Annotated[float, *quantity("1/mm^2"), Field(gt=0)] = Field(description="asperities on an area")
+    asperity_radius: constant_or_dependence(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
+        description="mean radius of the asperities' tips"
+    )
+    asperity_density: constant_or_dependence(  # type: ignore[valid-type]
+        Annotated[float, *quantity(DENSITY), Field(gt=0)]
+    ) = Field(description="asperities on an area")
     modulus: Annotated[Stress, Field(gt=0)] | None = Field(
         default=None, description="E* of the asperities; by default that of the materials at the contact"
     )
+
+    @classmethod
+    def units(cls) -> Mapping[str, str]:
+        """Return the units of what may depend on the place, by key."""
+        return {"roughness": "mm", "asperity_radius": "mm", "asperity_density": DENSITY}
 
 
 Layers = LinearLayer | PowerLayer | ExponentialLayer | RoughLayer

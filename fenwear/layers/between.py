@@ -245,11 +245,11 @@ def layers_of(
         case LinearLayer(stiffness=stiffness):
             winkler = 1 / place_values(stiffness, place, n, STIFFNESS, "contact.layer.stiffness")
         case PowerLayer() as law:
-            closure = PowerClosure(law.reference, law.pressure, law.exponent)
+            closure = PowerClosure(*_at_nodes(law, place, n), law.exponent)
         case ExponentialLayer() as law:
-            closure = ExponentialClosure(law.length, law.pressure)
+            closure = ExponentialClosure(*_at_nodes(law, place, n))
         case RoughLayer() as law:
-            closure = _rough(law, modulus)
+            closure = _rough(law, modulus, _at_nodes(law, place, n))
     third = contact.third_body
     if third is not None:
         life = place_values(third.life, place, n, "mm", "contact.third_body.life")
@@ -280,14 +280,21 @@ def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: flo
     return Memory(contact, own, frozenset(punch), temperature)
 
 
-def _rough(law: RoughLayer, modulus: float | None) -> Closure:
+def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[str, Array], n: int) -> list[Array]:
+    """Return what of a layer may depend on the place (n,) each, in the order of its keys."""
+    return [
+        place_values(getattr(law, key), place, n, unit, f"contact.layer.{key}") for key, unit in law.units().items()
+    ]
+
+
+def _rough(law: RoughLayer, modulus: float | None, values: list[Array]) -> Closure:
     young = law.modulus or modulus
     if young is None:
         message = "missing, but required where a body has several materials at the contact"
         raise CaseError(InputError("contact.layer.modulus", message))
-    height = RMS * law.roughness
-    stiffness = 4 / 3 * young * law.asperity_density * np.sqrt(law.asperity_radius) * height**1.5
-    return RoughClosure(float(height), float(stiffness))
+    roughness, radius, density = values
+    height = RMS * roughness
+    return RoughClosure(height, 4 / 3 * young * density * np.sqrt(radius) * height**1.5)
 
 
 def common_modulus(case: Case, punch: Mapping[str, Array], strip: Mapping[str, Array]) -> float | None:

@@ -27,7 +27,7 @@ FIRST, LAST, POINTS = 6.0, -12.0, 6000  # distances over sigma between which F i
 
 
 class Closure(Protocol):
-    """A law of closure."""
+    """A law of closure at n nodes, whose parameters are numbers or (n,)."""
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm, at pressures (...), MPa; zero without pressure."""
@@ -40,8 +40,8 @@ class Closure(Protocol):
 class PowerClosure:
     """delta = reference (p / pressure)^exponent."""
 
-    reference: float
-    pressure: float
+    reference: float | Array
+    pressure: float | Array
     exponent: float
 
     def closure(self, pressure: Array) -> Array:
@@ -50,7 +50,8 @@ class PowerClosure:
 
     def slope(self, pressure: Array) -> Array:
         """Return its derivative (...), mm/MPa; finite without pressure, too."""
-        floor = max(LEAST * float(pressure.max(initial=0.0)), 1e-300 if self.exponent == 1 else LEAST * self.pressure)
+        least = 1e-300 if self.exponent == 1 else LEAST * self.pressure
+        floor = np.maximum(LEAST * float(pressure.max(initial=0.0)), least)
         ratio = np.maximum(pressure, floor) / self.pressure
         return np.asarray(self.reference * self.exponent / self.pressure * ratio ** (self.exponent - 1))
 
@@ -59,8 +60,8 @@ class PowerClosure:
 class ExponentialClosure:
     """p = pressure (exp(delta / length) - 1)."""
 
-    length: float
-    pressure: float
+    length: float | Array
+    pressure: float | Array
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""
@@ -76,12 +77,12 @@ class RoughClosure:
     """Greenwood and Williamson's law.
 
     Attributes:
-        height: sigma, standard deviation of the heights, mm.
-        stiffness: (4/3) E* eta sqrt(R) sigma^(3/2), MPa.
+        height: sigma, standard deviation of the heights (n,), mm.
+        stiffness: (4/3) E* eta sqrt(R) sigma^(3/2) (n,), MPa.
     """
 
-    height: float
-    stiffness: float
+    height: float | Array
+    stiffness: float | Array
 
     def closure(self, pressure: Array) -> Array:
         """Return delta (...), mm."""

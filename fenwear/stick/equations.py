@@ -193,9 +193,9 @@ class Step:
         if self.closure is None:
             return
         rows, pressure = np.arange(len(closed)), status.pressure[closed]
-        slope = self.closure.slope(pressure)
+        slope = self.closure.slope(status.pressure)[closed]
         A[rows, rows] += slope / self.scale[0, closed]
-        b[rows] -= (self.closure.closure(pressure) - slope * pressure) / self.scale[0, closed]
+        b[rows] -= (self.closure.closure(status.pressure)[closed] - slope * pressure) / self.scale[0, closed]
         size = 1 + slope / self.scale[0, closed]
         A[rows] /= size[:, None]
         b[rows] /= size

@@ -453,7 +453,7 @@ def _stiffness(problem: PartialSlipProblem, position: Position, closed: NDArray[
     system[:k, :k] = position.compliance.entries(closed, closed) / unit
     closure = problem.interface.layers.closure
     if closure is not None:
-        system[np.arange(k), np.arange(k)] += closure.slope(pressure[closed]) / unit
+        system[np.arange(k), np.arange(k)] += closure.slope(pressure)[closed] / unit
     system[:k, k:] = position.modes[closed]
     system[k:, :k] = position.balance[:, closed]
     right = np.eye(k + r)[:, :k]

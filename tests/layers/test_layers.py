@@ -88,6 +88,45 @@ def test_debris_that_stays_for_ever_carries_like_what_was_worn() -> None:
     assert block.end.worn.between[0] == pytest.approx(block.end.worn.punch, rel=1e-9)
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_parameters_of_layers_are_maps(law: str) -> None:
+    """Those of a constant give its pressures; where half of the contact is softer, it carries less there."""
+    depths, pressures = [], []
+    middle = "{kind='power', reference={table=[[-1e3, 1], [1e3, 1]], of='x', unit='um'}, pressure='100 MPa'}"
+    softer = "{kind='power', reference={table=[[-1e-6, 1], [1e-6, 4]], of='x', unit='um'}, pressure='100 MPa'}"
+    for layer in ("{kind='power', reference='1 um', pressure='100 MPa'}", middle, softer):
+        block = end(assemble(case_of(law, "run.half_cycles=2", f"contact.layer={layer}")), "explicit")
+        depths.append(block.end.worn.punch)
+        pressures.append(block.pressure[0])
+    assert np.abs(depths[1] - depths[0]).max() < 1e-9 * depths[0].max()
+    assert np.abs(pressures[1] - pressures[0]).max() < 1e-9 * pressures[0].max()
+    x = block.system.pair.x
+    left, right = (float(block.system.pair.weights[side] @ pressures[2][side]) for side in (x < 0, x > 0))
+    assert right < 0.9 * left
+
+
+@pytest.mark.parametrize(
+    "layer",
+    [
+        "{kind='exponential', length={expression='1 + x', unit='um'}, pressure='10 MPa'}",
+        "{kind='rough', roughness={expression='0.2 * (1 + x)', unit='um'}, asperity_radius='50 um', "
+        "asperity_density={expression='1000 + 100 * x', unit='1/mm^2'}}",
+    ],
+)
+def test_maps_close_as_their_places_alone(layer: str) -> None:
+    """Each node by the law of constants with the values there; in all steps alike."""
+    system = assemble(case_of("gross-sliding", "run.half_cycles=4", f"contact.layer={layer}"))
+    pressure = np.linspace(1.0, 300.0, len(system.pair.x))
+    found = system.layers.given(pressure)
+    for k in (0, 7, len(pressure) - 1):
+        x = float(system.pair.x[k])
+        own = layer.replace("1000 + 100 * x", repr(1000 + 100 * x)).replace("1 + x", repr(1 + x))
+        alone = assemble(case_of("gross-sliding", f"contact.layer={own}")).layers.given(pressure)
+        assert found[k] == pytest.approx(alone[k], rel=1e-12)
+    depths = [end(system, how).end.worn.punch for how in ("explicit", "jump")]
+    assert np.abs(depths[1] - depths[0]).max() < 1e-3 * depths[0].max()
+
+
 def test_energy_of_a_layer_is_metered() -> None:
     """What a layer stores closes the balance of energy in partial slip, to rounding."""
     system = assemble(case_of("coulomb", f"contact.layer={LAYERS['power']}"), heat="none")
@@ -194,6 +233,10 @@ def test_what_sticks_flows_beyond_the_hardness() -> None:
         ("contact.third_body={share=0.5, life=1, initial=-1}", "contact.third_body.initial"),
         ("contact.third_body={share=0.5, life={expression='p', unit='mm'}}", "place x, y, z alone, got p"),
         ("contact.layer={kind='linear', stiffness=0}", "contact.layer"),
+        (
+            "contact.layer={kind='exponential', length={expression='p', unit='mm'}, pressure=1}",
+            "place x, y, z alone, got p",
+        ),
         ("contact.layer={kind='power', reference=1, pressure=1, exponent=2}", "exponent"),
     ],
 )

@@ -55,6 +55,10 @@ class ProgramStep(Part):
     load_factor: _ramp(Annotated[Number, Field(gt=0)]) = Field(  # type: ignore[valid-type]
         default=None, description="or: all loads of the case times this"
     )
+    load_factors: dict[str, Annotated[Number, Field(gt=0)]] | None = Field(
+        default=None,
+        description="or: single loads of the case by the group that they act on, each times a factor of its own",
+    )
     speed: _ramp(Annotated[Speed, Field(ge=0)]) = Field(  # type: ignore[valid-type]
         default=None, description="of one-way sliding; 0: a rest"
     )
@@ -82,7 +86,7 @@ class ProgramStep(Part):
     def _one_length(self) -> Self:
         if sum(length is not None for length in (self.cycles, self.distance, self.time)) != 1:
             raise ValueError("give one of cycles, distance and time: how long the step takes")
-        for one, other in (("load", "load_factor"), ("angular_frequency", "period")):
+        for one, other in (("load", "load_factor"), ("load", "load_factors"), ("angular_frequency", "period")):
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 raise ValueError(f"{one}: give either {one} or {other}")
         for key in ("speed", "angular_speed"):

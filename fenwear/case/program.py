@@ -150,10 +150,16 @@ class _Acting:
     factors: tuple[float, float] = (1.0, 1.0)
     given: dict[str, tuple[float, float]] = field(default_factory=dict)
     motion: Cycle | None = None  # another table than that of the case
+    single: dict[str, float] = field(default_factory=dict)  # factors of loads by their groups
 
     def of(self, case: Case) -> Case:
-        """Return the case with the table that acts."""
-        return case if self.motion is None else case.stage({"motion": self.motion})
+        """Return the case with the table that acts, and its loads with factors of their own."""
+        changes: dict[str, Any] = {} if self.motion is None else {"motion": self.motion}
+        for name, body in case.bodies.items():
+            loads = tuple(load.times(self.single.get(load.on, 1.0)) for load in body.loads)
+            if self.single and loads != body.loads:
+                changes[name] = body.model_copy(update={"loads": loads})
+        return case.stage(changes) if changes else case
 
 
 def _acting(steps: Sequence[ProgramStep]) -> Iterator[_Acting]:
@@ -166,6 +172,7 @@ def _acting(steps: Sequence[ProgramStep]) -> Iterator[_Acting]:
             _ends(step.load_factor, now.factors) or (1.0, 1.0),
             {key: ends for key, ends in ramps.items() if ends is not None},
             step.motion or now.motion,
+            {**now.single, **(step.load_factors or {})},
         )
         yield now
 

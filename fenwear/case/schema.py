@@ -322,8 +322,14 @@ class Case(Part):
         if self.program is None:
             return []
         motion, problems = self.motion, []
+        groups = sorted({load.on for body in self.bodies.values() for load in body.loads})
         for number, step in enumerate(self.program.steps):
             at = f"program.steps.{number}"
+            problems += [
+                f"{at}.load_factors.{name}: no load of the case acts on it, but on {', '.join(groups) or 'none'}"
+                for name in step.load_factors or {}
+                if name not in groups
+            ]
             for key in ("speed", "angular_speed", "amplitude", "angular_frequency", "period"):
                 known = key in type(motion).model_fields and not (key == "amplitude" and self.turns)
                 known = known and not isinstance(motion, Cycle)
@@ -345,6 +351,10 @@ class Case(Part):
             )
         if self.contact.solver == "full":
             problems.append("contact.solver: expected 'condensed' with a program")
+        if any(step.load for step in self.program.steps) and any(step.load_factors for step in self.program.steps):
+            problems.append(
+                "program.steps: load is the sum of the case's loads; expected load_factor with load_factors"
+            )
         if self.run.periodic_within is not None:
             problems.append("run.periodic_within: a program ends with its last step; expected none")
         return problems

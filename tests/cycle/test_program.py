@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from fenwear import Case, Tribosystem, assemble, jump, load_case, make_case, march, read_history, run_case, steady
-from fenwear.case.program import read_program, stages_of
+from fenwear.case.program import cycle_of, read_program, stages_of
 from fenwear.cycle import Block, Span, at_step, follow_program
 from fenwear.errors import CaseError
 from fenwear.plausibility import stroke_warnings
+from tests.results.test_contacts import two_pads
 
 Edited = Callable[..., Case]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "geometry.follow_wear=never")
@@ -193,6 +194,9 @@ def test_a_run_goes_on_within_a_ramp(edited: Edited, tmp_path: Path) -> None:
         ([{"cycles": 3, "speed": 5}], "program.steps.0.speed", "does not change with motion.kind = 'reciprocating'"),
         ([{"cycles": 3, "ambient": 5}], "program.steps.0.ambient", "table heat"),
         ([{"distance": 1}], "program.steps.0.distance", "at least a cycle of 6 mm, got 1 mm"),
+        ([{"cycles": 3, "load_factors": {"punch_lid": 2}}], "program.steps.0.load_factors.punch_lid", "no load of the"),
+        ([{"cycles": 3, "load_factors": {"punch_load": -2}}], "program.steps.0.load_factors.punch_load", "greater"),
+        ([{"cycles": 3, "load": 5, "load_factors": {"punch_load": 2}}], "program.steps.0.load", "load or load_factors"),
         ([{"cycles": 3, "lod": 5}], "program.steps.0.lod", "did you mean 'load'"),
         ([], "program.steps", "at least 1 entry"),
     ],
@@ -314,3 +318,30 @@ speed = ["100 mm/s", "0 mm/s"]
     done = fenwear("optimum", "monotonic-lz20", "--step", "1", cwd=tmp_path)
     assert done.returncode == 2
     assert "program: missing" in done.stderr
+
+
+@pytest.mark.parametrize("jumps", [False, True])
+def test_each_load_has_factors_of_its_own(jumps: bool, tmp_path: Path) -> None:
+    """Two pads over three blocks: each wears k F s of its own loads; what is not named stays; it is held at its end."""
+    tables = two_pads(tmp_path, named=1.0)
+    tables["program"] = {"steps": [
+        {"cycles": 4, "load_factors": {"punch_left": 2.0}},
+        {"cycles": 6, "load_factors": {"punch_right": 0.5}, "load_factor": [1.0, 3.0]},
+        {"cycles": 2, "load_factors": {"punch_left": 0.5, "punch_right": 1.0}, "load_factor": 1.0},
+    ]}  # fmt: skip
+    tables["run"] = {"integration": "jump" if jumps else "explicit"}
+    case = make_case(tables)
+    assert tomllib.loads(case.to_toml())["program"]["steps"][1]["load_factors"] == {"punch_right": 0.5}
+    system = assemble(case)
+    last = list(follow_program(system, jumped if jumps else marched, case.run.half_cycles))[-1]
+    law = case.wear.punch
+    assert law is not None
+    _, distance, _ = cycle_of(case)
+    surface = system.pair.punch
+    for name, load, shares in (("left", 300.0, (8, 24, 1)), ("right", 900.0, (4, 6, 2))):
+        own = surface.nodes_of(name)
+        worn = float(surface.weights[own] @ last.wear[-1][own]) * system.bodies.punch.thickness
+        assert worn == pytest.approx(law.coefficient * load * distance * sum(shares), rel=1e-6)
+    pressed = at_step(system, 1).optimum(1).pressure * surface.weights * system.bodies.punch.thickness
+    forces = [float(pressed[surface.nodes_of(name)].sum()) for name in ("left", "right")]
+    assert forces == pytest.approx([300 * 2 * 3, 900 * 0.5 * 3], rel=1e-9)

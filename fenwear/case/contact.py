@@ -9,6 +9,7 @@ from pydantic import Field, WrapValidator, model_validator
 
 from fenwear.case.laws import Dependence, constant_or_dependence
 from fenwear.case.layers import Layers, ThirdBody
+from fenwear.case.lubrication import Lubrication
 from fenwear.case.quantities import Number, Part, Stress
 
 CONTACT_LAWS: set[str] = set()  # that are registered beside fenwear's own, see `assembly.laws`
@@ -37,6 +38,9 @@ class Contact(Part):
         default="condensed", description="full: all displacements as unknowns, slow, to compare with"
     )
 
+    lubrication: Lubrication | None = Field(
+        default=None, description="mixed lubrication; without this table asperities carry all"
+    )
     third_body: ThirdBody | None = Field(
         default=None, description="debris that stays between the surfaces; without this table none does"
     )

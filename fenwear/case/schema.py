@@ -279,6 +279,9 @@ class Case(Part):
             problems.append("motion.positions: expected 1 for sliding out of the plane")
         if self.heat is None:
             given: dict[str, Any] = {"contact.friction": self.contact.friction}
+            if self.contact.lubrication is not None:
+                key, value = self.contact.lubrication.given
+                given[f"contact.lubrication.{key}"] = value
             for body, law in self.wear.by_body.items():
                 if law is not None:
                     given[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
@@ -436,7 +439,8 @@ class Case(Part):
     def varies(self) -> bool:
         """Whether a coefficient depends on the state, or a load on the time in the cycle."""
         laws = [law.given_coefficient for law in (self.wear.punch, self.wear.strip) if law is not None]
-        dependent = any(isinstance(value, Dependence) for value in (self.contact.friction, *laws))
+        mixed = self.contact.lubrication is not None and self.contact.lubrication.varies
+        dependent = mixed or any(isinstance(value, Dependence) for value in (self.contact.friction, *laws))
         return dependent or not all(load.steady for body in ("punch", "strip") for load in self.loads_of(body))
 
     def _thermal_problems(self, heat: Heat) -> list[str]:

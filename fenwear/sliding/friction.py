@@ -20,6 +20,7 @@ from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import ALONG_X, SlidingField
+from fenwear.sliding.lubrication import asperity_share
 
 
 @dataclass(frozen=True)
@@ -104,10 +105,35 @@ class Friction:
     def constant(self) -> bool:
         """Whether mu depends on nothing but the place."""
         varies = isinstance(self.contact.friction, Dependence) and self.contact.friction.varies
-        return not varies and self.of_coatings == (None, None)
+        return not varies and self.of_coatings == (None, None) and not self.mixed
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the share of the load that asperities carry changes with more than the place."""
+        return self.contact.lubrication is not None and self.contact.lubrication.varies
+
+    def share(self, conditions: ContactConditions) -> Array | float:
+        """Return the share of the pressure that asperities carry (n,); 1 without lubrication.
+
+        Raises:
+            CaseError: it is not between 0 and 1.
+        """
+        lubrication = self.contact.lubrication
+        return 1.0 if lubrication is None else asperity_share(lubrication, conditions.of("mean"), conditions.shape)
 
     def values(self, conditions: ContactConditions) -> Array:
-        """Return mu at the nodes (n,).
+        """Return mu at the nodes (n,): of asperities and fluid by what they carry.
+
+        Raises:
+            CaseError: it is negative or not finite.
+        """
+        found, lubrication = self.of_asperities(conditions), self.contact.lubrication
+        if lubrication is None:
+            return found
+        return np.asarray(lubrication.fluid_friction + self.share(conditions) * (found - lubrication.fluid_friction))
+
+    def of_asperities(self, conditions: ContactConditions) -> Array:
+        """Return mu of what touches at the nodes (n,).
 
         Raises:
             CaseError: it is negative or not finite.

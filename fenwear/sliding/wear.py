@@ -365,7 +365,7 @@ class Wear:
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
         given = [law.given_coefficient for law in laws]
         dependent = any(isinstance(one, Dependence) and one.varies for one in given)
-        return not dependent and (self.friction.constant or not of_friction)
+        return not dependent and not self.friction.mixed and (self.friction.constant or not of_friction)
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
@@ -399,11 +399,19 @@ def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions,
     """Return beta~ at the nodes (n,), in the internal unit of its exponents.
 
     beta~ = beta mu^b, K / H (Archard), the energy wear coefficient times mu, or k_A over the pressure from which on
-    surfaces touch, beyond which wear grows no more.
+    surfaces touch, beyond which wear grows no more; times X^b of the share X of the pressure that asperities carry.
 
     Raises:
         CaseError: it is negative or not finite; `key` is the law's key.
     """
+    found = _of_asperities(law, friction, conditions, key)
+    if friction.contact.lubrication is None:
+        return found
+    return np.asarray(found * friction.share(conditions) ** law.pressure_exponent)
+
+
+def _of_asperities(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:
+    """Return beta~ where asperities carry all the pressure (n,), as `coefficient`."""
     n, given = conditions.shape, law.given_coefficient
     scale = law.scale if law.per_area is None else 1 / law.touching_from
     if isinstance(given, Dependence):
@@ -413,7 +421,7 @@ def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions,
         return np.full(n, scale * given)
     if law.archard is not None and law.hardness is not None:
         return np.full(n, law.archard / law.hardness)
-    mu = friction.values(conditions)
+    mu = friction.of_asperities(conditions)
     if law.energy is not None:
         return law.energy * mu
     return (law.beta or 0.0) * mu**law.pressure_exponent

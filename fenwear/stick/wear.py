@@ -91,7 +91,7 @@ class LocalLaws:
         laws = [one for law in self.wear if law is not None for one in (law, law.of_coating) if one is not None]
         of_friction = any(law.beta is not None or law.energy is not None for law in laws)
         dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
-        return dependent or (of_friction and not self.friction.constant)
+        return dependent or self.friction.mixed or (of_friction and not self.friction.constant)
 
     def conditions(
         self,

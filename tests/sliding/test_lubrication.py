@@ -1,0 +1,75 @@
+"""Mixed lubrication: wear by the asperities' share, friction of both, against hand-computed rigid limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
+
+Assemble = Callable[..., Tribosystem]
+SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
+MOTION = "motion={kind='one-way', direction='rightward', speed=%g, duration=1}"
+FILM = (
+    "contact.lubrication={film={expression='1e-4 * v ** 0.5', unit='mm'}, roughness='1 um', "
+    "share_over_lambda=[[0, 1], [1, 0.4], [3, 0]], fluid_friction=0.01}"
+)
+MEAN = 1e4 / 600
+
+
+@pytest.mark.parametrize(("speed", "share"), [(25.0, 0.7), (100.0, 0.4), (400.0, 0.2), (1000.0, 0.0)])
+def test_a_curve_of_stribeck_in_the_rigid_limit(speed: float, share: float, assembled: Assemble) -> None:
+    """Film 0.1 um (v / (mm/s))^0.5 on a roughness of 1 um: lambda 0.5, 1, 2 and 3.16; wear and friction follow."""
+    system = assembled("example2", *SMALL, MOTION % speed, FILM, "contact.friction=0.2", "wear.punch.coefficient=1e-7")
+    steps, weights = 30, system.pair.weights
+    for blocks in (march(system, steps, implicit=True), jump(system, steps, tolerance=1e-2)):
+        *_, last = blocks
+        depth = float(weights @ last.wear[-1] / weights.sum())
+        assert depth == pytest.approx(1e-7 * share * MEAN * speed * steps, rel=1e-9, abs=1e-15)
+        mu = last.totals.of("work")[-1] / last.totals.of("load_path")[-1]
+        assert mu == pytest.approx(share * 0.2 + (1 - share) * 0.01, rel=1e-9)
+
+
+def test_wear_by_powers_of_the_pressure_and_by_energy(assembled: Assemble) -> None:
+    """The share is of the pressure: at b = 2 it counts twice; energy wears by what asperities rub."""
+    laws = {"{coefficient=1e-9, pressure_exponent=2}": 1e-9 * 0.25, "{energy=1e-7}": 1e-7 * 0.2 * 0.5}
+    for law, rate in laws.items():
+        settings = ("contact.lubrication.asperity_share=0.5", "contact.friction=0.2", f"wear.punch={law}")
+        system = assembled("example2", *SMALL, MOTION % 100, *settings)
+        np.testing.assert_allclose(system.phases_wear.punch.rate, 100 * rate, rtol=1e-12)
+
+
+def test_pressures_of_the_end(assembled: Assemble) -> None:
+    """A share that grows with p wears as a higher power of it: X p is even where p is, and X p^1 as beta~ p^1.5."""
+    share = "contact.lubrication.asperity_share={expression='min(1, 0.2 * (p / 16) ** 0.5)'}"
+    wide = "wear.punch.coefficient={expression='1e-8*(1 + (x/30)**2)'}"
+    system = assembled("example2", *SMALL, MOTION % 100, share, "contact.friction=0", wide)
+    state, x, weights = steady(system), system.pair.x, system.pair.weights
+    shape = (1 + (x / 30) ** 2) ** (-1 / 1.5)
+    np.testing.assert_allclose(state.pressure[0], 1000 * shape / (weights @ shape), rtol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ("{asperity_share=1.5}", "contact.lubrication.asperity_share"),
+        ("{}", "give one of asperity_share and film"),
+        ("{film='1 um'}", "film: expected together with roughness and share_over_lambda"),
+        ("{asperity_share={expression='depth'}}", "of p, v, T, x, y and z alone, got depth"),
+        ("{asperity_share={expression='T'}}", "contact.lubrication.asperity_share: depends on the temperature T"),
+        ("{film='1 um', roughness='1 um', share_over_lambda=[[1, 1], [0, 0]]}", "with rising lambda"),
+    ],
+)
+def test_wrong_input_is_told_by_its_key(wrong: str, told: str) -> None:
+    """Before anything is computed."""
+    with pytest.raises(CaseError, match=told):
+        load_case("example2", [f"contact.lubrication={wrong}"])
+
+
+def test_a_share_above_one_is_told(assembled: Assemble) -> None:
+    """With the state that it was met at."""
+    case = load_case("example2", [*SMALL, "contact.lubrication.asperity_share={expression='p'}"])
+    with pytest.raises(CaseError, match=r"contact.lubrication.asperity_share: expected at most 1, got .* at p = "):
+        assemble(case).friction.values(assemble(case).conditions(0))

@@ -370,9 +370,9 @@ def _broyden(step: Array, before: list[Array]) -> Array:
     for one, other in pairwise(before):
         step = step + other * ((one @ step) / (one @ one))
     if not before:
-        return step
+        return np.asarray(step)
     share = float(before[-1] @ step) / float(before[-1] @ before[-1])
-    return np.asarray(step / (1 - share)) if share < MOST_SHARE else step
+    return np.asarray(step / (1 - share) if share < MOST_SHARE else step)
 
 
 def _shell(size: int, context: _Matrix) -> PETSc.Mat:

@@ -14,6 +14,7 @@ from mpi4py import MPI
 from fenwear import Case, CaseError, ConvergenceError, Tribosystem, assemble, load_case, march, steady
 from fenwear.cycle import Block, decay_rates, evolve, growth_rate
 from fenwear.cycle.stability import phase_tangent
+from fenwear.cycle.state import present
 from fenwear.results.reading import load_history
 from fenwear.run import run_case
 from fenwear.sliding.wear import WornDepths
@@ -194,3 +195,33 @@ def test_material_that_leaves_the_contact_does_not_creep_there() -> None:
     one_way = "motion={kind='one-way', direction='rightward', speed='10 mm/s', duration='0.1 s'}"
     with pytest.raises(CaseError, match=r"strip\.creep: expected a motion to and fro"):
         load_case("example1", [one_way, f"strip.creep={TERMS}"])
+
+
+def test_a_shaft_that_creeps_comes_to_be_the_same_all_around() -> None:
+    """Quarters that pass under the load one after the other differ until they have crept, as its retardation goes on.
+
+    The first one meets a shaft that has not crept, the others what crept before them. What is left of that falls by
+    exp(-T / time) in each turn of duration T, or faster, and to nothing in the end.
+    """
+    turn = (
+        "motion={kind='cycle', columns=['time (s)', 'angle_y (deg)'], positions='steps', "
+        "rows=[[0, 0], [1, 90], [2, 180], [3, 270], [4, 360]]}"
+    )
+    settings = (
+        "geometry.parameters.elements_along_contact=24",
+        "geometry.follow_wear='never'",
+        "contact.friction=0",
+        "wear={punch={coefficient='1e-15 mm^3/(N mm)'}}",
+        "strip.creep={terms=[{compliance=0.5, time='10 s'}]}",
+        "run.integration='explicit'",
+        "run.half_cycles=16",
+        "output.uncertainty=false",
+    )
+    system, state, apart = assemble(load_case("bushing", [turn, *settings])), None, []
+    for turns in (1, 8, 16):
+        state = next(march(system, turns, start=state)).end
+        pressure = np.array([present(contact).pressure[0] for contact in state.contacts])
+        apart.append(float(np.ptp(pressure, axis=0).max() / pressure.max()))
+    assert apart[0] > 1e-2
+    assert apart[1] < apart[0] * np.exp(-7 * 0.4) * 1.1
+    assert apart[2] < apart[1] * np.exp(-8 * 0.4) * 1.1

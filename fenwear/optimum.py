@@ -45,6 +45,11 @@ def motion_words(mode: str) -> str:
     return MOVES[f"{name}_{kind}"] + (f" ({'_'.join(part)})" if part else "")
 
 
+def _lifts(mode: str) -> bool:
+    """Whether a rigid mode of this name takes the punch, or a part of it, off along z."""
+    return mode.split("_")[:2] == ["lambda", "F"]
+
+
 @dataclass(frozen=True, repr=False)
 class Optimum:
     """The optimal state of one-way sliding.
@@ -68,12 +73,13 @@ class Optimum:
         return f"<Optimum: {n} contact nodes, largest pressure {most:.5g} MPa, {velocity}>"
 
 
-def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) -> None:
+def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array, key: str = "punch.loads") -> None:
     """Make sure that some pressure p >= 0 balances the loads.
 
     Args:
-        way: Word for the sliding direction, for the message.
+        when: In words, such as "in rightward sliding".
         friction_ratio: tau (n, d), the traction of friction on the punch over the pressure.
+        key: Where the loads are given.
 
     Raises:
         CaseError: the loads would lift the punch or tip it over, or push a strip away that is not held.
@@ -94,20 +100,21 @@ def check_equilibrium(rigid: RigidEquilibrium, way: str, friction_ratio: Array) 
     every, punch = list(range(len(target))), list(range(rigid.of_punch))
     if not every or (size > 0 and balanced(every)):
         return
-    beginning = f"no pressure on the contact balances the loads in {way} sliding: "
+    beginning = f"no pressure on the contact balances the loads {when}: "
     if size > 0 and balanced(punch):
         loose = [k for k in every[rigid.of_punch :] if not balanced([*punch, k])] or every[rigid.of_punch :]
         freely = " and to ".join(motion_words(rigid.mode_names[k]) for k in loose)
         message = f"{beginning}the strip is free to {freely}, and the punch pushes it away; hold it against that"
         raise CaseError(InputError("strip.supports", message))
-    tips = []
-    if size > 0 and balanced(punch[:1]):
+    tips, lifted = [], [k for k in punch if _lifts(rigid.mode_names[k]) and not (size > 0 and balanced([k]))]
+    if not lifted and size > 0 and balanced(punch[:1]):
         tips = [k for k in punch[1:] if not balanced([*punch[:1], k])] or punch[1:]
     how = " and to ".join(motion_words(rigid.mode_names[k]) for k in tips)
-    what = f"the punch tips over, free to {how}" if tips else "the punch lifts off"
+    parts = ", ".join("_".join(rigid.mode_names[k].split("_")[2:]) for k in lifted)
+    what = f"the punch tips over, free to {how}" if tips else "the punch lifts off" + (f" ({parts})" if parts else "")
     raise CaseError(
         InputError(
-            "punch.loads",
+            key,
             f"{beginning}{what}; expected a load that presses on it between the contact's edges, friction included"
             + (", or supports against tilting (or no_turning_about)" if tips else ""),
         )

@@ -18,6 +18,7 @@ from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
 from fenwear.case import Case, Dependence, Heat
+from fenwear.case.motions import Cycle
 from fenwear.case.names import BY_ROLE, Names, told_by_name
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.passage import Passage
@@ -578,7 +579,11 @@ def place(
         passage=None if heat is None else _passage(middle, sliding, rings=rings),
     )
     for phase, one, ratio in zip(sliding.motion.phases, rigids, placed.friction_ratios(), strict=True):
-        check_equilibrium(one, placed.direction_words[phase.direction], ratio)
+        when, key = f"in {placed.direction_words[phase.direction]} sliding", "punch.loads"
+        if case is not None and isinstance(case.motion, Cycle):
+            row = int(np.searchsorted(case.motion.course.fraction, phase.fraction))
+            when, key = f"from row {row} to row {row + 1}", "punch.loads" if case.motion.load is None else "motion.load"
+        check_equilibrium(one, when, ratio, key)
     return placed
 
 

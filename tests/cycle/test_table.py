@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from fenwear import CaseError, Tribosystem, evolve, jump, load_case, march, steady
+from fenwear.assembly import place_case
+from tests.results.test_contacts import COARSE as PADS
 
 POSITIONS = 3
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=8", "geometry.parameters.overlap=3",
@@ -102,3 +104,43 @@ def test_blocks_of_cycles(assembled: Callable[..., Tribosystem]) -> None:
     ):
         with pytest.raises(CaseError, match=told):
             load_case("example1", [*settings, wrong])
+
+
+ROWS = "motion={kind='cycle', load={on='punch_load'}, columns=['time (s)', 'shift_x (mm)', 'force_z (N)', %s"
+AWAY = ROWS % "'moment_y (N*mm)'], rows=[[0, 0, -500, 0], [0.5, 0.3, -500, 0], [0.8, 0.1, 900, 0], [1, 0, -500, 0]]}"
+TIPS = ROWS % "'moment_y (N*mm)'], rows=[[0, 0, -500, 0], [0.5, 0.3, -500, 5e5], [1, 0, -500, 0]]}"
+OPENS = ROWS % "'shift_z (mm)'], rows=[[0, 0, -500, 0], [0.5, 0.3, -500, 0], [0.8, 0.1, -500, 4], [1, 0, -500, 0]]}"
+TURNS = ROWS % "'punch_angle_y (deg)'], rows=[[0, 0, -500, 0], [0.5, 0.3, -500, 30], [1, 0, -500, 0]]}"
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "told"),
+    [
+        (
+            "example1",
+            [AWAY, "punch.loads=[]"],
+            "motion.load: .* the loads from row 2 to row 3: the block lifts off; exp",
+        ),
+        ("example1", [TIPS, "punch.loads=[]"], "motion.load: .* the loads from row 1 to row 2: the block tips over"),
+        ("example1", [OPENS, "punch.loads=[]"], "motion.rows: from row 2 to row 3 the strip.*open the contact"),
+        ("example1", [TURNS, "punch.loads=[]"], "motion.rows: from row 1 to row 2 the strip.*open the contact"),
+        (
+            "bushing",
+            ["geometry.parameters.contact_angle=60", "punch.loads.0.force=[0, 50]"],
+            "the punch lifts off; exp",
+        ),
+        (
+            "disc-brake-two-pads",
+            [
+                *(f"geometry.parameters.{key}={count}" for key, count in PADS.items()),
+                "punch.loads.1.force=[0, 0, -5000]",
+            ],
+            r"the punch lifts off \(back\); expected",
+        ),
+    ],
+)
+def test_loads_that_no_contact_can_carry(name: str, settings: list[str], told: str) -> None:
+    """Told by the rows between which they act, the body and the part."""
+    names = ["punch.name=block"] if name == "example1" else []
+    with pytest.raises(CaseError, match=told):
+        place_case(load_case(name, [*settings, *names]))

@@ -22,6 +22,7 @@ NAMES = [
     "09_solids",
     "10_partial_slip",
     "11_bearings_and_brakes",
+    "12_what_lies_between",
 ]
 
 

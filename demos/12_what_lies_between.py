@@ -1,0 +1,144 @@
+# ---
+# jupyter:
+#   jupytext:
+#     formats: ipynb,py:percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # 12. What lies between
+#
+# One contact, with each term in turn: a third body, a compliant layer, a coating, a hardness, creep, mixed lubrication. What
+# does each change in the depth, in the pressure, and in the life? The contact is a steel cylinder of 6 mm radius that slides
+# 0.1 mm to and fro on a flat under 120 N/mm, with its wear as the only loss; its life ends when it is worn by 1 µm.
+
+# %%
+# %matplotlib inline
+import os
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import xarray
+
+from fenwear import load_case
+from fenwear.run import run_case
+
+COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
+folder = tempfile.TemporaryDirectory()
+LIFE = 1e-3  # mm, the depth at which it ends
+
+CONTACT = [
+    "title='A cylinder that slides on a flat'",
+    f"geometry.parameters.elements_along_contact={20 if COARSE else 40}",
+    "geometry.parameters.contact_width='0.5 mm'",
+    "geometry.parameters.overlap=0.1",
+    "geometry.follow_wear='never'",
+    "contact={law='gross-sliding', friction=0.3}",
+    "stick={}",
+    "motion={kind='reciprocating', profile='triangular', amplitude='50 um', period='0.2 s'}",
+    "wear={punch={coefficient='2e-8 1/MPa'}}",
+    "run.half_cycles=1200",
+    "run.jump_tolerance=0.003",
+    "output.report=false",
+    "output.uncertainty=false",
+    "output.fields_at=[]",
+]
+TERMS = {
+    "nothing": [],
+    "third body": ["contact.third_body={share=0.6, life='200 mm'}"],
+    "compliant layer": ["contact.layer={kind='exponential', length='0.5 um', pressure='20 MPa'}"],
+    "coating": ["wear.punch.coating={thickness='0.3 um', coefficient='5e-9 1/MPa'}"],
+    "hardness": ["contact.hardness='600 MPa'"],
+    "creep": ["punch.creep={terms=[{compliance=0.5, time='20 s'}]}"],
+    "mixed lubrication": ["contact.lubrication={asperity_share=0.5, fluid_friction=0.01}"],
+}
+
+
+def run(name, settings):
+    """Run the contact with a term; return its history and its summary."""
+    case = load_case("fretting-partial-slip", [*CONTACT, *settings])
+    summary, directory = run_case(case, name, Path(folder.name) / name, lambda _: None, progress="none")
+    with xarray.open_dataset(directory / "history.nc", engine="h5netcdf") as history:
+        return history.load(), summary
+
+
+runs = {name: run(name.replace(" ", "-"), settings) for name, settings in TERMS.items()}
+
+# %% [markdown]
+# ## Depth, pressure, life
+#
+# The depth is what the cylinder has lost, the pressure the largest at the start and at the end, the life the cycles until
+# 1 µm. Wear as such goes by load times path, so that only the coating and the lubricant change the volume worn in the
+# end. The others change where it is worn: what makes the contact wider makes the scar shallower.
+
+
+# %%
+def life(history):
+    """Return the cycles until the largest depth is reached, between the recorded ones."""
+    return float(np.interp(LIFE, history.wear.max("x"), history.half_cycle / 2, right=np.nan))
+
+
+print(f"{'':18}{'depth µm':>10}{'p start':>10}{'p end MPa':>10}{'worn µm²':>10}{'life':>8}")
+for name, (history, summary) in runs.items():
+    pressure = history.pressure.max("x").values
+    print(
+        f"{name:18}{1e3 * summary['punch']['largest_depth_mm']:10.3f}{pressure[0]:10.0f}{pressure[-1]:10.0f}"
+        f"{1e6 * summary['punch']['worn_area_mm2']:10.1f}{life(history):8.0f}"
+    )
+
+# %%
+fig, axes = plt.subplots(2, 2, figsize=(9, 6.2), layout="constrained")
+(first, last), (scars, depths) = axes
+for number, (name, (history, _)) in enumerate(runs.items()):
+    style = {"color": "black", "lw": 2.2} if name == "nothing" else {"color": f"C{number - 1}", "lw": 1.2}
+    x = 1e3 * history.x
+    first.plot(x, history.pressure[0], label=name, **style)
+    last.plot(x, history.pressure[-1], **style)
+    scars.plot(x, -1e3 * history.wear[-1], **style)
+    depths.plot(history.half_cycle / 2, 1e3 * history.wear.max("x"), **style)
+first.set(ylabel="pressure in the first half-cycle (MPa)", xlabel="x (µm)")
+last.set(ylabel="in the last one (MPa)", xlabel="x (µm)")
+scars.set(ylabel="scar (µm)", xlabel="x (µm)")
+depths.set(ylabel="largest depth (µm)", xlabel="cycle")
+depths.axhline(1e3 * LIFE, color="grey", lw=0.8, ls=":")
+fig.legend(*first.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
+plt.show()
+
+# %% [markdown]
+# ## What is there besides wear
+#
+# Debris that stays is as good as material: the surfaces are held apart by it, and worn = stored + ejected. What has flown
+# or crept looks like wear to a profilometer, and is none: it is metered apart. Of the coating the sheet says where and when
+# it was worn through first.
+
+# %%
+print(f"debris stored  {1e6 * runs['third body'][1]['debris_volume_mm3']:8.1f} µm² over 1 mm")
+print(f"       ejected {1e6 * runs['third body'][1]['ejected_volume_mm3']:8.1f}")
+print(f"plastic depth  {1e3 * runs['hardness'][1]['largest_plastic_depth_mm']:8.3f} µm")
+print(f"crept          {1e3 * runs['creep'][1]['punch']['largest_creep_depth_mm']:8.3f} µm")
+coating = runs["coating"][1]
+print(f"coating through first in cycle {coating['punch_coating_first_through_half_cycle'] / 2:.0f}", end=", ")
+print(f"at x = {1e3 * coating['punch_coating_first_through_at_x_mm']:.1f} µm")
+
+fig, (left, right) = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")
+history = runs["coating"][0]
+for number, cycle in enumerate((1, 100, 200, 300, 600)):
+    row = int(np.abs(history.half_cycle.values / 2 - cycle).argmin())
+    label = f"cycle {history.half_cycle.values[row] / 2:.0f}"
+    left.plot(1e3 * history.x, 1e3 * history.coating[row], color=plt.cm.viridis(number / 5), label=label)
+left.set(ylabel="coating left (µm)", xlabel="x (µm)")
+left.legend(frameon=False, fontsize="small")
+history = runs["third body"][0]
+right.plot(1e3 * history.x, 1e3 * history.debris_thickness[-1], label="debris")
+right.plot(1e3 * history.x, 1e3 * history.wear[-1], label="worn")
+right.set(ylabel="third body (µm)", xlabel="x (µm)")
+right.legend(frameon=False)
+plt.show()
+
+# %%
+folder.cleanup()

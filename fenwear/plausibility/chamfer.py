@@ -24,6 +24,7 @@ from fenwear.sliding.wear import WornDepths
 
 STEEP = 0.27  # cotangent of 75 degrees: beyond, a chamfer widens by a quarter of the depth
 WIDER = 0.02  # of the surface's width
+OPPOSED = 1e-6  # length of the mean of unit normals that is rounding
 
 
 @dataclass(frozen=True)
@@ -59,13 +60,18 @@ class Chamfer:
 def contact_chamfer(system: Tribosystem) -> Chamfer | None:
     """Return the chamfer beside the punch's contact surface; collective. None for upright sides and smooth surfaces.
 
+    None, too, where contacts look opposite ways, as pads on both faces of a disc: they have no normal in common.
+
     Args:
         system: On meshes as they were made, not moved by wear.
     """
     pair, punch = system.pair, system.bodies.punch
     x: Array = pair.punch.x
     cotangent: Array = np.zeros(len(x))  # of the boundary's angle beyond each node of the rim
-    normal = pair.normal.mean(axis=0) / np.linalg.norm(pair.normal.mean(axis=0))
+    normal = pair.normal.mean(axis=0)
+    if np.linalg.norm(normal) < OPPOSED:
+        return None
+    normal /= np.linalg.norm(normal)
     if pair.punch.dim == 3:
         edges, inward, outward = rim_edges(punch)
         at_trace = np.zeros(len(pair.punch.trace))

@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fenwear import CaseError, Tribosystem, march
+from fenwear.arrays import Array
 
 RADIUS, FORCE, RATE = 14.0, 1000.0, 1e-9
 COARSE = (
@@ -49,6 +51,35 @@ def test_both_bodies_worn_under_turns(assembled: Callable[..., Tribosystem]) -> 
                                           (pair.strip.weights, end.worn.strip, pair.strip.outward))]  # fmt: skip
     on_cup, on_ball = (middle / np.linalg.norm(middle) for middle in middles)
     assert np.degrees(np.cross(on_cup, on_ball) @ AXIS) == pytest.approx(-np.degrees(np.sin(np.radians(10))), abs=0.1)
+
+
+@pytest.mark.slow
+def test_both_bodies_wear_point_by_point(assembled: Callable[..., Tribosystem]) -> None:
+    """The cup's nodes lose k sum of p s of their own; the ball's material what the cup had where it was turned to.
+
+    There as means over 2 mm around its nodes, by the nodes of either mesh: an error that falls with the meshes.
+    """
+    errors = []
+    for across, around, overlap in ((4, 3, 2), (6, 4, 4)):
+        finer = (
+            f"geometry.parameters={{across={across}, around={around}, overlap_elements={overlap}, overlap_angle=25}}"
+        )
+        system = assembled("ball-in-cup", *COARSE, finer, "wear.strip.coefficient=3e-10", turning([0, 20, 0]))
+        *_, last = march(system, 1)
+        end, cup, ball = last.end, system.pair, system.pair.strip
+        doses = sum(RATE * way * c.pressure[0] for c, way in zip(end.contacts, system.path, strict=True) if c)
+        np.testing.assert_allclose(end.worn.punch, doses, rtol=0, atol=1e-12 * end.worn.punch.max())
+        turned = Rotation.from_rotvec(-np.radians(10) * AXIS).apply(cup.punch.x)  # in the middle of both steps
+        centres = ball.x[np.linalg.norm(ball.x[:, :2], axis=1) < 0.8 * RADIUS]
+
+        def means(x: Array, weights: Array, depth: Array, centres: Array = centres) -> Array:
+            near = np.exp(-((x[:, None] - centres) ** 2).sum(axis=2) / (2 * 2.0**2))
+            return np.asarray((weights * depth) @ near / (weights @ near))
+
+        wanted = means(turned, cup.weights, 0.3 * end.worn.punch)
+        errors.append(float(np.abs(means(ball.x, ball.weights, end.worn.strip) - wanted).max() / wanted.max()))
+    assert errors[1] < errors[0] / 2
+    assert errors[1] < 0.02
 
 
 def test_bad_cups(assembled: Callable[..., Tribosystem]) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import ContactSetup
 from fenwear.cycle import Block
 from fenwear.cycle.state import RunState
@@ -41,7 +41,8 @@ def values(block: Block) -> dict[str, Array]:
         if thickness is not None:
             coated = weights * (thickness > 0)
             found[f"coating{end}"] = left_of(thickness, depth)
-            found[f"coating_worn_through{end}"] = (depth >= thickness) @ coated / max(float(coated.sum()), 1e-300)
+            through = (depth >= thickness) @ coated
+            found[f"coating_worn_through{end}"] = np.asarray(through / max(float(coated.sum()), 1e-300))
     return found
 
 
@@ -97,9 +98,10 @@ def _coated(system: ContactSetup, body: str, thickness: Array) -> CoatedBody:
     return CoatedBody(thickness, np.full_like(thickness, base / coating))
 
 
-def _ends(coated: CoatedBody, depths: Array, cycles: Array) -> tuple[Array, Array]:
+def _ends(coated: CoatedBody, depths: Array, cycles: Array) -> tuple[Mask, Array]:
     """Return which coatings end within rows of depths (k, n), and after how many half-cycles (n,)."""
-    ended, at = np.zeros(depths.shape[1], dtype=bool), np.zeros(depths.shape[1])
+    ended: Mask = np.zeros(depths.shape[1], dtype=bool)
+    at: Array = np.zeros(depths.shape[1])
     for k in range(len(depths) - 1):
         now = (depths[k] < coated.thickness) & (depths[k + 1] >= coated.thickness)
         left, grown = coated.thickness - depths[k], coated.measure(depths[k + 1]) - depths[k]

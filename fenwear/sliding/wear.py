@@ -174,7 +174,7 @@ class PhasesWear:
         """Return what is worn of coating and base of a body, at its own nodes; None where all is of the base."""
         if body is None or body.coating is None or body.coating.left is None:
             return None
-        felt, own = body.law.value(pressure), body.coating
+        felt, own, left = body.law.value(pressure), body.coating, body.coating.left
         if body is self.punch:
             coating, base = (np.asarray((rate * felt).sum(axis=0)) for rate in (own.rate, body.rate))
         else:
@@ -182,7 +182,7 @@ class PhasesWear:
                 np.sum([pair.wear_projection @ one for pair, one in zip(self.pairs, rate * felt, strict=True)], axis=0)
                 for rate in (own.rate, body.rate)
             )
-        return shares(own.cycles * coating, own.cycles * base, own.left)
+        return shares(own.cycles * coating, own.cycles * base, left)
 
     def _at_contact(self, pressure: Array) -> tuple[Shares | None, Shares | None]:
         """Return what is worn of coatings and bases, at the contact's nodes."""

@@ -537,7 +537,7 @@ class PartialSlipProblem:
         def wearing(k: int, at: ContactConditions) -> Array:
             tau = float(slips.duration[k])
             punch, strip = laws.wear_at(at).depths(at.pressure, slips.slid[k], tau)
-            return self._taken(punch, strip, before) / tau
+            return np.asarray(self._taken(punch, strip, before) / tau)
 
         conditions, pairs = self._conditions(slips, before), self._pairs(slips, before)
         return Evolution(memory, conditions, slips.duration, pairs, wearing, before.worn.strip)

@@ -40,6 +40,7 @@ from fenwear.stick.heat import HeatHistory
 
 FAR = 1e3  # times the largest gap: never closes
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
+DOUBLED, HALVED = 40, 60  # times that bounds are doubled and halved to share a depth between coated bodies
 
 
 @dataclass(frozen=True)
@@ -336,8 +337,30 @@ def _shape(problem: PartialSlipProblem, zone: Mask, carried: tuple[Array, Array]
     """Return the shape of a zone, from the pressures and the least gap of a cycle."""
     pressures, gap = carried
     depth = np.maximum(-gap, 0.0)
+    of_punch = _of_punch(problem, depth)
+    worn = WornDepths(of_punch, problem.interface.middle.pair.wear_projection @ (depth - of_punch))
+    return FinalShape(zone, pressures[-1], depth, np.maximum(gap, 0.0), worn, pressures, size)
+
+
+def _of_punch(problem: PartialSlipProblem, depth: Array) -> Array:
+    """Return what of a depth (n,) the punch has lost: both bodies wear by their rates, through their coatings."""
     rates = [0.0 if law is None else float(law.rate.mean()) for law in (problem.wear.punch, problem.wear.strip)]
     share = rates[0] / sum(rates) if sum(rates) > 0 else 1.0
-    strip = problem.interface.middle.pair.wear_projection @ ((1 - share) * depth)
-    worn = WornDepths(share * depth, strip)
-    return FinalShape(zone, pressures[-1], depth, np.maximum(gap, 0.0), worn, pressures, size)
+    punch, strip = problem.coatings
+    if (punch is None and strip is None) or not 0 < share < 1:
+        return np.asarray(share * depth)
+    strip = None if strip is None else strip.at(problem.interface.middle.pair.wear_interpolation)
+
+    def lost(rubbed: Array) -> tuple[Array, Array]:
+        parts = ((punch, share * rubbed), (strip, (1 - share) * rubbed))
+        found = [one if coated is None else coated.depth(one) for coated, one in parts]
+        return found[0], found[1]
+
+    low, high = np.zeros_like(depth), np.maximum(depth, 1e-300)
+    for _ in range(DOUBLED):
+        high = np.where(sum(lost(high)) < depth, 2 * high, high)
+    for _ in range(HALVED):
+        middle = (low + high) / 2
+        less = sum(lost(middle)) < depth
+        low, high = np.where(less, middle, low), np.where(less, high, middle)
+    return np.minimum(lost(high)[0], depth)

@@ -137,3 +137,22 @@ def test_wrong_input_is_told_by_its_key(wrong: str, told: str) -> None:
     """Before anything is computed."""
     with pytest.raises(CaseError, match=told):
         assemble(load_case("example2", [*SMALL, f"wear.punch={{coefficient=1e-8, coating={wrong}}}"]))
+
+
+def test_the_end_of_partial_slip_is_shared_through_coatings() -> None:
+    """Less than the coating: by its coefficient; deeper, what is beyond it by that of the base; the sum is the same."""
+    thickness, both = 1e-4, "wear.strip.coefficient='1e-7 1/MPa'"
+    above = f"coating={{thickness={thickness}, coefficient='1e-7 1/MPa'}}"
+    laws = {
+        "coated": f"wear.punch={{coefficient='3e-7 1/MPa', {above}}}",
+        "bare": "wear.punch={coefficient='1e-7 1/MPa'}",
+    }
+    settings = [*SMALLEST, *STICK, "contact.law='coulomb'", both]
+    systems = {name: assemble(load_case("fretting-partial-slip", [*settings, law])) for name, law in laws.items()}
+    ends = {name: system.contact_law.end(system) for name, system in systems.items()}
+    coated, depth = ends["coated"].worn.punch, ends["bare"].depth
+    np.testing.assert_allclose(ends["coated"].depth, depth, rtol=1e-9, atol=1e-12)
+    # The strip loses what the coating would: t + 3 (A - t) + A = depth.
+    exact = np.where(depth < 2 * thickness, depth / 2, depth - (depth + 2 * thickness) / 4)
+    assert (depth > 2 * thickness).any()
+    np.testing.assert_allclose(coated, exact, rtol=1e-9, atol=1e-12)

@@ -34,8 +34,9 @@ def sliding_tensor_of_strip(placed: ContactSetup, pressure: Array | None = None)
     """Return the same at the strip's contact nodes, of its own material that moves under the punch."""
     weights = placed.path if pressure is None else placed.path * pressure
     values = np.zeros((len(placed.pair.strip.weights), 9))
-    for facing, way, along in zip(placed.pairs, weights, placed.sliding_directions, strict=True):
-        values += facing.wear_projection @ (way[:, None] * squares(facing.material_place.back(along)))
+    for k, facing in enumerate(placed.pairs):
+        along = facing.material_place.back(placed.sliding_directions[k])
+        values += facing.wear_projection @ (weights[k][:, None] * squares(along))
     return SlidingTensor(values.reshape(-1, 3, 3))
 
 

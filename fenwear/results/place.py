@@ -181,8 +181,8 @@ def _apart(block: Block, nodes: Mask) -> Array:
     The translation, and in a solid the tilt, that fits what gaps at some nodes have opened by best.
     """
     system, pair = block.system, block.system.pair
-    depths = zip(block.wear, block.wear_strip, strict=True)
-    undeformed = np.array([system.gap(0, WornDepths(np.asarray(one), np.asarray(other))) for one, other in depths])
+    depths = zip(block.wear, block.wear_strip, block.between, strict=True)
+    undeformed = np.array([system.gap(0, WornDepths(*map(np.asarray, one))) for one in depths])
     fields = pair.normal[nodes][:, [0, -1]]
     if pair.punch.dim == 3:
         y = pair.punch.x[nodes, 1]

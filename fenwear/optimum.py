@@ -106,7 +106,8 @@ def check_equilibrium(rigid: RigidEquilibrium, when: str, friction_ratio: Array,
         freely = " and to ".join(motion_words(rigid.mode_names[k]) for k in loose)
         message = f"{beginning}the strip is free to {freely}, and the punch pushes it away; hold it against that"
         raise CaseError(InputError("strip.supports", message))
-    tips, lifted = [], [k for k in punch if _lifts(rigid.mode_names[k]) and not (size > 0 and balanced([k]))]
+    tips: list[int] = []
+    lifted = [k for k in punch if _lifts(rigid.mode_names[k]) and not (size > 0 and balanced([k]))]
     if not lifted and size > 0 and balanced(punch[:1]):
         tips = [k for k in punch[1:] if not balanced([*punch[:1], k])] or punch[1:]
     how = " and to ".join(motion_words(rigid.mode_names[k]) for k in tips)

@@ -240,12 +240,14 @@ def layers_of(
     """
     n, winkler, debris = len(pair.weights), None, None
     closure: Closure | None = None
-    place = dict(zip("xyz", in_space(pair.punch.x).T, strict=True))
+    x = in_space(pair.punch.x)
+    place = {name: np.asarray(x[:, axis]) for axis, name in enumerate("xyz")}
     match contact.layer:
         case LinearLayer(stiffness=stiffness):
             winkler = 1 / place_values(stiffness, place, n, STIFFNESS, "contact.layer.stiffness")
         case PowerLayer() as law:
-            closure = PowerClosure(*_at_nodes(law, place, n), law.exponent)
+            reference, pressure = _at_nodes(law, place, n)
+            closure = PowerClosure(reference, pressure, law.exponent)
         case ExponentialLayer() as law:
             closure = ExponentialClosure(*_at_nodes(law, place, n))
         case RoughLayer() as law:

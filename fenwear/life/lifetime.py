@@ -140,10 +140,10 @@ class Lifetime:
             lines.append(
                 f"  {'of each, reached before by a share of':40} {'1 %':>11} {'10 %':>12} {'50 %':>12}  is first"
             )
-            for one, share in zip(self.each, self.first_share, strict=True):
-                known = {q.level: q.value for q in one.quantiles}
+            for part, share in zip(self.each, self.first_share, strict=True):
+                known = {q.level: q.value for q in part.quantiles}
                 lines.append(
-                    f"    {one.quantity:36} {known[0.01]:13.5g} {known[0.1]:12.5g} {known[0.5]:12.5g} {share:9.0%}"
+                    f"    {part.quantity:36} {known[0.01]:13.5g} {known[0.1]:12.5g} {known[0.5]:12.5g} {share:9.0%}"
                 )
         return "\n".join(lines)
 
@@ -233,8 +233,8 @@ def lifetime(
 
     whole = replace(asked[0], text=asked[0].text if len(asked) == 1 else f"first of {', '.join(names)}")
     found = summary(whole, lives.min(axis=1), wanted, with_indices=indices)
-    told = zip(quantities, lives.T, strict=True)
-    each = tuple(summary(one, own, None) for one, own in told if len(asked) > 1 or one is not asked[0])
+    told = [(k, one) for k, one in enumerate(quantities) if len(asked) > 1 or one is not asked[0]]
+    each = tuple(summary(one, np.asarray(lives[:, k]), None) for k, one in told)
     return replace(found, each=each)
 
 

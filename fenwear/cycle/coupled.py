@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -109,10 +108,10 @@ class _Unknowns:
         """Return the parts of a vector."""
         return [part / unit for part, unit in zip(np.split(x, self.cuts), self.units, strict=True)]
 
-    def close(self, change: Array, x: Array, within: float = CLOSE) -> bool:
-        """Return whether pressures, and the temperatures and depths behind them, change by no more than this."""
+    def close(self, change: Array, x: Array) -> bool:
+        """Return whether pressures, and the temperatures and depths behind them, change by rounding only."""
         return all(
-            float(np.abs(part).max()) <= within * max(float(np.abs(whole).max()), 1e-300)
+            float(np.abs(part).max()) <= CLOSE * max(float(np.abs(whole).max()), 1e-300)
             for part, whole in zip(np.split(change, self.cuts), np.split(x, self.cuts), strict=True)
             if part.size
         )
@@ -146,13 +145,11 @@ class Coupled:
         heat: Of whole cycles; None without heat. Linear in mu p: where mu is not constant its own mu is 1.
         mu: What the pressures are to be multiplied by for `heat` (m, n): what friction heats.
         held: States that laws remember, at the end of a step or at rest; None without, and before.
-        close: Change over their largest that ends the iterations of pressures and what follows from them.
     """
 
     def __init__(self, system: Tribosystem, take: Take) -> None:
         self.system, self._take = system, take
         self.held: Held | None = None
-        self.close = CLOSE
         self.heat = cycle_heat(system)
         self.mu: Array = np.ones((len(system.motion.phases), len(system.pair.weights)))
         if self.heat is not None and not system.friction.constant:
@@ -250,8 +247,7 @@ class Coupled:
                 found.extend(passing.depths(contact.pressure))
             return unknowns.joined([contact.pressure.ravel(), *found]), solved, same and constant
 
-        close = partial(unknowns.close, within=self.close)
-        return fixed_point(advance, unknowns.joined(parts), close, DISAGREE, team=system.team)
+        return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE, team=system.team)
 
     def _in_step(self, end: CycleJump, start: ContactState, solve: SolveContact) -> ContactState:
         """Return contact at the heat of its own pressures, which is a smooth and mostly small part of the gap."""

@@ -59,7 +59,6 @@ GAMMA = 1 - np.sqrt(0.5)
 LAST = 1 / 8  # of a jump in which nodes come into contact, that its last step covers
 PARTS = 8  # of a cycle that does not converge as a whole
 ROUGH, FINE = 0.1, 0.01  # of the tolerance, to which a jump is solved whole, and in halves
-FOLLOWED = 0.1  # of that, to which coefficients and the pressures that they depend on agree
 
 # What is worn from depths on in so many cycles, and what they add to the totals, from what they add without coatings.
 ThroughCoatings = Callable[[WornDepths, float, Totals], tuple[WornDepths, Totals]]
@@ -245,8 +244,7 @@ class Stepper:
         return state
 
     def _solve_to(self, share: float) -> None:
-        """Solve contact to a share of the tolerance, where its digits cost, and coefficients to less of it."""
-        self.coupled.close = max(FOLLOWED * share * self.tolerance, CLOSE)
+        """Solve contact to a share of the tolerance, where its digits cost."""
         if isinstance(self.contact, CondensedContact):
             self.contact.inequality.close = max(share * self.tolerance, CLOSE)
 

@@ -22,7 +22,7 @@ def problems(*settings: str, name: str = "example1-heat") -> list[str]:
     [
         # The key was heat.conductance.function-after[functools.partial(...)], and it was told twice.
         ("heat.conductance=perfekt", "heat.conductance: expected a number or a string with a unit such as "
-                                     "'1 N/(mm*s*K)', got 'perfekt'; or 'perfect'"),
+                                     "'1 N/(mm*s*K)', got 'perfekt'; or 'perfect' or 'layer'"),
         ("heat.conductance=-1", "heat.conductance: expected greater than or equal to 0, got -1"),
         ("heat=3", "heat: expected a table, got 3"),
         ("heat.ambient=[1]", "heat.ambient: expected a number or a string with a unit such as '1 K', got a list"),

@@ -38,6 +38,7 @@ from fenwear.assembly import (
     with_reduced_heat,
 )
 from fenwear.case.names import told_by_name
+from fenwear.contact import ContactState
 from fenwear.contact.complementarity import complementarity_error
 from fenwear.cycle.coupled import Coupled, Solved
 from fenwear.cycle.jump import jump
@@ -281,12 +282,22 @@ def _solve(problem: SteadyInequality) -> tuple[Solved, CycleHeat | None, Held | 
             f"{error}; friction tips the punch so far that no pressures wear the whole contact by a rigid motion: "
             "it goes on changing its shape. Expected less friction, a lower pin or a wider contact"
         ) from error
+    if (capped := _no_state_under_cap(problem)) and _any_shape_stays(problem, contact):
+        raise ConvergenceError(capped)
     coupled = Coupled(system, problem.take)
     if coupled.heat is None and system.constant_coefficients:
         return Solved(contact), None, None
     initial = None if coupled.heat is None else coupled.heat.initial()
     solved = coupled.solve(initial, np.inf, contact, lambda thermal, coupling, _: problem.solve(thermal, coupling))
     return solved, coupled.at_friction(), coupled.held
+
+
+def _any_shape_stays(problem: SteadyInequality, contact: ContactState) -> bool:
+    """Return whether all that touches is pressed beyond a cap, so that what was found is one of many shapes."""
+    if any(law is not None and law.per_area is not None for law in problem.system.sliding.wear):
+        return False
+    pressed = contact.pressure[contact.pressure > 0]
+    return bool(pressed.min(initial=np.inf) >= (1 - 1e-9) * problem.wear.cap)
 
 
 def _no_state_under_cap(problem: SteadyInequality) -> str:

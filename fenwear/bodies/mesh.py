@@ -41,6 +41,7 @@ MATRICES = 3  # of n by n contact nodes: what a solid's contact holds at least, 
 SOLID_ELEMENTS = ("Tetrahedron", "Hexahedron")  # as gmsh names them
 NOTHING: Mapping[str, float] = MappingProxyType({})
 SCALING = "Mesh.ScalingFactor"  # of all lengths, as set in a .geo
+MOST_ELEMENTS = 1_000_000  # along one line: with more gmsh comes to no end
 TOLERANCE, SAME_POINT = "Geometry.Tolerance", 1e-8  # of the size of what gmsh compares points in: closer ones are one
 _largest = [
     1.0
@@ -124,7 +125,10 @@ def find_geometry(geometry: Geometry, folder: Path | None) -> Path:
     """
     ready = meshes_folder()
     places = [Path(geometry.file)] if folder is None else [folder / geometry.file]
-    path = next((p for p in (*places, ready / geometry.file) if p.is_file()), None)
+    try:
+        path = next((p for p in (*places, ready / geometry.file) if p.is_file()), None)
+    except OSError:  # a name that no file can have
+        path = None
     if path is None:
         names = ", ".join(sorted(p.name for p in ready.glob("*.geo")))
         raise CaseError(InputError("geometry.file", f"no file {geometry.file!r}; ready ones are {names}"))
@@ -340,6 +344,10 @@ def _checked_parameters(geometry: Geometry, path: Path) -> list[str]:
         raise CaseError(
             [InputError(f"geometry.parameters.{name}", _no_parameter(path, name, known)) for name in unknown]
         )
+    many = [name for name, value in geometry.parameters.items() if "elements" in name and value > MOST_ELEMENTS]
+    if many:
+        message = f"expected at most {MOST_ELEMENTS:,} elements, got {geometry.parameters[many[0]]:g}"
+        raise CaseError(InputError(f"geometry.parameters.{many[0]}", message))
     return known
 
 

@@ -27,6 +27,7 @@ from fenwear.case.quantities import (
 from fenwear.case.topography import Topography
 from fenwear.case.units import convert, shown
 
+NOTHING = 1e-9  # of a load: what is called a factor still
 CONDENSED = "condensed"  # operator of a body whose mesh is eliminated down to its contact surface
 
 
@@ -165,6 +166,8 @@ class Load(Part):
             fractions = [fraction for fraction, _ in self.over_cycle]
             if len(fractions) < 2 or fractions[0] != 0 or fractions[-1] != 1 or np.any(np.diff(fractions) <= 0):
                 raise ValueError("over_cycle: expected pairs [fraction, factor] with fractions that rise from 0 to 1")
+            if 0 < max(abs(factor) for _, factor in self.over_cycle) < NOTHING:
+                raise ValueError(f"over_cycle: expected a factor of at least {NOTHING:g}, or none but zeros")
         return self
 
     _of_table: bool = False  # of a motion that is a table

@@ -370,3 +370,16 @@ def test_a_large_geometry_leaves_small_ones_as_they_are() -> None:
         read("punch_on_strip.geo", "stress", overlap=1e9)
     read("pin_on_disc.geo", "solid", across=2, around=2, outer=1, pin_layers=1, disc_layers=1)
     read("two_bushings.geo", "solid", clearance=1e-5, along=2, between_elements=2, overhang_elements=1, fine_elements=4)
+
+
+@pytest.mark.parametrize(
+    ("setting", "told"),
+    [
+        ("geometry.file=" + 300 * "x" + ".geo", "geometry.file: no file 'xxx"),
+        ("geometry.parameters.elements_along_contact=1e9", "expected at most 1,000,000 elements, got 1e[+]09"),
+    ],
+)
+def test_what_no_file_and_no_mesh_can_be(setting: str, told: str) -> None:
+    """A name that is too long was an OSError, and gmsh came to no end."""
+    with pytest.raises(CaseError, match=told):
+        build_meshes(load_case("example1", [setting]).geometry, None, MPI.COMM_WORLD)

@@ -59,6 +59,12 @@ def test_a_run_of_a_program_is_a_table() -> None:
     assert problems("program={steps=[{cycles=1}]}", "run=3") == ["run: expected a table, got 3"]
 
 
+def test_loads_next_to_nothing_over_a_cycle() -> None:
+    """Of which no equilibrium could be told from rounding."""
+    told = problems("punch.loads.0.over_cycle=[[0, 1e-300], [1, 1e-300]]")
+    assert told == ["punch.loads.0.over_cycle: expected a factor of at least 1e-09, or none but zeros"]
+
+
 def test_from_python() -> None:
     """Objects that no case file can hold."""
     tables: dict[str, Any] = copy.deepcopy(tomllib.loads(load_case("example1").to_toml()))

@@ -99,7 +99,7 @@ def test_worn_volume_goes_with_the_work_of_friction() -> None:
     """For b = a = 1 the worn area is coefficient / mu times the work of friction."""
     driven = problem()
     records = first_cycle(driven)
-    energy, worn = records.energy(driven.weights), driven.worn_in(records, 0)
+    energy, worn = records.energy(driven.weights), driven.worn_in(records, 0, driven.beginning())
     assert driven.weights @ worn.punch == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)
     strip = driven.interface.middle.pair.strip.weights
     assert strip @ worn.strip == pytest.approx(2e-8 / 0.9 * energy, rel=1e-9)

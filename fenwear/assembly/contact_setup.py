@@ -35,7 +35,7 @@ from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, co
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
 from fenwear.parallel import Team
 from fenwear.remedies import Remedies
-from fenwear.sliding.coating import coating_thickness, covering
+from fenwear.sliding.coating import coatings_of, covering
 from fenwear.sliding.cross_shear import CycleShear
 from fenwear.sliding.field import SlidingField
 from fenwear.sliding.friction import ContactConditions, Friction
@@ -235,11 +235,7 @@ class ContactSetup:
         Raises:
             CaseError: it is negative somewhere.
         """
-        punch, strip = self.sliding.wear
-        return (
-            coating_thickness(punch, self.pair.punch.unworn, "punch"),
-            coating_thickness(strip, self.pair.strip.unworn, "strip"),
-        )
+        return coatings_of(self.pair, self.sliding.wear)
 
     @cached_property
     def layers(self) -> Layers:

@@ -31,9 +31,7 @@ class ReadyGeometry:
 
     def text(self) -> str:
         """Return it in words, a line for each parameter."""
-        lines = (
-            f"    {name} = {value}" + (f"   {meaning}" * bool(meaning)) for name, value, meaning in self.parameters
-        )
+        lines = (f"    {name} = {value}   {meaning}".rstrip() for name, value, meaning in self.parameters)
         return "\n".join((f"{self.name}: {self.about}", "geometry.parameters, in mm and degrees:", *lines))
 
 

@@ -80,6 +80,16 @@ def coating_thickness(law: WearLaw | None, x: Array, key: str) -> Array | None:
     return np.asarray(place_values(law.coating.thickness, place, len(x), "mm", name, 0.0))
 
 
+def coatings_of(pair: ContactPair, laws: tuple[WearLaw | None, WearLaw | None]) -> tuple[Array | None, Array | None]:
+    """Return the thickness of the coatings of punch and strip at their own contact nodes, mm; None without.
+
+    Raises:
+        CaseError: it is negative somewhere.
+    """
+    punch, strip = laws
+    return coating_thickness(punch, pair.punch.unworn, "punch"), coating_thickness(strip, pair.strip.unworn, "strip")
+
+
 def covering(
     coatings: tuple[Array | None, Array | None], pair: ContactPair, depths: tuple[Array, Array] | None
 ) -> tuple[Array | None, Array | None]:

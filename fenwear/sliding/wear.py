@@ -360,12 +360,7 @@ class Wear:
     @property
     def constant(self) -> bool:
         """Whether no coefficient depends on more than the place."""
-        both = [law for law in (self.punch, self.strip) if law is not None]
-        laws = [one for law in both for one in (law, law.of_coating) if one is not None]
-        of_friction = any(law.beta is not None or law.energy is not None for law in laws)
-        given = [law.given_coefficient for law in laws]
-        dependent = any(isinstance(one, Dependence) and one.varies for one in given)
-        return not dependent and not self.friction.mixed and (self.friction.constant or not of_friction)
+        return stays((self.punch, self.strip), self.friction)
 
     def phases(self, conditions: Sequence[ContactConditions], which: Sequence[int] | None = None) -> PhasesWear:
         """Return the wear of all phases or of some of them.
@@ -393,6 +388,14 @@ class Wear:
             coating = None if above is None or thickness is None else _CoatingWear(rates(above), thickness)
             bodies.append(_BodyWear(rates(law), PressureLaw.of(law), coating))
         return PhasesWear(bodies[0], bodies[1], [self.pairs[k] for k in chosen])
+
+
+def stays(wear: tuple[WearLaw | None, WearLaw | None], friction: Friction) -> bool:
+    """Return whether no wear coefficient depends on more than the place, those of coatings as well."""
+    laws = [one for law in wear if law is not None for one in (law, law.of_coating) if one is not None]
+    of_friction = any(law.beta is not None or law.energy is not None for law in laws)
+    dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
+    return not dependent and not friction.mixed and (friction.constant or not of_friction)
 
 
 def coefficient(law: WearLaw, friction: Friction, conditions: ContactConditions, key: str) -> Array:

@@ -10,7 +10,7 @@ from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Cycle, Oscillation
 from fenwear.errors import CaseError, InputError
-from fenwear.sliding.coating import coating_thickness
+from fenwear.sliding.coating import coatings_of
 from fenwear.stick.cycle import PartialSlipProblem
 from fenwear.stick.heat import stick_heat
 from fenwear.stick.interface import StickInterface, meshed
@@ -74,12 +74,7 @@ def unheated_problem(
     of_punch, of_strip = bodies.regions
     regions = of_punch, {name: middle.pair.wear_interpolation @ share for name, share in of_strip.items()}
     initial = 0.0 if case.heat is None else case.heat.initial
-    punch, strip = sliding.wear
-    coatings = (
-        coating_thickness(punch, middle.pair.punch.unworn, "punch"),
-        coating_thickness(strip, middle.pair.strip.unworn, "strip"),
-    )
-    laws = LocalLaws(sliding.friction, sliding.wear, regions, initial, coatings)
+    laws = LocalLaws(sliding.friction, sliding.wear, regions, initial, coatings_of(middle.pair, sliding.wear))
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
     conditions = laws.conditions(middle.pair, mean, states=interface.layers.known(middle.pair, None))
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)

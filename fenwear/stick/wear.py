@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.case import Dependence, WearLaw
+from fenwear.case import WearLaw
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.friction import ContactConditions, Friction
 from fenwear.sliding.pressure_law import PressureLaw
-from fenwear.sliding.wear import WornDepths, coefficient
+from fenwear.sliding.wear import WornDepths, coefficient, stays
 
 States = tuple[Mapping[str, Array], Mapping[str, Array]]
 
@@ -88,10 +88,7 @@ class LocalLaws:
         """Return whether friction changes with the state, or wear does."""
         if not of_wear:
             return not self.friction.constant
-        laws = [one for law in self.wear if law is not None for one in (law, law.of_coating) if one is not None]
-        of_friction = any(law.beta is not None or law.energy is not None for law in laws)
-        dependent = any(isinstance(one, Dependence) and one.varies for one in (law.given_coefficient for law in laws))
-        return dependent or self.friction.mixed or (of_friction and not self.friction.constant)
+        return not stays(self.wear, self.friction)
 
     def conditions(
         self,

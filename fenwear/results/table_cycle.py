@@ -60,7 +60,8 @@ def table_cycle(last: Block) -> TableCycle | None:
         for k, own in enumerate(pressure)
     ]
     tensors = sliding_tensor(system, pressure), sliding_tensor_of_strip(system, pressure)
-    return TableCycle(system.path.sum(axis=0), pressure, system.wear.phases(states).worn(pressure), tensors)
+    worn = system.wear.phases(states).begun(end.worn).worn(pressure)
+    return TableCycle(system.path.sum(axis=0), pressure, worn, tensors)
 
 
 def _of_time_steps(last: Block, steps: Steps) -> TableCycle:

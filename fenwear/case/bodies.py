@@ -321,3 +321,7 @@ class Body(Part):
     profile: Profile | None = Field(
         default=None, description="by which its contact surface differs from the mesh: a measured or machined shape"
     )
+
+    def materials_at(self, shares: Mapping[str, Array]) -> set[str]:
+        """Return the names of the materials at nodes, of which regions have these shares (n,), by their names."""
+        return {self.regions[name] for name, share in shares.items() if share.any()}

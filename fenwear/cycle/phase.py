@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -184,6 +185,11 @@ class PhaseStep:
         passing = system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
         return replace(passing, ended=end) if ended else passing
 
+    @cached_property
+    def _uncapped(self) -> ContactSolver:
+        """The contact whose surfaces flow by and by."""
+        return self.system.passed_contact(self.phase, capped=False)
+
     def _solve(
         self,
         temperature: HeatState | None,
@@ -197,7 +203,7 @@ class PhaseStep:
             try:
                 return self._capped(temperature, gap, start, passing, worn)
             except ConvergenceError:  # so much flows that too little else carries on the way to the solution
-                contact = self.system.passed_contact(self.phase, capped=False)
+                contact = self._uncapped
                 if isinstance(contact, CondensedContact):
                     contact.press(self._load)
                     contact.slide([self._friction_ratio])

@@ -117,8 +117,7 @@ class Layers:
         if self.memory is None or self.begun is None:
             return {}, {}
         held = held or (self.begun if worn is None else self.held(worn))
-        strip = held.strip @ pair.wear_interpolation.T if len(held.strip) else np.zeros((0, self.nodes))
-        return self.memory.known(np.vstack([held.contact, strip]))
+        return self.memory.known(held.at_contact(pair))
 
     def with_held(self, worn: WornDepths, held: Held) -> WornDepths:
         """Return the depths with other states of laws."""
@@ -308,7 +307,7 @@ def common_modulus(case: Case, punch: Mapping[str, Array], strip: Mapping[str, A
     """
     materials, given = case.initial_materials, 0.0
     for shares, body in ((punch, case.punch), (strip, case.strip)):
-        own = {body.regions[name] for name, share in shares.items() if share.any()}
+        own = body.materials_at(shares)
         if len(own) != 1:
             return None
         material = materials[own.pop()]

@@ -59,7 +59,7 @@ def _conductivity(case: Case, punch: Mapping[str, Array], strip: Mapping[str, Ar
     """Return 2 k_1 k_2 / (k_1 + k_2) at the initial temperature, N/(s K); None where a body has several materials."""
     materials, resistance = case.initial_materials, 0.0
     for shares, body in ((punch, case.punch), (strip, case.strip)):
-        own = {body.regions[name] for name, share in shares.items() if share.any()}
+        own = body.materials_at(shares)
         if len(own) != 1:
             return None
         resistance += 0.5 / float(materials[own.pop()].conductivity or np.nan)

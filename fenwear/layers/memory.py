@@ -137,6 +137,12 @@ class Held:
         """Return all of it times a factor."""
         return Held(factor * self.contact, factor * self.strip)
 
+    def at_contact(self, pair: ContactPair) -> Array:
+        """Return all of it at the contact's nodes (q + q_s, n)."""
+        if not len(self.strip):
+            return self.contact
+        return np.vstack([self.contact, self.strip @ pair.wear_interpolation.T])
+
     @property
     def size(self) -> Held:
         """Absolute values."""
@@ -242,10 +248,7 @@ class Evolution:
         q, held, middles = len(self.memory.contact), start, []
         slopes = _Slopes(*(np.zeros((rows.shape[1], len(rows), len(rows))) for rows in (start.contact, start.strip)))
         for k, (pair, tau) in enumerate(zip(self.pairs, self.durations, strict=True)):
-            onto_nodes = (
-                held.strip @ pair.wear_interpolation.T if len(held.strip) else np.zeros((0, held.contact.shape[1]))
-            )
-            begin = np.vstack([held.contact, onto_nodes])
+            begin = held.at_contact(pair)
             middle, end, z = self._over(begin, float(tau), self._under(k))
             middles.append(replace(self.conditions[k], states=self.memory.known(middle)))
             strip, z_strip = held.strip, np.zeros_like(slopes.strip)

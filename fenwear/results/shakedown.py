@@ -22,15 +22,19 @@ def shakedown_limit(placed: ContactSetup) -> tuple[float, str] | None:
     case = placed.made_from
     if case is None or conforming(placed.pair):
         return None
-    bodies = zip((case.punch, case.strip), placed.bodies.regions, strict=True)
-    used = {body.regions[name] for body, shares in bodies for name, share in shares.items() if share.any()}
+    punch, strip = placed.bodies.regions
+    used = case.punch.materials_at(punch) | case.strip.materials_at(strip)
     known = {name: case.materials[name].yield_stress for name in sorted(used)}
     given = {name: value for name, value in known.items() if value is not None}
     if not given:
         return None
     softest = min(given, key=lambda name: given[name])
-    factor = POINT if placed.pair.punch.dim == 3 else LINE
-    return float(factor * given[softest] / np.sqrt(3)), softest
+    return float(_factor(placed) * given[softest] / np.sqrt(3)), softest
+
+
+def _factor(placed: ContactSetup) -> float:
+    """Return p_0 / k: in space of a point, else of a line."""
+    return POINT if placed.pair.punch.dim == 3 else LINE
 
 
 def shakedown_text(placed: ContactSetup, pressure: float, when: str) -> str:
@@ -38,9 +42,8 @@ def shakedown_text(placed: ContactSetup, pressure: float, when: str) -> str:
     limit = None if placed.layers.hardness < np.inf else shakedown_limit(placed)
     if limit is None or pressure <= limit[0]:
         return ""
-    factor = POINT if placed.pair.punch.dim == 3 else LINE
     return (
         f"the largest pressure is {pressure:,.4g} MPa {when}, beyond the shakedown limit of {limit[0]:,.4g} MPa, "
-        f"{factor:g} k by materials.{limit[1]}.yield_stress: the surface flows in every cycle, and a linear-elastic "
-        "contact does not; expected less load, or contact.hardness"
+        f"{_factor(placed):g} k by materials.{limit[1]}.yield_stress: the surface flows in every cycle, and a "
+        "linear-elastic contact does not; expected less load, or contact.hardness"
     )

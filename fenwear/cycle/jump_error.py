@@ -21,7 +21,8 @@ class Estimate:
 
     Attributes:
         depth: Of the worn depths over what the jump wears, both integrated over the surfaces; so the errors of
-            all jumps add up to at most the largest of them times the depth.
+            all jumps add up to at most the largest of them times the depth. Or, where a coating ends in the jump, the
+            largest at such a place over the largest that the jump wears: it may wear many times as much by itself.
         pressure: How far the contact force lies from where it should, over the width in contact, in the worst phase.
         temperature: Of the contact surfaces over their rise from the initial one, root mean squares.
         state: Of the states that laws remember, over the largest they are in the jump, both integrated.
@@ -49,7 +50,7 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
     share, depth = 1 / (2**ORDER - 1), wrong / max(worn, 1e-300)
     depth = max(depth, _creep_difference(system, apart, step, halves.worn))
     return Estimate(
-        share * depth,
+        max(share * depth, _through_difference(system, before, whole, halves)),
         share * pressure,
         share * _heat_difference(system, whole, halves),
         share * _state_difference(system, before, whole, halves),
@@ -63,6 +64,22 @@ def _creep_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, 
         return 0.0
     wrong, moved, there = (float(weights @ np.abs(creep.depth(one.crept))) for one in (apart, step, end))
     return wrong / max(moved, REST * there, 1e-300)
+
+
+def _through_difference(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> float:
+    """Return the largest difference of depths where coatings end, over the largest that the jump wears.
+
+    Not a part of it: in a step that a coating ends in depths bend, and its order is not that of others.
+    """
+    found = 0.0
+    for body, thickness in zip(("punch", "strip"), system.coatings, strict=True):
+        if thickness is None:
+            continue
+        first, one, other = (getattr(state.worn, body) for state in (before, whole, halves))
+        ended = (first < thickness) & (np.maximum(one, other) >= thickness)
+        apart = float(np.abs(one - other).max(where=ended, initial=0.0))
+        found = max(found, apart / max(float((other - first).max()), 1e-300))
+    return found
 
 
 def area(system: Tribosystem, worn: WornDepths) -> float:

@@ -67,6 +67,22 @@ def coated(law: str, thickness: float, more: str = "", *both: str) -> Tribosyste
     return assemble(load_case("fretting-partial-slip", settings))
 
 
+def test_a_place_that_is_through_first_ends_no_jump_unseen(assembled: Assemble) -> None:
+    """Of the surface it is a small part, and wears ten times as much by itself: at the edge, where it is thinnest."""
+    thin = "wear.punch={coefficient=4e-7, coating={thickness={expression='5e-3*(1-x/100)'}, coefficient=4e-8}}"
+    system, half_cycles = assembled("example2", *SMALL, thin), 1300
+    marched = [list(march(system, half_cycles, implicit=way))[-1].wear[-1] for way in (True, False)]
+    exact = sum(marched) / 2  # of which the errors of first order go
+    left = 5e-3 * (1 - system.pair.punch.unworn[:, 0] / 100) - exact
+    assert 0 < (left <= 0).mean() < 0.2
+    errors = []
+    for tolerance in (0.3, 0.03, 0.003):
+        *_, last = jump(system, half_cycles, tolerance=tolerance)
+        errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
+        assert errors[-1] < tolerance
+    assert errors[0] > errors[1] > errors[2]
+
+
 @pytest.mark.parametrize("bodies", ["punch", "both", "debris"])
 @pytest.mark.parametrize("law", ["gross-sliding", "coulomb"])
 def test_jumps_go_through_the_end_as_marches_do(law: str, bodies: str) -> None:

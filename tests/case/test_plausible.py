@@ -33,6 +33,12 @@ def test_builtin_cases_are_beyond_doubt(name: str) -> None:
         (["heat.convection=80"], "heat.convection", "8e+04 W/(m^2 K)"),
         (["heat.initial='3000 K'"], "heat.initial", "3000 K is far outside"),
         (["wear.punch.coefficient=4e-2"], "wear.punch.coefficient", "0.04 1/MPa"),
+        (
+            ["wear.punch.coating={thickness=5, coefficient=1e-9}"],
+            "wear.punch.coating.thickness",
+            "5000 µm as it is read without a unit",
+        ),
+        (["materials.steel.yield_stress=0.3"], "materials.steel.yield_stress", "0.3 MPa as it is read without a unit"),
         (["motion.amplitude=2"], "motion.amplitude", "read as 2.0 mm, beside motion.angular_frequency = '10 rad/s'"),
         (["heat.initial='20 degC'", "heat.ambient=20"], "heat.ambient", "20 K without a unit, which is -253.15 degC"),
         (["heat.initial='20 degC'"], "strip.temperatures.0.temperature", "0 K, which is -273.15 degC"),

@@ -9,6 +9,7 @@ import pytest
 
 from fenwear import CaseError, Tribosystem, evolve, jump, load_case, march, steady
 from fenwear.assembly import place_case
+from fenwear.results.table_cycle import table_cycle
 from tests.results.test_contacts import COARSE as PADS
 
 POSITIONS = 3
@@ -64,6 +65,17 @@ def test_steady_state_of_changing_loads_and_ways(assembled: Callable[..., Tribos
     x = system.pair.x[touching]
     fit = np.polynomial.Polynomial.fit(x, worn[touching], 1)
     np.testing.assert_allclose(worn[touching], fit(x), atol=1e-9 * worn.max())
+
+
+def test_what_a_cycle_wears_is_of_the_coating_while_it_lasts(assembled: Callable[..., Tribosystem]) -> None:
+    """A million such cycles: it was told of the base, ten times as much."""
+    found = []
+    for wear in ("{coefficient=1e-7, coating={thickness=1.0, coefficient=1e-8}}", "{coefficient=1e-8}"):
+        *_, last = march(assembled("example1", *SMALL[:3], sine(), f"wear.punch={wear}"), 4)
+        cycle = table_cycle(last)
+        assert cycle is not None
+        found.append(cycle.worn.punch)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
 
 
 def test_a_group_that_is_none(assembled: Callable[..., Tribosystem]) -> None:

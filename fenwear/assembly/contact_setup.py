@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.assembly.bodies import Bodies
-from fenwear.assembly.cycle_shear import cycle_shear, squares
+from fenwear.assembly.cycle_shear import SlidingWays
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding, check_stays
 from fenwear.bodies.shape import element_height
@@ -204,14 +204,13 @@ class ContactSetup:
         )
 
     @cached_property
-    def sliding_squares(self) -> Array:
-        """Products of their components (m, n, 9)."""
-        return squares(self.sliding_directions)
-
-    @cached_property
-    def _unknown_cycle(self) -> CycleShear | None:
-        """What coefficients know of a cycle whose pressures are not known."""
-        return cycle_shear(self, None)
+    def ways(self) -> SlidingWays:
+        """What slides how far and where to in each phase of a cycle: tensors, cross-shear."""
+        laws = [law.given_coefficient for law in self.sliding.wear if law is not None]
+        given = [self.friction.contact.friction, *laws]
+        asked = any(isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm")) for one in given)
+        mean = self.rigid.mean_pressure
+        return SlidingWays(self.pairs, self.pair, self.path, self.sliding_directions, self.strip_wears, mean, asked)
 
     def friction_in_space(self, phase: int, mu: Array) -> Array:
         """Return tau of a phase in space (n, 3), as `phase_friction`."""
@@ -413,7 +412,7 @@ class ContactSetup:
             temperatures: Of the punch's and the strip's surface (n,), K; by default the initial one.
             worn: Depths, and states that laws remember; by default those at the start.
             half_cycles: Done since the start of the run; by default those before its motion.
-            cycle: Of the pressures of all phases, by `cycle_shear`; by default they are not known.
+            cycle: Of the pressures of all phases, by `SlidingWays.shear`; by default they are not known.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
@@ -436,7 +435,7 @@ class ContactSetup:
             (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
-            self._unknown_cycle if cycle is None else cycle,
+            self.ways.shear(None) if cycle is None else cycle,
             self.layers.known(pair, worn),
             covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
         )

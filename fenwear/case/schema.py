@@ -249,7 +249,14 @@ class Case(Part):
     @property
     def diffusion(self) -> dict[str, float]:
         """What ready geometries grade the strip by, see `diffusion_of`: the same for all stages of a program."""
-        return diffusion_of(self) if self._diffusion is None else self._diffusion
+        if self._diffusion is not None:
+            return self._diffusion
+        motion = self.motion
+        if self.heat is None or not self.passes or not isinstance(motion, OneWay | Rotation):
+            return {}
+        materials = self.initial_materials
+        regions = [materials[region] for region in self.strip.regions.values()]
+        return diffusion_of(motion, () if self.program is None else self.program.steps, regions)
 
     def stage(self, changes: Mapping[str, Any]) -> Case:
         """Return the case with the motion and heat of a stage of its program, whose stages have the same meshes."""

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
-from fenwear.assembly.cycle_shear import cycle_shear
 from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
@@ -301,7 +300,7 @@ class Coupled:
     ) -> None:
         """Take the coefficients at these pressures and, where there are any, temperatures of the phases and depths."""
         system = self.system
-        done, shear = None if passing is None else passing.half_cycles, cycle_shear(system, np.asarray(pressure))
+        done, shear = None if passing is None else passing.half_cycles, system.ways.shear(np.asarray(pressure))
         conditions = [
             system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None, worn, done, shear)
             for k, p in enumerate(pressure)

@@ -28,7 +28,6 @@ from fenwear.assembly import (
     with_exchange,
     with_reduced_heat,
 )
-from fenwear.assembly.cycle_shear import asks_for_cycle, cycle_shear
 from fenwear.assembly.laws import GROSS
 from fenwear.assembly.tribosystem import answers_for, condense_bodies
 from fenwear.assembly.variants import same_conduction
@@ -57,7 +56,7 @@ class HalfCycles:
         phases = range(len(system.motion.phases))
         self.steps = [PhaseStep(system, phase, implicit=implicit) for phase in phases]
         self.smaller = SmallerSteps(system, implicit=implicit)
-        self._of_cycle = asks_for_cycle(system)  # whether a coefficient depends on what a whole cycle does
+        self._of_cycle = system.ways.asked  # whether a coefficient depends on what a whole cycle does
 
     def __call__(self, state: RunState, _until: int, /) -> tuple[RunState, list[HalfCycle]]:
         """Return the state after the next half-cycle, and its record."""
@@ -83,7 +82,7 @@ class HalfCycles:
         worn, temperature = state.worn, state.temperature
         ends: list[PhaseEnd] = []
         known = known_pressures(state.contacts) if self._of_cycle else None
-        cycle = None if known is None else cycle_shear(self.system, known)
+        cycle = None if known is None else self.system.ways.shear(known)
         for number, phase in enumerate(phases):
             if number:
                 self.watch()

@@ -39,7 +39,6 @@ import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
-from fenwear.assembly.cycle_shear import cycle_shear
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.inequality import CLOSE
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
@@ -225,7 +224,7 @@ class Stepper:
         """Return what a cycle wears at the depths, temperatures and pressures of a state."""
         system, surfaces = self.system, None
         pressures = np.concatenate([present(contact).pressure for contact in state.contacts])
-        shear = cycle_shear(system, pressures)
+        shear = system.ways.shear(pressures)
         if self.coupled.heat is not None and state.temperature is not None:
             surfaces = self.coupled.heat.exchange.contact_temperatures(state.temperature)
         conditions: Sequence[ContactConditions] = [

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.assembly.cycle_shear import cycle_shear, sliding_tensor, sliding_tensor_of_strip
 from fenwear.cycle import Block
 from fenwear.cycle.state import known_pressures
 from fenwear.interface.placement import in_space
@@ -54,12 +53,12 @@ def table_cycle(last: Block) -> TableCycle | None:
     pressure = known_pressures(last.end.contacts)
     if pressure is None:
         return None
-    end, shear = last.end, cycle_shear(system, pressure)
+    end, shear = last.end, system.ways.shear(pressure)
     states = [
         system.conditions(k, np.asarray(own), worn=end.worn, half_cycles=end.half_cycle, cycle=shear)
         for k, own in enumerate(pressure)
     ]
-    tensors = sliding_tensor(system, pressure), sliding_tensor_of_strip(system, pressure)
+    tensors = system.ways.tensor(pressure), system.ways.tensor_of_strip(pressure)
     worn = system.wear.phases(states).begun(end.worn).worn(pressure)
     return TableCycle(system.path.sum(axis=0), pressure, worn, tensors)
 

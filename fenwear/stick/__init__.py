@@ -6,7 +6,8 @@ controller, `fenwear.cycle`.
 """
 
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import LoadEffect, Position, StickInterface
-from fenwear.stick.state import Imposed, StickState, untouched
+from fenwear.stick.interface import StickInterface, untouched
+from fenwear.stick.position import LoadEffect, Position
+from fenwear.stick.state import Imposed, StickState
 
 __all__ = ["Imposed", "LoadEffect", "Position", "StickInterface", "StickState", "advance", "untouched"]

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
@@ -18,10 +17,8 @@ import scipy.linalg
 from fenwear.arrays import Array
 from fenwear.bodies.creep import Retardation, RetardedCycle
 from fenwear.bodies.scaled import scaled
-
-if TYPE_CHECKING:
-    from fenwear.stick.interface import OppositeBodies, Position
-    from fenwear.stick.state import StickState
+from fenwear.stick.position import Position
+from fenwear.stick.state import StickState
 
 PARTS = ("punch", "strip", "layer")
 ACCURATE, ROBUST = 1 - np.sqrt(0.5), 1 + np.sqrt(0.5)  # g of the two methods that are stable to infinity
@@ -157,13 +154,13 @@ class CreepStep:
 
     Args:
         creep: What creeps.
-        interface: The bodies.
+        position: The bodies in the middle position of the strip.
         period: Of a cycle, s.
         cycles: N.
     """
 
-    def __init__(self, creep: StickCreep, interface: OppositeBodies, period: float, cycles: float) -> None:
-        self._creep, self._position, self._interface = creep, interface.middle, interface
+    def __init__(self, creep: StickCreep, position: Position, period: float, cycles: float) -> None:
+        self._creep, self._position = creep, position
         self._paces = [np.zeros(0) if law is None else cycles * period / law.times for law in creep.laws]
         self._normals = self._position.frame[:, 0], _normals_of_strip(self._position)
         self._answer: Array | None = None
@@ -191,7 +188,7 @@ class CreepStep:
         """Return what pressures (n,) displace of a part."""
         if part == 2:
             return self._creep.closure * pressure
-        position, interface = self._position, self._interface
+        position, interface = self._position, self._position.interface
         force = position.pair.normal * (position.pair.weights * pressure)[:, None]
         if part == 0:
             return interface.punch.apply(force)

@@ -24,9 +24,10 @@ from fenwear.sliding.wear import WornDepths
 from fenwear.stick.heat import StickHeat
 from fenwear.stick.heated import StepStart, coupled_step
 from fenwear.stick.increment import advance
-from fenwear.stick.interface import LoadEffect, OppositeBodies, Position
+from fenwear.stick.interface import OppositeBodies, untouched
+from fenwear.stick.position import LoadEffect, Position
 from fenwear.stick.program import Program, TimeStep
-from fenwear.stick.state import Imposed, StickState, untouched
+from fenwear.stick.state import Imposed, StickState
 from fenwear.stick.strain import surface_gradient, surface_strain
 from fenwear.stick.wear import LocalLaws, LocalWear
 

@@ -31,7 +31,8 @@ from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
 from fenwear.stick.cone import derivative, project
 from fenwear.stick.creep import Displaced, StickCreep
-from fenwear.stick.interface import OppositeBodies, Position
+from fenwear.stick.interface import OppositeBodies
+from fenwear.stick.position import Position
 from fenwear.stick.state import Imposed, StickState
 
 ROUNDING = 1e-12  # of what the largest pressure gives way: no slip

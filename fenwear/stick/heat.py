@@ -29,7 +29,8 @@ from fenwear.heat.passage import Passage
 from fenwear.heat.prepare import prepare_exchange
 from fenwear.interface.placement import HERE, Placement
 from fenwear.layers import conductance_of
-from fenwear.stick.interface import LoadEffect, StickInterface
+from fenwear.stick.interface import StickInterface
+from fenwear.stick.position import LoadEffect
 from fenwear.stick.program import far_enough, timed_motion
 
 NEUTRAL = 1e-10  # of a cycle's largest factor below 1: temperatures do not die out

@@ -15,7 +15,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.interface.placement import Placement
 from fenwear.stick.heat import StickHeat
-from fenwear.stick.interface import LoadEffect
+from fenwear.stick.position import LoadEffect
 from fenwear.stick.state import StickState
 
 CLOSE = 1e-9  # change of heat and pressure over their largest that ends the iterations of a step

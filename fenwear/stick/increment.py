@@ -11,7 +11,8 @@ from fenwear.arrays import Array
 from fenwear.errors import ConvergenceError
 from fenwear.stick.equations import ContactStatus, StatusSolution, Step
 from fenwear.stick.full import FullStep
-from fenwear.stick.interface import OppositeBodies, Position, along_tangents
+from fenwear.stick.interface import OppositeBodies
+from fenwear.stick.position import Position, along_tangents
 from fenwear.stick.state import Imposed, StickState
 
 MOST = 60  # Newton steps

@@ -36,7 +36,7 @@ from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
 from fenwear.stick.heat import HeatHistory
-from fenwear.stick.interface import Position
+from fenwear.stick.position import Position
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 GAMMA = 1 + np.sqrt(0.5)
@@ -259,7 +259,9 @@ class _Implicit:
             raise ConvergenceError(TOO_LARGE)
         self._factor = scipy.linalg.lu_factor(matrix)
         creep = problem.interface.creep
-        self._creep = None if creep is None else CreepStep(creep, problem.interface, problem.program.period, cycles)
+        self._creep = (
+            None if creep is None else CreepStep(creep, problem.interface.middle, problem.program.period, cycles)
+        )
         if self._creep is not None:
             self._creep.answering(self._answer())
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.sliding.wear import STIFF
-from fenwear.stick.interface import LoadEffect, OppositeBodies
+from fenwear.stick.position import LoadEffect
 
 
 @dataclass(frozen=True)
@@ -121,23 +121,3 @@ class StickState:
     def sticking(self) -> Mask:
         """Which nodes carry pressure and have not slipped (n,)."""
         return self.closed & ~self.slipping
-
-
-def untouched(interface: OppositeBodies) -> StickState:
-    """Return the unloaded bodies before they touch."""
-    n, d = interface.middle.pair.normal.shape
-    none = np.zeros((n, d - 1))
-    return StickState(
-        np.zeros(n),
-        none,
-        np.zeros(n),
-        none,
-        np.zeros(n),
-        np.zeros(interface.middle.modes.shape[1]),
-        0.0,
-        0.0,
-        np.zeros((n, d)),
-        np.zeros(interface.strip.by_load.shape),
-        none,
-        crept=STIFF if interface.creep is None else interface.creep.beginning(),
-    )

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array, csr_array
 from fenwear.arrays import Array
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.subcells import linear_cells
-from fenwear.stick.interface import Position
+from fenwear.stick.position import Position
 
 
 def along_sliding(position: Position) -> Array:

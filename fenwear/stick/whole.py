@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, block_diag, coo_array, csr_array, diags_array
@@ -11,9 +11,7 @@ from scipy.sparse import block_array, block_diag, coo_array, csr_array, diags_ar
 from fenwear.arrays import Array
 from fenwear.assembly import Bodies
 from fenwear.bodies.elasticity import ElasticBody
-
-if TYPE_CHECKING:
-    from fenwear.stick.interface import Position
+from fenwear.stick.position import Position
 
 GUIDES = ("rotations", "couples")
 

@@ -94,7 +94,7 @@ def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.
         response[:, 0, :, 0] = response[:, 1, :, 1]
         return replace(body, response=response)
 
-    monkeypatch.setattr("fenwear.stick.interface.contact_frame", upright)
+    monkeypatch.setattr("fenwear.stick.position.contact_frame", upright)
     system = assemble(pressed_on(14, "stick.force='60 N'", "stick.steps=4", "stick.step_tolerance=1"))
     coarse = system.law_state.problem
     interface = coarse.interface

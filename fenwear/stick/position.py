@@ -1,0 +1,176 @@
+"""Two bodies in contact with stick: what tractions in every direction do to the relative displacement.
+
+In the contact frame of each node, its normal e_n first and then the d - 1 tangents, tractions f = (p, t) on
+the punch and their reactions on the strip move the punch's surface against the strip's by
+
+    j = C f + H a + l - V delta,
+
+C the compliance of both bodies, H the rigid modes, l the loads and the bulk strain, and V delta what the rig
+moves the strip by. The first component opens the gap, the others are the slip.
+
+Arrays of all components have d n entries, one component after the other: p of all nodes, then t of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from fenwear.arrays import Array
+from fenwear.bodies.operators import SurfaceOperator
+from fenwear.bodies.response import identity
+from fenwear.interface import ContactPair, FrameCompliance, Interface, RigidEquilibrium
+from fenwear.interface.frame import contact_frame
+from fenwear.interface.placement import in_model
+from fenwear.sliding.field import SlidingField
+
+
+@dataclass(frozen=True)
+class LoadEffect:
+    """What the loads do at one time of the cycle.
+
+    Attributes:
+        resultant: F of the rigid modes (r,), N/mm and N; in a solid N and N mm.
+        on_punch: Displacement of the punch's contact nodes (n, d), mm.
+        on_strip: Of the strip at the nodes of its operator (q, d), mm.
+        by_force: Of both of these what forces do, and so creeps; None where nothing creeps.
+    """
+
+    resultant: Array
+    on_punch: Array
+    on_strip: Array
+    by_force: tuple[Array, Array] | None = None
+
+    def times(self, factor: float) -> LoadEffect:
+        """Return the same of loads times a factor."""
+        if factor == 1:
+            return self
+        forced = None if self.by_force is None else (factor * self.by_force[0], factor * self.by_force[1])
+        return LoadEffect(factor * self.resultant, factor * self.on_punch, factor * self.on_strip, forced)
+
+    def plus(self, other: LoadEffect) -> LoadEffect:
+        """Return what both loads do."""
+        forced = None
+        if self.by_force is not None and other.by_force is not None:
+            forced = self.by_force[0] + other.by_force[0], self.by_force[1] + other.by_force[1]
+        return LoadEffect(
+            self.resultant + other.resultant, self.on_punch + other.on_punch, self.on_strip + other.on_strip, forced
+        )
+
+
+@dataclass(frozen=True)
+class Position:
+    """Both bodies opposite each other in one place of the strip.
+
+    Attributes:
+        interface: How their surfaces move against each other along e_n and the tangents of each node.
+        drive: V (d n,), for a unit of the motion; along the tangents alone where the strip goes far.
+        far: Whether it goes so far: what it is moved by along e_n its place has in the gap.
+    """
+
+    interface: Interface
+    drive: Array
+    far: bool = False
+
+    @property
+    def rigid(self) -> RigidEquilibrium:
+        """The rigid modes and the pair of surfaces there."""
+        return self.interface.rigid
+
+    @property
+    def pair(self) -> ContactPair:
+        """The surfaces."""
+        return self.rigid.pair
+
+    @property
+    def frame(self) -> Array:
+        """e_n and the tangents of each node (n, d, d), by rows."""
+        return self.interface.axes
+
+    @cached_property
+    def reading(self) -> csr_array:
+        """Takes displacements of the strip at the nodes of its operator to the contact nodes (n, q)."""
+        return self.pair.transfer if self.interface.strip_moves else identity(len(self.pair.weights))
+
+    @cached_property
+    def compliance(self) -> FrameCompliance:
+        """C, mm/MPa."""
+        return FrameCompliance(self.interface)
+
+    @cached_property
+    def modes(self) -> Array:
+        """H (d n, r)."""
+        n, d, _ = self.frame.shape
+        return np.einsum("iac,icm->aim", self.frame, self.rigid.motion).reshape(d * n, -1)
+
+    @cached_property
+    def weights(self) -> Array:
+        """Areas of the nodes for each component (d n,)."""
+        return np.tile(self.pair.weights, self.frame.shape[2])
+
+    @cached_property
+    def balance(self) -> Array:
+        """What each traction adds to the load of each rigid mode (r, d n)."""
+        return self.modes.T * self.weights
+
+    @cached_property
+    def pull(self) -> Array:
+        """What each traction adds to the force along the motion, positive where the strip is pulled to +x (d n,)."""
+        return self.drive * self.weights
+
+    @cached_property
+    def elastic_length(self) -> float:
+        """Gap that unit pressures open on average, mm/MPa: the scale of gaps."""
+        n, even = len(self.pair.weights), np.zeros(len(self.weights))
+        even[:n] = 1.0
+        return float(np.abs(self.compliance.apply(even)[:n]).mean())
+
+    def in_frame(self, vectors: Array) -> Array:
+        """Return the components (d n,) of vectors (n, d)."""
+        return np.einsum("nac,nc->an", self.frame, vectors).ravel()
+
+    def beside(self, moved: Array | None) -> Array:
+        """Return what the strip is moved by beside its motion (n, d) in the frame (d n,)."""
+        if moved is None:
+            return np.zeros(len(self.drive))
+        found = self.in_frame(moved)
+        if self.far:
+            found[: len(self.pair.weights)] = 0.0
+        return found
+
+    def in_space(self, components: Array) -> Array:
+        """Return vectors (n, d) of components (d n,)."""
+        return np.einsum("nac,an->nc", self.frame, components.reshape(self.frame.shape[2], -1))
+
+
+def position_of(
+    rigid: RigidEquilibrium,
+    punch: SurfaceOperator,
+    strip: SurfaceOperator,
+    field: SlidingField,
+    *,
+    strip_moves: bool = False,
+    layer: Array | None = None,
+) -> Position:
+    """Return both bodies opposite each other.
+
+    Args:
+        rigid: The rigid modes and the pair of surfaces.
+        punch, strip: How the bodies answer, along all axes.
+        field: The motion of the strip.
+        strip_moves: Whether the strip answers at its own trace nodes, not at the contact nodes opposite.
+        layer: Closure by unit pressures of what lies between (n,), mm/MPa; None where it does not give way so.
+    """
+    frame = contact_frame(rigid.pair.normal)
+    drive = np.einsum("nac,nc->an", frame, in_model(field.velocity(rigid.pair.punch.x), frame.shape[2]))
+    return Position(Interface(rigid, punch, strip, strip_moves, frame=frame, layer=layer), drive.ravel())
+
+
+def along_tangents(position: Position) -> Position:
+    """Return the same for a strip that goes far: what it is moved by along e_n its place has in the gap."""
+    drive = position.drive.copy()
+    drive[: len(position.pair.weights)] = 0.0
+    return replace(position, drive=drive, far=True)

@@ -124,7 +124,7 @@ class ContactSetup:
         """The ranks."""
         return self.bodies.comm
 
-    @property
+    @cached_property
     def team(self) -> Team:
         """The ranks, of which one leads."""
         return Team.of(self.comm)

@@ -368,8 +368,10 @@ class CondensedContact:
         # From the rigid motions of the start: they take up a worn depth that may be thousands of times what the bodies
         # give. What is left at the nodes in contact is as small as the elastic gap, and so is the residual's rounding.
         begun = np.zeros((m, self._offset.shape[1] - n)) if start is None else start.rigid
-        opened = [phase.interface.rigid.rigid_normal @ own for phase, own in zip(self.phases, begun, strict=True)]
-        self._offset[:, :n] = (gap + self._loads + np.array(opened)) / self._gap_scale
+        self._offset[:, :n] = gap + self._loads
+        for phase, own, offset in zip(self.phases, begun, self._offset, strict=True):
+            offset[:n] += phase.interface.rigid.rigid_normal @ own
+        self._offset[:, :n] /= self._gap_scale
         if not np.isfinite(self._offset).all():
             raise ConvergenceError(f"{self.inequality.name}: the gap between the bodies is beyond all numbers")
         if coupling is not self._coupling:
@@ -382,7 +384,8 @@ class CondensedContact:
         x = x.reshape(m, -1)
         pressure = x[:, :n] * self._pressure_scale
         pressure[x[:, :n] <= ZERO] = 0.0
-        pressure[x[:, :n] >= self.most / self._pressure_scale] = self.most
+        if self.most < np.inf:
+            pressure[x[:, :n] >= self.most / self._pressure_scale] = self.most
         gaps = f.reshape(m, -1)[:, :n] * self._gap_scale
         return ContactState(pressure, gaps, begun + x[:, n:] * self._rigid_scale, iterations)
 

@@ -22,6 +22,7 @@ meshes do. A step of a jump adds these as it adds depths.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -37,6 +38,7 @@ SUMS = (
     "distance", "load_path", "load_distance", "drag_distance", "work", "volume_punch", "mass_punch", "volume_strip",
     "mass_strip",
 )  # fmt: skip
+DISTANCE, LOAD_DISTANCE, DRAG_DISTANCE = (SUMS.index(name) for name in ("distance", "load_distance", "drag_distance"))
 AROUND = 0.1  # mean normal of a part of the contact below which it looks all ways
 MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
@@ -97,7 +99,8 @@ class PhaseMeter:
         whole = sum(one.distance for one in phases[first : first + positions])
         self._share = phases[phase].distance / whole if whole else 1 / positions  # at rest by the time
         speed = np.linalg.norm(system.field_of(phase).velocity(pair.opposite), axis=1)
-        self._weights, self._speed = pair.weights, system.motion.phases[phase].distance * speed
+        self._weights, self._moved = pair.weights, pair.weights * system.motion.phases[phase].distance * speed
+        self._mean_distance = float(self._moved.sum() / pair.weights.sum())  # where nothing presses
         self._rows = np.zeros((len(SUMS), len(areas)))
         self._rows[SUMS.index("load_path")] = areas * path
         self._rows[SUMS.index("work")] = areas * self._energy
@@ -120,11 +123,12 @@ class PhaseMeter:
     def __call__(self, pressure: Array) -> Totals:
         """Return what the phase adds at a pressure (n,)."""
         sums = self._rows @ pressure
-        carried = self._weights * pressure if pressure.any() else self._weights
-        distance = float(self._speed @ carried) / float(carried.sum())
-        sums[SUMS.index("distance")] = distance
-        sums[SUMS.index("load_distance")] = float(self._load @ pressure) * distance
-        sums[SUMS.index("drag_distance")] = float(np.linalg.norm(pressure @ self._drag)) * distance
+        force = float(self._weights @ pressure)
+        distance = float(self._moved @ pressure) / force if force else self._mean_distance
+        drag = pressure @ self._drag
+        sums[DISTANCE] = distance
+        sums[LOAD_DISTANCE] = float(self._load @ pressure) * distance
+        sums[DRAG_DISTANCE] = math.sqrt(drag @ drag) * distance
         for rows, weigh, body in self._curved:
             sums[rows] = weigh @ body.depth(pressure[None])[0]
         return Totals(sums, self._energy * pressure, self._share * pressure)

@@ -45,8 +45,13 @@ class WornDepths:
     carried: Array = field(default_factory=lambda: NOTHING)
 
     def __add__(self, other: WornDepths) -> WornDepths:
-        pairs = ((self.between, other.between), (self.crept, other.crept), (self.carried, other.carried))
-        return WornDepths(self.punch + other.punch, self.strip + other.strip, *(_added(*pair) for pair in pairs))
+        return WornDepths(
+            self.punch + other.punch,
+            self.strip + other.strip,
+            _added(self.between, other.between),
+            _added(self.crept, other.crept),
+            _added(self.carried, other.carried),
+        )
 
     def __sub__(self, other: WornDepths) -> WornDepths:
         return self + other.times(-1.0)

@@ -21,8 +21,9 @@ from fenwear_verify.suite import registered
 
 
 class Written(SphinxDirective):
-    """A directive whose content is written here, as Markdown."""
+    """A directive whose content is written here, as Markdown; what the page has in it tells where else to find that."""
 
+    has_content = True
     required_arguments = 0
     optional_arguments = 1
 

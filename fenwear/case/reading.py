@@ -65,7 +65,7 @@ def _read_tables(source: str, base_of: tuple[str, ...] = ()) -> tuple[dict[str, 
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise CaseError(InputError(source, f"not a TOML file: {error}")) from None
-    except RecursionError:
+    except (MemoryError, RecursionError):
         raise CaseError(InputError(source, "not a TOML file that can be read: it nests too deeply")) from None
     base, unset = data.pop("base", None), data.pop(UNSET, None)
     if base is None:

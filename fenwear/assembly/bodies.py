@@ -12,7 +12,7 @@ from fenwear.arrays import Array
 from fenwear.assembly.coatings import check_coatings
 from fenwear.assembly.grids import lay_grids
 from fenwear.assembly.strokes import make_sliding
-from fenwear.bodies.contact_surface import profiled
+from fenwear.bodies.contact_surface import ContactSurface, profiled
 from fenwear.bodies.density import contact_density
 from fenwear.bodies.elasticity import ElasticBody
 from fenwear.bodies.material import isotropic, nodal_function
@@ -145,12 +145,14 @@ def build_bodies(
     release(comm)  # what earlier systems have left
     known, owners = case.diffusion, _owners(case, comm)
     meshes = build_meshes(case.geometry, case.folder, comm, case.model.law, owners, known, case.names)
-    moved = None if followed is None else _moved(case, meshes, followed)
+    moved, made = (None, (None, None)) if followed is None else _moved(case, meshes, followed)
     warmed = warmed if case.warming else None
     punch, strip = (
         elastic_body(case, m, d, theta)
         for m, d, theta in zip(meshes, (case.punch, case.strip), warmed or (None, None), strict=True)
     )
+    for body, before in zip((punch, strip), made, strict=True):
+        body.surface = replace(body.surface, made=before)
     check_coatings(case, punch, strip)
     lay_grids(case, make_sliding(case), punch, strip)
     regions = contact_regions(punch), contact_regions(strip)
@@ -222,8 +224,10 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
     return body
 
 
-def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: WornDepths) -> WornDepths:
-    """Let the meshes follow the wear; return how far their contact nodes have moved into the bodies."""
+def _moved(
+    case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: WornDepths
+) -> tuple[WornDepths, tuple[ContactSurface, ContactSurface]]:
+    """Let the meshes follow the wear; return how far contact nodes have moved into the bodies, and what was made."""
     punch, strip = (movable_surface(mesh, case.geometry.degree, case.model.law) for mesh in meshes)
     facing = pair(punch.surface, strip.surface, axisymmetric=case.model.law == "axisymmetric")
     moved = []
@@ -234,4 +238,4 @@ def _moved(case: Case, meshes: tuple[BodyMesh, BodyMesh], followed: WornDepths) 
         pins = [np.array(support.at) for support in description.supports if support.at is not None]
         groups = [point for points in movable.body.points.values() for point in points]
         moved.append(follow_wear(movable, depth, into, [*pins, *groups]))
-    return WornDepths(moved[0], moved[1])
+    return WornDepths(moved[0], moved[1]), (punch.surface, strip.surface)

@@ -29,6 +29,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.bodies.assembly import assembled_vector
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.mesh import BodyMesh
+from fenwear.bodies.round import Round, rounds_of
 from fenwear.errors import CaseError, InputError
 
 CORNERS = {"interval": 2, "triangle": 3, "quadrilateral": 4}
@@ -59,6 +60,7 @@ class ContactSurface:
         contact: Which of them each pressure node belongs to (n,); None where it is one.
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
         grid: Of a surface that is a regular grid and no trace of a mesh; else None.
+        made: The same as its mesh was made, where that has followed the wear since; else None.
     """
 
     body: str
@@ -75,6 +77,7 @@ class ContactSurface:
     names: tuple[str, ...] = ()
     contact: NDArray[np.int64] | None = None
     grid: RegularGrid | None = None
+    made: ContactSurface | None = None
 
     @cached_property
     def part(self) -> NDArray[np.int64]:
@@ -83,6 +86,17 @@ class ContactSurface:
         graph = csr_array((np.ones(ring.size), (self.facets.ravel(), ring.ravel())), shape=(len(self.trace),) * 2)
         _, part = connected_components(graph, directed=False)
         return np.asarray(np.unique(part[self.nodes], return_inverse=True)[1], dtype=np.int64)
+
+    @cached_property
+    def rounds(self) -> tuple[list[Round], NDArray[np.int64]]:
+        """What is round of it, as its mesh was made, and which of it each trace node is on, -1 for none (N,)."""
+        if self.made is not None:
+            return self.made.rounds
+        number = np.full(len(self.trace), -1)
+        number[self.nodes] = self.part
+        outward = np.zeros_like(self.trace)
+        outward[self.nodes] = self.outward
+        return rounds_of(self.trace, self.facets, number[self.facets].max(axis=1), outward)
 
     @cached_property
     def abscissa(self) -> Array:

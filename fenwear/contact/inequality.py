@@ -33,6 +33,7 @@ from fenwear.errors import ConvergenceError
 
 REASONS = {value: name for name, value in vars(PETSc.SNES.ConvergedReason).items() if isinstance(value, int)}
 TOLERANCE = 1e-11  # of residuals, which are scaled to 1
+AT_BOUND = 1e-12  # of unknowns, which are scaled to 1: how near to their bound they count as at it
 EPSILON = 1e-13  # of the parts that residuals add up: what rounding may leave of them
 SETS = 30  # that are gone through before SNES starts
 CHORDS, FALLS = 40, 0.3  # steps where the derivative changes; fall of the residual by which its factor still serves
@@ -50,7 +51,7 @@ def configure(snes: PETSc.SNES, prefix: str, line_search: str = "basic") -> None
     # Residuals are scaled to 1 and need few steps; a step that changes nothing ends the iteration.
     snes.setTolerances(rtol=0.0, atol=TOLERANCE, stol=0.0, max_it=100)
     options = PETSc.Options()
-    for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", 1e-12)):
+    for name, value in (("snes_linesearch_type", line_search), ("snes_vi_zero_tolerance", AT_BOUND)):
         if not options.hasName(f"{prefix}{name}"):
             options[f"{prefix}{name}"] = value
     snes.ksp.setType("preonly")

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import ContactState
-from fenwear.contact.inequality import Inequality
+from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.operators import Operator
 from fenwear.contact.row_blocks import SpreadPhases
 from fenwear.contact.spread_shape import SpreadShape
@@ -23,6 +23,7 @@ from fenwear.parallel import agreed
 from fenwear.sliding.friction import ContactConditions
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
+GRAZING = 1e-7  # of the wear by the mean pressure: a motion of open nodes that leaves them where they are
 SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressure beyond a cap that wears
 LARGE = 4000  # nodes from which on no matrix of them is made
 NUMBER, COUPLED = 8, 3  # bytes; copies of what the heat of all phases opens in all phases, as they are scaled
@@ -106,6 +107,9 @@ class SteadyInequality:
         f = self.equations.multiply(x) + self.offset
         pressure = x[: m * n].reshape(m, n) * self.p_scale
         f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
+        # A rim that looks square to the motion, where nothing wears, either: rounding would drive it for ever.
+        still = (pressure.max(axis=0) <= AT_BOUND * self.p_scale) & (np.abs(f[self.omega]) < GRAZING)
+        f[self.omega] = np.where(still, 0.0, f[self.omega])
         if self.closure is not None:
             f[: m * n] += self.closure.closure(pressure).ravel() / self.gap_scale
         return f
@@ -114,7 +118,7 @@ class SteadyInequality:
         pressure = x[: self.m * self.n].reshape(self.m, self.n)
         slopes = self.wear.slopes(pressure * self.p_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
-        held = np.where(pressure.max(axis=0) <= 0, DRIVE, 0.0)
+        held = np.where(pressure.max(axis=0) <= AT_BOUND, DRIVE, 0.0)
         layer = None if self.closure is None else self.closure.slope(pressure * self.p_scale)
         known = self._known
         if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):

@@ -24,6 +24,7 @@ from fenwear.interface.frame import common_normal, unit
 from fenwear.interface.overlap import ChartedSurface, Patch
 from fenwear.interface.patches import folds, patches, radius_of
 from fenwear.interface.placement import HERE, ZERO, Placement
+from fenwear.interface.round_shape import round_shape
 from fenwear.interface.transfer import dual_transfer, wear_transfer
 
 STEEPEST = 0.7  # cosine between the normals of the two surfaces: steeper parts never touch
@@ -126,13 +127,15 @@ def pair(
     transfer = dual_transfer(parts)
     material = _material(parts, transfer)
     normal = unit(material @ strip_outward)
+    shape = round_shape(parts, punch, strip, placement, transfer, material)
+    normal = unit(normal + shape.turned)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
     _check_facing(punch, normal, facing, placement)
     if halfway:
         normal = common_normal(punch, normal)
         facing = -np.einsum("ic,ic->i", punch.outward, normal)
-    gap = np.einsum("ic,ic->i", normal, punch.spread.T @ punch.trace - transfer @ strip_trace)
-    gap += _profiles(punch, strip, material)
+    apart = punch.spread.T @ punch.trace - transfer @ strip_trace + shape.moved
+    gap = np.einsum("ic,ic->i", normal, apart) + _profiles(punch, strip, material)
     # Forces act along the common normal: a node's weight is its area seen along it.
     weights = punch.weights * facing
     wear_projection = _wear_projection(parts, weights, strip.weights)

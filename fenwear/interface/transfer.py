@@ -17,11 +17,12 @@ The psi_i have negative parts, by which wear would let material grow. Worn depth
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import coo_array, csr_array, diags_array
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.interface.overlap import Indices, Patch, shared_areas
 
 ROUNDING = 1e-14  # entries of T that are left of zero
@@ -42,26 +43,75 @@ def dual_transfer(patches: Sequence[Patch]) -> csr_array:
     return _rows_to_one(matrix)
 
 
-def _integrals(patch: Patch) -> csr_array:
-    """Return the integrals of psi_i phi_j over the facets of a patch (n1, N2)."""
-    first, second, common = patch.first, patch.second, patch.common
-    shape = (len(first.nodes), len(second.s))
+def dual_means(patches: Sequence[Patch], values: Sequence[Array]) -> Array:
+    """Return the means of values by the psi_i (n1,), which the transfer takes the second surface's by.
+
+    Args:
+        patches: Of the contact.
+        values: At the points of each patch's overlap (q,).
+    """
+    count = len(patches[0].first.nodes)
+    sums = np.zeros((2, count))
+    for patch, own in zip(patches, values, strict=True):
+        duals = _duals(patch)
+        if duals is None:
+            continue
+        at = own[duals.used].reshape(len(duals.number), -1)
+        integrals = np.einsum("tpk,tp->tk", duals.weighted, at), duals.weighted.sum(axis=1)
+        nodes = patch.first.pressure_facets[duals.facet1]
+        for total, part in zip(sums, integrals, strict=True):
+            np.add.at(total, nodes[nodes >= 0], np.einsum("tki,tk->ti", duals.dual[duals.number], part)[nodes >= 0])
+    return np.asarray(sums[0] / np.where(sums[1] == 0, 1.0, sums[1]))
+
+
+@dataclass(frozen=True)
+class _Duals:
+    """The psi_i on the facets of a patch.
+
+    Attributes:
+        used: Points of the overlap on facets that are covered (q,).
+        facet1, facet2: Facets of each simplex (t,).
+        number: Of its first facet among those that occur (t,).
+        weighted: Shape functions of the pressure, times the quadrature's weights (t, points, k).
+        dual: psi_i = sum of dual_ki lambda_k on each facet (facets, k, k).
+    """
+
+    used: Mask
+    facet1: Indices
+    facet2: Indices
+    number: Indices
+    weighted: Array
+    dual: Array
+
+
+def _duals(patch: Patch) -> _Duals | None:
+    """Return the psi_i of a patch; None where nothing is covered."""
+    first, common = patch.first, patch.common
     used = common.covered_facets[common.facet1]
     facet1, facet2 = (facet[used][:: common.per_simplex] for facet in (common.facet1, common.facet2))
     if len(facet1) == 0:
-        return csr_array(shape)
+        return None
     points = (len(facet1), common.per_simplex)
     own = first.pressure_functions(common.points1[used]).reshape(*points, -1)
-    other = second.shape_functions(common.points2[used]).reshape(*points, -1)
-    weighted = (own * common.weights[used].reshape(*points, 1)).swapaxes(1, 2)
+    weighted = own * common.weights[used].reshape(*points, 1)
     number = np.unique(facet1, return_inverse=True)[1]
     sums = csr_array((np.ones(len(number)), (number, np.arange(len(number)))))
     functions = own.shape[2]
-    mass = (sums @ (weighted @ own).reshape(len(number), -1)).reshape(-1, functions, functions)
-    weights = sums @ weighted.sum(axis=2)
-    dual = np.linalg.solve(mass, weights[:, :, None] * np.eye(functions))  # psi_i = sum of dual_ki lambda_k
-    parts = dual.swapaxes(1, 2)[number] @ (weighted @ other)
-    return _assemble(first.pressure_facets[facet1], second.facets[facet2], parts, shape)
+    mass = (sums @ (weighted.swapaxes(1, 2) @ own).reshape(len(number), -1)).reshape(-1, functions, functions)
+    weights = sums @ weighted.sum(axis=1)
+    dual = np.linalg.solve(mass, weights[:, :, None] * np.eye(functions))
+    return _Duals(used, facet1, facet2, number, weighted, dual)
+
+
+def _integrals(patch: Patch) -> csr_array:
+    """Return the integrals of psi_i phi_j over the facets of a patch (n1, N2)."""
+    first, second = patch.first, patch.second
+    shape, duals = (len(first.nodes), len(second.s)), _duals(patch)
+    if duals is None:
+        return csr_array(shape)
+    other = second.shape_functions(patch.common.points2[duals.used]).reshape(*duals.weighted.shape[:2], -1)
+    parts = duals.dual.swapaxes(1, 2)[duals.number] @ (duals.weighted.swapaxes(1, 2) @ other)
+    return _assemble(first.pressure_facets[duals.facet1], second.facets[duals.facet2], parts, shape)
 
 
 def wear_transfer(patches: Sequence[Patch]) -> csr_array:

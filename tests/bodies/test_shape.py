@@ -171,3 +171,17 @@ def test_pressure_on_some_of_the_nodes() -> None:
         np.testing.assert_allclose(moved.bodies.moved.punch, depth, atol=1e-12)
         lost = area(punch.body) - area(moved.bodies.punch.body)
         assert lost == pytest.approx(weights @ depth if solid else 0.02, rel=1e-9)
+
+
+@pytest.mark.mpi
+def test_round_surfaces_stay_round_as_they_follow() -> None:
+    """An even depth next to nothing changes no gap: that of the circles goes on to count, not that of the facets."""
+    data = tomllib.loads(fill_in(find_template("bushing")))
+    data["geometry"]["parameters"]["elements_along_contact"] = 16
+    system = assemble(make_case(data))
+    none = system.unworn()
+    worn = WornDepths(np.full_like(none.punch, 1e-7), none.strip)
+    moved = assemble(system.case, system.comm, worn)
+    assert len(system.pair.strip.rounds[0]) == len(moved.pair.strip.rounds[0]) == 1
+    np.testing.assert_allclose(moved.gap(0, worn), system.gap(0, worn), atol=1e-9)
+    np.testing.assert_allclose(moved.pair.normal, system.pair.normal, atol=1e-7)

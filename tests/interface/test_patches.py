@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from fenwear import CaseError, Tribosystem, assemble, load_case, make_case, march
 from fenwear.bodies.contact_surface import ContactSurface, vertex_surface
+from fenwear.bodies.round import rounds_of
 from fenwear.interface import check_distance, pair
 from fenwear.interface.patches import folds, patches
 from fenwear.interface.placement import Placement
@@ -114,9 +115,41 @@ def test_ball_in_a_cup() -> None:
         np.testing.assert_allclose(between.transfer.sum(axis=1), 1, rtol=1e-12)
         way = (between.transfer @ there) / 10.0
         errors.append(np.linalg.norm(way - cup.x / 10.02, axis=1).max())
-        np.testing.assert_allclose(between.initial_gap, 0.02, atol=10 * errors[-1])
+        np.testing.assert_allclose(between.initial_gap, 0.02, atol=1e-12)  # of the spheres, not of their facets
+        np.testing.assert_allclose(between.normal, cup.x / 10.02, atol=1e-12)
         assert between.wear_projection.data.min() >= 0
     assert errors[1] < 0.35 * errors[0] < 0.02
+
+
+def test_spheres_that_lie_beside_each_other() -> None:
+    """The gap is that of the spheres, to second order in what the clearance changes; one that is dented has facets."""
+    errors, shift = [], np.array([0.003, -0.002, -0.004])
+    for points in (500, 2000):
+        cup, ball = sphere("punch", 10.02, points, 0.0, 1), sphere("strip", 10.0, 2 * points, 2.0, 2)
+        between = pair(cup, ball, Placement(shift=tuple(shift), turn=(0.5, -0.9, 0.3)))
+        exact = np.linalg.norm(cup.x - shift, axis=1) - 10.0
+        inside = cup.x[:, 2] < -2.0  # at the rim the mean of a node's facets is beside it
+        errors.append(float(np.abs(between.initial_gap - exact)[inside].max()))
+    assert errors[1] < 0.4 * errors[0] < 4e-5
+    dent = replace(ball, trace=ball.trace * (1 + 1e-6 * np.cos(ball.trace[:, :1])))
+    assert ball.rounds[1].min() == 0
+    assert (dent.rounds[1] == -1).all()
+    assert np.ptp(pair(cup, dent).initial_gap) > 1e-3
+
+
+def test_a_cylinder_in_any_place() -> None:
+    """Its axis and radius to rounding, from the nodes of a part of it; a slab is none."""
+    rng, turn = np.random.default_rng(3), Rotation.from_rotvec([0.4, -1.1, 0.2])
+    around, along = (np.repeat(rng.uniform(*ends, 20), 3) + rng.uniform(0, 0.1, 60) for ends in ((-1.2, 1.2), (0, 8)))
+    outward = np.column_stack([np.sin(around), np.zeros(60), np.cos(around)])
+    x = turn.apply(7.5 * outward + along[:, None] * [0, 1, 0]) + [3.0, -2.0, 30.0]
+    facets = np.arange(60).reshape(-1, 3)
+    (found,), _ = rounds_of(x, facets, np.zeros(20, dtype=int), turn.apply(-outward + 1e-3 * rng.normal(size=(60, 3))))
+    assert found.radius == pytest.approx(7.5, rel=1e-12)
+    assert found.sign == -1
+    np.testing.assert_allclose(np.abs(turn.inv().apply(found.axis)), [0, 1, 0], atol=1e-12)
+    slab = turn.apply(np.column_stack([rng.uniform(-4, 4, (60, 2)), np.zeros(60)]))
+    assert not rounds_of(slab, facets, np.zeros(20, dtype=int), turn.apply(np.tile([0.0, 0, 1], (60, 1))))[0]
 
 
 def test_a_ball_larger_than_its_cup() -> None:

@@ -1,7 +1,7 @@
 """Round surfaces: the circles, cylinders and spheres that a mesh follows by polynomials.
 
-Facets leave a circle by a power of their size: quadratic ones of a tenth of the radius by 1e-6 of it, which is more than
-a stiff contact is pressed together. A surface all of whose nodes lie on one circle, cylinder or sphere is taken for it.
+Facets leave a circle by a power of their size: quadratic ones of a tenth of the radius by 1e-6 of it, more than what a
+stiff contact is pressed together by. A surface whose nodes all lie on one circle, cylinder or sphere is taken for it.
 """
 
 from __future__ import annotations

@@ -74,17 +74,18 @@ def round_shape(
         for k, one in enumerate(of_punch):
             there = on_punch[nodes[:, 0]] == k
             x[there] = one.onto(x[there])
-        gap, below = np.zeros(len(x)), strip.rounds[1][second.facets[common.facet2][:, 0]]
+        gap: Array = np.zeros(len(x))
+        below = strip.rounds[1][second.facets[common.facet2][:, 0]]
         for k, one in enumerate(of_strip):
             there = below == k
             gap[there] = one.sign * (np.linalg.norm(one.ways(x[there]), axis=1) - one.radius)
         gaps.append(gap)
-    gap, normal = dual_means(parts, gaps), np.ones_like(own.x)
+    means, normal = dual_means(parts, gaps), np.ones_like(own.x)
     for k, one in enumerate(of_strip):
         normal[opposite == k] = one.sign * unit(one.ways(own.x[opposite == k]))
     of_facets = unit(material @ placement.vectors(other.outward))
     apart = own.spread.T @ own.trace - transfer @ placement.points(other.trace)
-    missing = gap - np.einsum("ic,ic->i", normal, apart)
+    missing = means - np.einsum("ic,ic->i", normal, apart)
     return RoundShape(
         np.where(round_[:, None], normal - of_facets, none), np.where(round_[:, None], missing[:, None] * normal, none)
     )

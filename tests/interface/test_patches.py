@@ -142,7 +142,7 @@ def test_a_cylinder_in_any_place() -> None:
     rng, turn = np.random.default_rng(3), Rotation.from_rotvec([0.4, -1.1, 0.2])
     around, along = (np.repeat(rng.uniform(*ends, 20), 3) + rng.uniform(0, 0.1, 60) for ends in ((-1.2, 1.2), (0, 8)))
     outward = np.column_stack([np.sin(around), np.zeros(60), np.cos(around)])
-    x = turn.apply(7.5 * outward + along[:, None] * [0, 1, 0]) + [3.0, -2.0, 30.0]
+    x = turn.apply(7.5 * outward + np.outer(along, [0, 1, 0])) + np.array([3.0, -2.0, 30.0])
     facets = np.arange(60).reshape(-1, 3)
     (found,), _ = rounds_of(x, facets, np.zeros(20, dtype=int), turn.apply(-outward + 1e-3 * rng.normal(size=(60, 3))))
     assert found.radius == pytest.approx(7.5, rel=1e-12)

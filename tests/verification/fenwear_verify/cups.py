@@ -82,7 +82,7 @@ def growing_cup() -> Result:
         ]
     errors, (angle, slid, *_) = [], GROWING[0]
     for across in (4, 6):
-        # From a soft one's first tenth: at first stiff ones touch at a single node, which holds them along one axis alone.
+        # From a soft one's first tenth: at first stiff ones touch at a single node, which holds them one way alone.
         *_, begun = jump(_stiff_cup(across, "20 GPa"), _cycles(slid) // 10, tolerance=3e-3)
         system = _stiff_cup(across, "200 GPa")
         *_, last = jump(system, _cycles(slid), tolerance=1e-3, start=begun.end)

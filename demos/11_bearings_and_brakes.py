@@ -12,7 +12,7 @@
 # # 11. Bearings and brakes
 #
 # Contacts that wrap around the other body, or touch it at several places: a bushing that wears from a line contact to half
-# of its bore, a load that tilts it, and a drum brake. All are built-in cases; the answers on paper stand beside them.
+# of its bore, a load that tilts it, a drum brake, and a ball that walks in its cup. All are built-in cases; the answers on paper stand beside them.
 
 # %%
 # %matplotlib inline
@@ -27,6 +27,7 @@ from scipy.optimize import brentq
 
 from fenwear import load_case
 from fenwear.report.maps import map_figure, quantities
+from fenwear.report.tracks import tracks_figure
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
@@ -137,3 +138,22 @@ ax.legend(frameon=False)
 plt.show()
 shoes = {name: sheet["punch"]["worn_volume_mm3"] for name, sheet in summary["contacts"].items()}
 print({name: f"{volume:.0f} mm³" for name, volume in shoes.items()})
+
+# %% [markdown]
+# ## A ball in a cup
+#
+# A made cycle of walking: three turns and a load whose direction changes, in 32 steps. Each place of the cup is rubbed along
+# a track of its own, most of it forwards and backwards; where tracks are wide, molecules that were drawn out along the main
+# direction are rubbed across it, and polyethylene wears faster.
+
+# %%
+small = ["geometry.parameters.across=4", "geometry.parameters.around=3"] if COARSE else []
+cup, summary = run("ball-in-cup", "run.half_cycles=100", "run.jump_tolerance=0.1", *small)
+tracks_figure(cup)
+
+# %%
+map_figure(cup, quantities(cup)["wear_map"], [int(cup.half_cycle[-1])])
+
+# %%
+print(f"worn per million cycles {summary['punch']['worn_volume_per_million_cycles_mm3']:.1f} mm³")
+print(f"cross-shear ratio, mean over the work of friction {summary['punch']['mean_cross_shear']:.3f}")

@@ -203,6 +203,11 @@ class ContactSetup:
             ]
         )
 
+    @property
+    def slides_many_ways(self) -> bool:
+        """Whether places of a solid slide in directions of their own, step by step of a table, as a whole surface."""
+        return self.motion.steps and not self.sticks and self.pair.punch.dim == 3
+
     @cached_property
     def ways(self) -> SlidingWays:
         """What slides how far and where to in each phase of a cycle: tensors, cross-shear."""

@@ -19,6 +19,7 @@ from fenwear.cycle.state import RunState, pressure_scales
 from fenwear.cycle.totals import Totals
 from fenwear.errors import ConvergenceError
 from fenwear.interface import RigidEquilibrium
+from fenwear.sliding.cross_shear import SlidingTensor
 from fenwear.sliding.wear import WornDepths
 
 
@@ -101,6 +102,7 @@ class Block:
         end: From where the run goes on.
         steps: Time steps of each half-cycle, where the law of contact resolves it in time; else none.
         friction_ratio: tau of each in its middle position (n, d), k of them.
+        sliding: Tensor of the sliding of a cycle that is a table in a solid, of the work, k of them; else none.
     """
 
     system: Tribosystem
@@ -127,6 +129,7 @@ class Block:
     carried: Array = field(kw_only=True)
     steps: tuple[StepRecords, ...] = field(default=(), kw_only=True)
     friction_ratio: tuple[Array, ...] = field(kw_only=True)
+    sliding: tuple[SlidingTensor, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.half_cycle)
@@ -336,9 +339,13 @@ class Recorder:
             carried=np.array([row.worn.carried for row in rows]),
             steps=tuple(row.steps for row in rows if row.steps is not None),
             friction_ratio=tuple(middle.friction_ratio for middle in middles),
+            sliding=tuple(self._sliding(row) for row in rows) if system.slides_many_ways else (),
         )
         self._rows, self._retries, self._remedies = [], [], Counter()
         return block
+
+    def _sliding(self, row: HalfCycle) -> SlidingTensor:
+        return self.system.ways.tensor(np.concatenate([one.contact.pressure for one in row.phases]))
 
     def __bool__(self) -> bool:
         return bool(self._rows)

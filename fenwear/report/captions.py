@@ -48,6 +48,8 @@ TEXTS = {
     "wear_strip_map": "Maps of the worn depth of the strip over its largest at {chosen}, which is told above each.",
     "temperature_map": "Maps of the temperature of the punch's contact surface at {chosen}.",
     "temperature_strip_map": "Maps of the temperature of the strip's surface below the punch at {chosen}.",
+    "tracks": "Sliding over the last cycle: (a) tracks of the strip's material, dots where it begins, and (b) the "
+    "cross-shear ratio on the punch where it is rubbed, with the direction of most of the work of friction.",
     "cuts_along": "Pressure, worn depths and temperatures along the sliding at {chosen}. First pressures far beyond "
     "all later ones have a panel of their own.",
     "cuts_across": "Pressure, worn depths and temperatures across the sliding at {chosen}. First pressures far beyond "

@@ -43,6 +43,7 @@ from fenwear.report.style import (
     wrapped,
 )
 from fenwear.report.surface import along_contact, model_of
+from fenwear.report.tracks import tracks_of
 from fenwear.results.cycles import by_cycles, resolves
 from fenwear.results.history import HISTORY
 from fenwear.results.reading import load_history
@@ -152,6 +153,7 @@ def all_figures(history: xarray.Dataset, wanted: Sequence[int] = (), look: Style
     if model == "solid":
         shown = quantities(history) | quantities_between(history)
         drawn |= {name: map_figure(history, one, chosen[-MAPS:], look) for name, one in shown.items()}
+        drawn |= tracks_of(history, look)
         drawn["cuts_along"] = cuts_figure(history, chosen, look, along=True)
         drawn["cuts_across"] = cuts_figure(history, chosen, look, along=False)
     else:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 COMPONENTS = {"xx": "σ xx", "zz": "σ zz", "xz": "σ xz"}
 SHOWN_WIDE = 2.0  # widths over height of both bodies that are shown whole
 LINE_OF_TEXT = 0.07  # of the height of a panel
+WORDS = (0.2, 0.4)  # of its width: how wide a name is; of a narrow figure
+AROUND = 0.2  # of its size: how far the middle of what goes all the way round is from it
 CLOSE_UP = 0.75  # of the contact's width: what a close view has of the bodies above and below
 APART = 5.0  # of the distance of contact nodes: from which on two are of two parts
 BETWEEN = 0.1  # of the mean length of parts: the gap between two of them
@@ -160,6 +162,11 @@ class _Names:
 
     def add(self, points: Array, text: str, colour: str) -> None:
         """Take a name of points that are held."""
+        around = points.mean(axis=0)
+        if len(points) > 1 and np.linalg.norm(points - around, axis=1).min() > AROUND * np.ptp(points):
+            top = points[points[:, 1].argmax()]  # of what goes all the way round: in its middle others may be
+            self.found.append((float(top[0]), float(top[1]), text, colour, False))
+            return
         right = points[points[:, 0] > points[:, 0].max() - 1e-6 * (1 + np.ptp(points[:, 0]))]
         upright = bool(np.ptp(right[:, 1]) > 0 or len(points) == 1)
         x, z = right.mean(axis=0) if upright else points.mean(axis=0)
@@ -170,10 +177,12 @@ class _Names:
         (left, right), (low, high) = self.ax.get_xlim(), self.ax.get_ylim()
         within = [one for one in self.found if left <= one[0] <= right and low <= one[1] <= high]
         apart = LINE_OF_TEXT * (high - low)
+        figure: Any = self.ax.figure
+        beside = WORDS[figure.get_size_inches()[0] < NARROW]
         taken: list[tuple[float, float]] = []
         for x, z, text, colour, upright in sorted(within, key=lambda one: -one[1]):
             level = z
-            while any(abs(x - other) < 0.4 * (right - left) and abs(level - at) < apart for other, at in taken):
+            while any(abs(x - other) < beside * (right - left) and abs(level - at) < apart for other, at in taken):
                 level -= apart / 4
             taken.append((x, level))
             offset = (6, 0) if upright else (0, -6)

@@ -22,7 +22,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
-from fenwear.results import between, coating, creep, place, sheet, steps
+from fenwear.results import between, coating, creep, place, sheet, steps, table_cycle
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.scar import conforming
@@ -125,6 +125,7 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
         **creep.variables(system),
         **place.variables(system),
         **steps.variables(system),
+        **table_cycle.variables(system),
     }
     variables = {name: (axes, unit, case.names.told(text)) for name, (axes, unit, text) in variables.items()}
     if case.model.kind == "plane":
@@ -141,7 +142,12 @@ def columns_of(system: Tribosystem) -> dict[str, Column]:
 def _columns(system: Tribosystem) -> dict[str, Column]:
     pair = system.pair
     if system.case.model.kind != "plane":
-        return {**surface_columns(system), **part_columns(system, plane=False), **steps.columns(system)}
+        return {
+            **surface_columns(system),
+            **part_columns(system, plane=False),
+            **steps.columns(system),
+            **table_cycle.columns(system),
+        }
     arc = pair.punch.arc is not None
     text = "arc length along the contact" if arc else "position along the contact, from the centre of the geometry"
     columns = {
@@ -176,7 +182,7 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    rooms = (sheet, between, coating, creep, place, steps)
+    rooms = (sheet, between, coating, creep, place, steps, table_cycle)
     own = {name: value for room in rooms for name, value in room.values(block).items()}
     return {name: own[name] if name in own else _values(block, name) for name in names}
 

@@ -17,10 +17,12 @@ from fenwear.cycle import Block
 from fenwear.cycle.state import known_pressures
 from fenwear.interface.placement import in_space
 from fenwear.results.steps import steps_of
+from fenwear.results.surfaces import Column
 from fenwear.sliding.cross_shear import SlidingTensor
 from fenwear.sliding.wear import WornDepths
 
 if TYPE_CHECKING:
+    from fenwear.assembly import ContactSetup
     from fenwear.stick.coulomb import Steps
 
 MILLION = 1e6
@@ -79,6 +81,62 @@ def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
         on_strip += position.pair.wear_projection @ squares.reshape(-1, 9)
     tensors = SlidingTensor(np.sum(values, axis=0)), SlidingTensor(on_strip.reshape(-1, 3, 3))
     return TableCycle(ways.sum(axis=0), records.pressure, steps.wear, tensors)
+
+
+PRINCIPAL = tuple(f"principal_{axis}" for axis in "xyz")
+
+
+def variables(placed: ContactSetup) -> dict[str, tuple[tuple[str, ...], str, str]]:
+    """Return the variables of a history of solids that slide in directions of their own at each place."""
+    if not placed.slides_many_ways:
+        return {}
+    over = ("half_cycle", "x")
+    of_cycle = "direction with most of the work of friction in a cycle"
+    return {
+        "cross_shear": (over, "1", "cross-shear ratio of a cycle on the punch: share of the work across its direction"),
+        **{name: (over, "1", f"{of_cycle}, along {name[-1]}") for name in PRINCIPAL},
+    }
+
+
+def values(block: Block) -> dict[str, Array]:
+    """Return them of each half-cycle of a block (k, n)."""
+    if not block.sliding:
+        return {}
+    directions = np.array([one.direction for one in block.sliding])
+    return {
+        "cross_shear": np.array([one.ratio for one in block.sliding]),
+        **dict(zip(PRINCIPAL, np.moveaxis(directions, 2, 0), strict=True)),
+    }
+
+
+def columns(placed: ContactSetup) -> dict[str, Column]:
+    """Return what each place slides in each step of a table, and the tracks of the strip's material."""
+    if not placed.slides_many_ways:
+        return {}
+    ways = placed.ways
+    slid = ways.lengths[:, :, None] * ways.directions
+    return {
+        "slid": Column(
+            ("table_step", "node", "axis"),
+            slid,
+            {"units": "mm", "long_name": "way of the strip past each node in each step of the table: x, y and z"},
+        ),
+        "track": Column(
+            ("table_row", "node", "axis"),
+            _tracks(placed),
+            {
+                "units": "mm",
+                "long_name": "where the strip's material is, at each node at first, in each row of the table",
+            },
+        ),
+    }
+
+
+def _tracks(placed: ContactSetup) -> Array:
+    """Return the places of the strip's material that lies at each node of the punch in the first row (rows, n, 3)."""
+    x, screws = placed.pair.punch.x, [phase.way for phase in placed.motion.phases if phase.way is not None]
+    material = screws[0].at(0.0).points_back(x)
+    return np.array([x, *(screw.at(1.0).points(material) for screw in screws)])
 
 
 def sliding_numbers(last: Block) -> dict[str, float]:

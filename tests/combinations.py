@@ -85,6 +85,15 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
             "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
         ),
     ),
+    "debris by laws": (
+        "fretting-partial-slip",
+        (
+            *SMALL,
+            "contact.third_body={share=0.8, life={expression='3 / (1 + 1e3 * debris)', unit='mm'}, edge_life='0.3 mm', "
+            "edge_length='0.02 mm'}",
+            "wear={punch={coefficient={expression='1e-7 * (0.2 + 0.8 * exp(-debris / 1e-3))', unit='1/MPa'}}}",
+        ),
+    ),
     "all that lies between": (
         "fretting-partial-slip",
         (

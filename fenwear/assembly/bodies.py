@@ -25,6 +25,7 @@ from fenwear.case.names import told_by_name
 from fenwear.heat.conduction import HeatBody
 from fenwear.heat.material import ConductionLaw, isotropic_conduction
 from fenwear.interface import pair
+from fenwear.interface.edges import Edges
 from fenwear.parallel import release
 from fenwear.sliding.wear import WornDepths
 
@@ -239,3 +240,8 @@ def _moved(
         groups = [point for points in movable.body.points.values() for point in points]
         moved.append(follow_wear(movable, depth, into, [*pins, *groups]))
     return WornDepths(moved[0], moved[1]), (punch.surface, strip.surface)
+
+
+def edges_of(bodies: Bodies, surface: ContactSurface) -> Edges:
+    """Return the distances from the edges of a contact on the punch's surface."""
+    return Edges(surface, rings=bodies.punch.law.kind == "axisymmetric")

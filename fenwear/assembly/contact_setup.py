@@ -12,7 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array, Mask
-from fenwear.assembly.bodies import Bodies
+from fenwear.assembly.bodies import Bodies, edges_of
 from fenwear.assembly.cycle_shear import SlidingWays
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import Sliding, check_stays
@@ -30,6 +30,7 @@ from fenwear.interface import (
     pass_material,
     rigid_equilibrium,
 )
+from fenwear.interface.edges import Edges
 from fenwear.interface.placement import HERE, in_model, in_space
 from fenwear.layers import Evolution, LayerEvolution, Layers, common_modulus, conductance_of, layers_of
 from fenwear.optimum import Optimum, WearRates, check_equilibrium, optimum, optimum_on_track
@@ -263,7 +264,11 @@ class ContactSetup:
         return conductance_of(self.layers, self.made_from, self.bodies.regions)
 
     def passing(
-        self, wear: PhasesWear, phases: Sequence[int] | None = None, evolution: Evolution | None = None
+        self,
+        wear: PhasesWear,
+        phases: Sequence[int] | None = None,
+        evolution: Evolution | None = None,
+        conditions: Sequence[ContactConditions] | None = None,
     ) -> LayerEvolution:
         """Return what phases of the motion, by default all, wear and do to what lies between.
 
@@ -271,9 +276,12 @@ class ContactSetup:
             wear: Of these phases.
             phases: Their numbers.
             evolution: What they do to the states that laws remember; None where there are none.
+            conditions: Of the phases, which debris may be lost by; by default those of the mean pressure.
         """
         chosen = list(range(len(self.motion.phases)) if phases is None else phases)
-        return LayerEvolution.over(self.layers, wear, self.path[chosen], evolution)
+        if conditions is None and self.layers.varies:
+            conditions = [self.conditions(k) for k in chosen]
+        return LayerEvolution.over(self.layers, wear, self.path[chosen], evolution, conditions)
 
     def evolution(
         self,
@@ -335,12 +343,23 @@ class ContactSetup:
             f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in laws if law is not None
         }
         given["contact.friction"] = self.friction.contact.friction
+        third = self.friction.contact.third_body
+        given["contact.third_body.life"] = None if third is None else third.life
         return [key for key, value in given.items() if isinstance(value, Dependence) and value.passes]
 
     @property
     def constant_coefficients(self) -> bool:
-        """Whether friction and wear are the same at any temperature, pressure and speed, depth and distance."""
-        return self.friction.constant and self.wear.constant
+        """Whether friction, wear and loss of debris are alike at any temperature, pressure, speed, depth, distance."""
+        return self.friction.constant and self.wear.constant and not self.layers.varies
+
+    def asks(self, name: str) -> bool:
+        """Return whether friction, wear or the loss of debris depends on a variable of coefficients."""
+        return self.friction.contact.asks(name, self.sliding.wear)
+
+    @cached_property
+    def edges(self) -> Edges | None:
+        """Distances from the edge of the contact; None where nothing depends on them."""
+        return edges_of(self.bodies, self.pair.punch) if self.asks("edge") else None
 
     @cached_property
     def mode_lengths(self) -> Array:
@@ -408,6 +427,7 @@ class ContactSetup:
         worn: WornDepths | None = None,
         half_cycles: float | None = None,
         cycle: CycleShear | None = None,
+        touching: Mask | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on in a phase.
 
@@ -418,6 +438,7 @@ class ContactSetup:
             worn: Depths, and states that laws remember; by default those at the start.
             half_cycles: Done since the start of the run; by default those before its motion.
             cycle: Of the pressures of all phases, by `SlidingWays.shear`; by default they are not known.
+            touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
         """
         n = len(self.pair.weights)
         initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
@@ -432,6 +453,8 @@ class ContactSetup:
             speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.opposite, self.pair.normal)
         pair = self.pair if phase is None else self.pairs[phase]
         none = np.zeros(n)
+        if touching is None:
+            touching = np.full(n, True) if pressure is None else pressure > 0
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
             speed,
@@ -443,6 +466,8 @@ class ContactSetup:
             self.ways.shear(None) if cycle is None else cycle,
             self.layers.known(pair, worn),
             covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
+            self.layers.thickness(worn),
+            None if self.edges is None else self.edges.distance(touching),
         )
 
     def friction_ratio(self, direction: int) -> Array:

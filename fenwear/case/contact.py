@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, WrapValidator, model_validator
 
-from fenwear.case.laws import Dependence, constant_or_dependence
+from fenwear.case.laws import Dependence, WearLaw, constant_or_dependence
 from fenwear.case.layers import Layers, ThirdBody
 from fenwear.case.lubrication import Lubrication
 from fenwear.case.quantities import Number, Part, Stress
@@ -51,6 +51,13 @@ class Contact(Part):
     layer: Annotated[Layers, Field(discriminator="kind")] | None = Field(
         default=None, description="what gives way between the bodies beside their own elasticity, such as roughness"
     )
+
+    def asks(self, name: str, wear: Iterable[WearLaw | None]) -> bool:
+        """Return whether friction, these wear laws or the loss of debris depend on a variable of coefficients."""
+        given = [self.friction, *(law.given_coefficient for law in wear if law is not None)]
+        if self.third_body is not None and self.third_body.asks(name):
+            return True
+        return any(isinstance(one, Dependence) and one.depends_on(name) for one in given)
 
     @model_validator(mode="after")
     def _pure_number(self) -> Self:

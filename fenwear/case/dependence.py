@@ -1,8 +1,9 @@
 """Coefficients that depend on the state of the contact: expressions of a case file.
 
 An expression is arithmetic on T (contact temperature, K), p (contact pressure, MPa), v (sliding speed, mm/s), the
-position x, y, z (mm), the worn depth (mm), s, what has been slid (mm), and of the cycle cs, the cross-shear ratio, and
-pm, the mean pressure over the sliding (MPa). It is parsed, checked node by node and then
+position x, y, z (mm), the worn depth (mm), s, what has been slid (mm), debris, the thickness of the third
+body (mm), edge, the distance from the edge of the contact (mm), and of the cycle cs, the cross-shear ratio, and pm, the
+mean pressure over the sliding (MPa). It is parsed, checked node by node and then
 computed with numpy: no other name, call or operation than those below exists for it, so that a case file cannot run
 code.
 """
@@ -20,9 +21,9 @@ import numpy as np
 
 from fenwear.arrays import Array
 
-VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "cs", "pm")
+VARIABLES = ("T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm")
 UNITS = {"T": "K", "p": "MPa", "v": "mm/s", "x": "mm", "y": "mm", "z": "mm", "depth": "mm", "s": "mm",
-         "cs": "", "pm": "MPa"}  # fmt: skip
+         "debris": "mm", "edge": "mm", "cs": "", "pm": "MPa"}  # fmt: skip
 LONGEST = 500  # characters of an expression
 DEEPEST = 30  # levels of its operations
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {

@@ -23,12 +23,13 @@ class Dependence(Part):
     expression: str | None = Field(
         default=None,
         description="arithmetic on T (K), p (MPa), v (mm/s), x, y, z (mm), depth (mm, worn), s (mm, slid), "
+        "debris (mm, thickness of the third body), edge (mm, distance from the edge of the contact), "
         "cs (cross-shear ratio of the cycle) and pm (MPa, mean pressure over its sliding)",
     )
     table: tuple[tuple[Number, Number], ...] | None = Field(
         default=None, description="[argument, value] pairs; beyond its ends the end values hold"
     )
-    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "cs", "pm"] = Field(
+    of: Literal["T", "p", "v", "x", "y", "z", "depth", "s", "debris", "edge", "cs", "pm"] = Field(
         default="T", description="argument of the table"
     )
     regions: dict[str, Annotated[Number, Field(ge=0)]] | None = Field(
@@ -73,7 +74,7 @@ class Dependence(Part):
     @property
     def varies(self) -> bool:
         """Whether it changes with more than the place."""
-        names = ("T", "p", "v", "depth", "s", "cs", "pm")
+        names = [name for name in VARIABLES if name not in ("x", "y", "z")]
         return bool(self.states) or any(self.depends_on(name) for name in names)
 
     @property

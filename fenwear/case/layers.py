@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from fenwear.case.creep import Creep
 from fenwear.case.laws import Dependence, OfPlace, constant_or_dependence
-from fenwear.case.quantities import Length, Number, Stress, quantity
+from fenwear.case.quantities import Length, Number, Part, Stress, quantity
 
 STIFFNESS, DENSITY = "MPa/mm", "1/mm^2"
 
 
-class ThirdBody(OfPlace):
+class ThirdBody(Part):
     """Debris that stays between the surfaces as a layer of thickness t >= 0, until it is lost.
 
-    Over the sliding distance s of a place, dt/ds = share * (worn depth of both bodies)' - t / life: what is worn is
-    kept in part, and lost as it slides. The gap is the worn one less t.
+    Over the sliding distance s of a place, dt/ds = share * (worn depth of both bodies)' - t / life, and at the distance
+    d from an edge of the contact - exp(-d / edge_length) t / edge_life besides: what is worn is kept in part, and lost
+    as it slides. The gap is the worn one less t.
     """
 
     share: Annotated[Number, Field(ge=0, le=1)] = Field(
@@ -26,17 +27,45 @@ class ThirdBody(OfPlace):
         "at once"
     )
     life: constant_or_dependence(Annotated[Length, Field(gt=0)]) = Field(  # type: ignore[valid-type]
-        description="sliding distance over which 1 - 1/e of what lies at a place is ejected; of the place where edges "
-        "lose faster"
+        description="sliding distance over which 1 - 1/e of what lies at a place is ejected; an expression, a table or "
+        "a registered law of what coefficients may depend on, debris (its own thickness, mm) and edge among it: a law "
+        "of loss, t / life over sliding distance"
+    )
+    edge_life: Annotated[Length, Field(gt=0)] | None = Field(
+        default=None,
+        description="the same of what lies at an edge of the contact, where surfaces part or the punch's ends, besides "
+        "life; by default edges lose as any place does",
+    )
+    edge_length: Annotated[Length, Field(gt=0)] | None = Field(
+        default=None, description="with edge_life: distance from the edge over which that loss falls e times"
     )
     initial: Annotated[Length, Field(ge=0)] = Field(
         default=0.0, description="thickness at the start, such as of a powder or a solid lubricant"
     )
 
-    @classmethod
-    def units(cls) -> Mapping[str, str]:
-        """Return the units of what may depend on the place, by key."""
-        return {"life": "mm"}
+    @model_validator(mode="after")
+    def _together(self) -> Self:
+        if (self.edge_life is None) != (self.edge_length is None):
+            missing, given = ("edge_length", "edge_life") if self.edge_length is None else ("edge_life", "edge_length")
+            raise ValueError(f"{missing}: missing, but required with {given}")
+        if isinstance(self.life, Dependence):
+            if self.life.regions is not None:
+                raise ValueError("life: expected an expression, a table or a law, got regions")
+            try:
+                self.life.scale("mm")
+            except ValueError as error:
+                raise ValueError(f"life: unit: {error}") from None
+        return self
+
+    def asks(self, name: str) -> bool:
+        """Return whether the loss depends on a variable of coefficients."""
+        by_edge = name == "edge" and self.edge_life is not None
+        return by_edge or (isinstance(self.life, Dependence) and self.life.depends_on(name))
+
+    @property
+    def varies(self) -> bool:
+        """Whether the loss changes with more than the place."""
+        return self.edge_life is not None or (isinstance(self.life, Dependence) and self.life.varies)
 
 
 class LinearLayer(OfPlace):

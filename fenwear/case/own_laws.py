@@ -35,8 +35,8 @@ class State:
     Attributes:
         rate: Function of the variables in `of` and of the state itself, by their names at n nodes (n,), that returns
             the change in a second (n,), or one number.
-        of: Which of T, p, v, x, y, z, depth, s, cs and pm, which other states, and `wear`, what both bodies lose there
-            (mm/s), the rate depends on.
+        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm, which other states, and `wear`, what both
+            bodies lose there (mm/s), the rate depends on.
         initial: Value at the start, or a function of the places x, y, z of the nodes, mm.
         unit: Of its values, as it is told in results.
         fills: Gap that a unit of it fills, mm: 1 of a film's thickness in mm that carries as third bodies do. Such a
@@ -79,8 +79,8 @@ def register_law(
     Args:
         name: A word; registered again, the new function takes its place.
         function: Of the state of the contact.
-        of: Which of T, p, v, x, y, z, depth, s, cs and pm it depends on, and which states; with depth or s nothing ever
-            repeats.
+        of: Which of T, p, v, x, y, z, depth, s, debris, edge, cs and pm it depends on, and which states; with depth or
+            s nothing ever repeats.
         states: What it remembers, by names that are words; laws that name the same state share it.
 
     Raises:

@@ -289,6 +289,8 @@ class Case(Part):
             if self.contact.lubrication is not None:
                 key, value = self.contact.lubrication.given
                 given[f"contact.lubrication.{key}"] = value
+            if self.contact.third_body is not None:
+                given["contact.third_body.life"] = self.contact.third_body.life
             for body, law in self.wear.by_body.items():
                 if law is not None:
                     given[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
@@ -302,6 +304,15 @@ class Case(Part):
                 "know"
                 for name, material in self.materials.items()
                 for key in material.dependent
+            ]
+        if self.contact.third_body is None:
+            felt: dict[str, Any] = {"contact.friction": self.contact.friction}
+            pairs = self.wear.by_body.items()
+            felt |= {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in pairs if law}
+            problems += [
+                f"{key}: depends on the thickness of debris, which a case without contact.third_body does not know"
+                for key, value in felt.items()
+                if isinstance(value, Dependence) and value.depends_on("debris")
             ]
         problems += self._region_problems()
         friction = self.contact.friction
@@ -419,8 +430,7 @@ class Case(Part):
             ),
             "stick.force: expected none in a cycle, whose forces are columns,": table and self.stick.force is not None,
             "contact.friction and wear: expected coefficients without cs and pm, which are of gross sliding,": any(
-                isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm"))
-                for one in (self.contact.friction, *(law.given_coefficient for law in self.wear.laws))
+                self.contact.asks(name, self.wear.laws) for name in ("cs", "pm")
             ),
             "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
                 law.coating is not None and not self._one_ratio(law) for law in self.wear.laws

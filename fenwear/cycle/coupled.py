@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, heating_friction, with_reduced_heat
 from fenwear.contact import ContactState
 from fenwear.cycle.fixed_point import fixed_point
 from fenwear.cycle.state import pressure_scale
 from fenwear.errors import ConvergenceError
 from fenwear.heat.periodic import CycleHeat, CycleJump
+from fenwear.layers import LayerEvolution
 from fenwear.layers.memory import Evolution, Held
 from fenwear.remedies import GRAZING
 from fenwear.sliding.friction import ContactConditions
@@ -24,6 +25,7 @@ from fenwear.sliding.wear import WornDepths
 FLAT = 1e-9  # mm: depths below it count as none
 MANY, LARGE = 300, 4000  # contact nodes, and pressures of all phases, above which heat is lagged
 SMOOTH = 15  # changes of pressure that are combined: the heat of few patterns is not small
+EDGES, EDGES_AT_REST = 2, 20  # times that contact is solved for its own edges in a step, and in the steady state
 CLOSE = 1e-9  # change of pressure and temperature over their largest that ends the iterations
 DISAGREE = (
     'set heat.conducting = "nominal", or take weaker dependences: contact and what depends on it, the nodes that '
@@ -95,7 +97,7 @@ class _Unknowns:
     @classmethod
     def like(cls, parts: Sequence[Array], scale: float, *, warm: bool) -> _Unknowns:
         """Return the layout of these parts, the pressures first, and temperatures next where it is warm."""
-        least = [1.0, *([1.0] if warm else []), FLAT, FLAT]
+        least = [1.0, *([1.0] if warm else []), FLAT, FLAT, FLAT]
         units = [scale / max(float(np.abs(part).max()), low) for part, low in zip(parts, least, strict=False)]
         return cls([1.0, *units[1:]], np.cumsum([part.size for part in parts])[:-1])
 
@@ -149,6 +151,8 @@ class Coupled:
     def __init__(self, system: Tribosystem, take: Take) -> None:
         self.system, self._take = system, take
         self.held: Held | None = None
+        self._touching: Mask | None = None  # which nodes do in each phase, for the edges of the contact
+        self._passing: LayerEvolution | None = None  # at the conditions last taken, where debris is felt by them
         self.heat = cycle_heat(system)
         self.mu: Array = np.ones((len(system.motion.phases), len(system.pair.weights)))
         if self.heat is not None and not system.friction.constant:
@@ -182,6 +186,28 @@ class Coupled:
             ConvergenceError: contact did not converge, or nodes open and close in turn.
         """
         self.held = None
+        if self.system.edges is None:
+            return self._at_edges(temperature, cycles, start, solve, passing, lagged=lagged)
+        # Of the contact that was found before: nodes that open and close as edges move would never come to an end.
+        for _ in range(EDGES if passing is not None else EDGES_AT_REST):
+            self._touching = start.pressure > 0
+            found = self._at_edges(temperature, cycles, start, solve, passing, lagged=lagged)
+            start = found.contact
+            if np.array_equal(start.pressure > 0, self._touching):
+                break
+        return found
+
+    def _at_edges(
+        self,
+        temperature: Array | None,
+        cycles: float,
+        start: ContactState,
+        solve: SolveContact,
+        passing: DepthEvolution | None,
+        *,
+        lagged: bool,
+    ) -> Solved:
+        """Return what `solve` does, at edges of the contact that are known."""
         try:
             return self._solve(temperature, cycles, start, solve, passing, touching, lagged=lagged)
         except ConvergenceError:
@@ -214,6 +240,9 @@ class Coupled:
         if passing is not None:
             # From what was worn before: where wear grows with the depth there may be a deeper solution, beyond a jump.
             parts += [passing.before.punch, passing.before.strip]
+        felt = system.layers.debris is not None and system.asks("debris")
+        if felt:
+            parts.append(self._first_debris(start.pressure, passing))
         unknowns = _Unknowns.like(parts, pressure_scale(system, start.pressure), warm=warm)
 
         def advance(x: Array) -> tuple[Array, Solved, bool]:
@@ -222,8 +251,9 @@ class Coupled:
             pressure = now[0].reshape(shape)
             if not constant:
                 surfaces = now[1] if warm else np.zeros(0)
-                worn = None if passing is None else replace(passing.before, punch=now[-2], strip=now[-1])
-                self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing)
+                depths = now[:-1] if felt else now
+                worn = None if passing is None else replace(passing.before, punch=depths[-2], strip=depths[-1])
+                self._update(pressure, surfaces.reshape(-1, 2, shape[1]), worn, passing, now[-1] if felt else None)
             found: list[Array] = []
             if heat is None or temperature is None:
                 contact = solve(None, None, contact)
@@ -244,6 +274,8 @@ class Coupled:
                     found.append(self.surfaces(state, contact.pressure, conductances).ravel())
             if passing is not None:
                 found.extend(passing.depths(contact.pressure))
+            if felt:
+                found.append(self._debris(contact.pressure, passing))
             return unknowns.joined([contact.pressure.ravel(), *found]), solved, same and constant
 
         return fixed_point(advance, unknowns.joined(parts), unknowns.close, DISAGREE, team=system.team)
@@ -295,22 +327,54 @@ class Coupled:
             return [state]
         return [state, *self.heat.cycle(conductances).states(state, self.mu * pressure)]
 
+    def _first_debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
+        """Return the thickness of the debris that is looked for from: what there was before, or would be in the end."""
+        if passing is not None:
+            return np.asarray(self.system.layers.thickness(passing.before))
+        resting = self.system.passing(self.system.phases_wear).resting(pressure)
+        return np.zeros(pressure.shape[1]) if resting is None or not np.isfinite(resting).all() else resting
+
+    def _debris(self, pressure: Array, passing: DepthEvolution | None) -> Array:
+        """Return the thickness of the debris at the end of a step, or in the end, at the conditions last taken."""
+        assert self._passing is not None
+        if passing is None:
+            return np.asarray(self._passing.resting(pressure))
+        added, _ = self._passing.debris_changes(pressure, passing.before, passing.cycles)
+        return np.asarray(self.system.layers.thickness(passing.before) + passing.cycles * added)
+
     def _update(
-        self, pressure: NDArray[Any], surfaces: NDArray[Any], worn: WornDepths | None, passing: DepthEvolution | None
+        self,
+        pressure: NDArray[Any],
+        surfaces: NDArray[Any],
+        worn: WornDepths | None,
+        passing: DepthEvolution | None,
+        debris: NDArray[Any] | None,
     ) -> None:
-        """Take the coefficients at these pressures and, where there are any, temperatures of the phases and depths."""
+        """Take the coefficients at these pressures and, where there are any, temperatures, depths and debris."""
         system = self.system
         done, shear = None if passing is None else passing.half_cycles, system.ways.shear(np.asarray(pressure))
         conditions = [
-            system.conditions(k, p, (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None, worn, done, shear)
+            system.conditions(
+                k,
+                p,
+                (surfaces[k, 0], surfaces[k, 1]) if len(surfaces) else None,
+                worn,
+                done,
+                shear,
+                None if self._touching is None else self._touching[k],
+            )
             for k, p in enumerate(pressure)
         ]
+        if debris is not None:
+            conditions = [replace(one, debris=np.maximum(debris, 0.0)) for one in conditions]
         evolution = system.evolution(conditions, worn)
         if evolution is not None:
             evolution = replace(evolution, near=self.held)
             conditions = list(self._remembering(evolution, passing))
             evolution = replace(evolution, near=self.held)
         self._take(conditions, evolution)
+        if debris is not None:
+            self._passing = system.passing(system.wear.phases(conditions), None, evolution, conditions)
         if not system.friction.constant:
             friction = [system.friction.values(state) for state in conditions]
             self.mu = np.array([heating_friction(system, mu, phase) for phase, mu in enumerate(friction)])

@@ -139,8 +139,9 @@ class Stepper:
             self.contact.follows = not system.constant_coefficients
         self.ratios = system.friction_ratios()
         self.wear = system.phases_wear
-        self.evolution = system.evolution([system.conditions(k) for k in range(len(self.ratios))])
-        self._measure([system.friction.values(system.conditions(k)) for k in range(len(self.ratios))])
+        self.conditions: Sequence[ContactConditions] = [system.conditions(k) for k in range(len(self.ratios))]
+        self.evolution = system.evolution(self.conditions)
+        self._measure([system.friction.values(one) for one in self.conditions])
         self.coupled = Coupled(system, self.take)
         self._heated: Array = np.zeros(0)  # by the last cycle
         self._flowed: Array | None = None  # beyond the hardness, in the stage solved last
@@ -149,6 +150,7 @@ class Stepper:
         self._half: tuple[RunState, float, RunState, _Trend] | None = None  # the first half of the last attempt
         self._trend = _Trend()  # of what was made last
         passing = bool(system.passing_laws) or system.friction.of_coatings != (None, None)
+        passing = passing or system.layers.varies or system.asks("debris")
         self._follows = passing or system.layers.memory is not None  # coefficients do, within a step
 
     def beginning(self) -> RunState:
@@ -335,7 +337,7 @@ class Stepper:
         flowed: Array | None = None
         if self._flowed is not None:
             flowed = np.asarray(self._flowed / (cycles if followed is None else followed), dtype=np.float64)
-        passing = self.system.passing(self.wear, evolution=self.evolution)
+        passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
         worn = passing.worn(contact.pressure, before.worn, cycles, flowed)
         creep = self._creep(before.worn, cycles)
         if creep is not None:
@@ -360,7 +362,8 @@ class Stepper:
         """Return contact of a stage from the depths before it, so many cycles on."""
         self.watch()
         worn, cycles = begin
-        step, near = self.system.passing(self.wear, evolution=self.evolution).step(worn, cycles), start
+        passing = self.system.passing(self.wear, None, self.evolution, self.conditions)
+        step, near = passing.step(worn, cycles), start
         creep = self._creep(worn, cycles)
         if creep is not None:
             gap, coupling = gap + creep.gap, creep.coupling if coupling is None else coupling + creep.coupling
@@ -381,7 +384,7 @@ class Stepper:
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None) -> None:
         """Take friction and wear at the conditions of the phases, and what these do to the states of laws."""
         system = self.system
-        self.wear, self.evolution = system.wear.phases(conditions), evolution
+        self.wear, self.evolution, self.conditions = system.wear.phases(conditions), evolution, conditions
         self._measure([system.friction.values(state) for state in conditions])
         if system.friction.constant:
             return
@@ -425,7 +428,8 @@ class Stepper:
     def _worn(self, phases: Sequence[int], contacts: Sequence[ContactState], now: WornDepths) -> WornDepths:
         pressures = np.concatenate([contacts[k].pressure for k in phases])
         evolution = None if self.evolution is None else self.evolution.some(phases)
-        return self.system.passing(self.wear.some(phases), phases, evolution).worn(pressures, now)
+        conditions = [self.conditions[k] for k in phases]
+        return self.system.passing(self.wear.some(phases), phases, evolution, conditions).worn(pressures, now)
 
     def _phase_record(
         self, phase: int, contact: ContactState, old: ContactState | None, cycles: int, adds: Totals

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.assembly import Tribosystem, heating_friction
 from fenwear.contact import CondensedContact, ContactSolver, ContactState
 from fenwear.cycle.block import HalfCycleHeat, PhaseRecord
@@ -111,9 +111,11 @@ class PhaseStep:
             self._remember(before, contact)
             return self._end(contact, after, heat, before, passing, worn)
 
+        touching = None if start is None else start.pressure[0] > 0  # those of a cycle ago: they do not go to and fro
+
         def solve(pressure: Array) -> tuple[Array, _Solved, bool]:
             nonlocal start
-            passing = self._update(pressure, temperature, worn, half_cycles, cycle)
+            passing = self._update(pressure, temperature, worn, half_cycles, cycle, touching=touching)
             try:
                 contact, after, heat = self._solve(temperature, gap, start, passing, worn)
             except ConvergenceError as error:
@@ -162,16 +164,18 @@ class PhaseStep:
         cycle: CycleShear | None,
         *,
         ended: bool = False,
+        touching: Mask | None = None,
     ) -> LayerEvolution:
         """Take friction and wear at this pressure, and at temperature and depths at the start of the phase.
 
-        Where it is that of the end, the states of laws are those at the end.
+        Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes that
+        touch, by default those that carry this pressure.
         """
         system = self.system
         surfaces = None
         if self._thermal is not None and temperature is not None:
             surfaces = self._thermal.exchange.contact_temperatures(temperature, self.phase - 1)
-        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle)
+        conditions = system.conditions(self.phase, pressure, surfaces, worn, half_cycles, cycle, touching)
         evolution = system.evolution([conditions], worn, [self.phase])
         end: Held | None = None
         if evolution is not None:  # coefficients are those of the states in the middle of the phase
@@ -182,7 +186,7 @@ class PhaseStep:
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
                 self._thermal.slide(heating_friction(system, mu, self.phase))
-        passing = system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution)
+        passing = system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution, [conditions])
         return replace(passing, ended=end) if ended else passing
 
     @cached_property

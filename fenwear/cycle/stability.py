@@ -32,6 +32,7 @@ MAX_ITERATIONS = 60  # of friction and the temperatures that it depends on
 CLOSE = 1e-10  # change of these temperatures over their range that ends them
 APART = 0.1  # what a nearly stationary state may be away from itself a cycle later, or from its own temperatures
 STEP, MAX_HALVINGS, SETTLED = 1.0, 10, 1e-6  # of differences to temperatures, K; of their steps; of the slopes
+THIN = 1e-9  # mm: the least of differences to the thickness of debris
 
 
 def stability_number(system: Tribosystem) -> float:
@@ -128,6 +129,8 @@ def decay_rates(system: Tribosystem, pressure: Array, conductances: Array | None
 def _growth_rate(system: Tribosystem, pressure: Array, conductances: Array | None, *, implicit: bool) -> float:
     values = _factors(system, pressure, conductances, implicit=implicit)
     counted = np.abs(values - 1.0) > NEUTRAL
+    if not counted.any():  # as where all that is worn stays, and fills what it opens
+        return 0.0
     return float(np.log(np.abs(values[counted]).max()) / system.motion.period)
 
 
@@ -139,12 +142,13 @@ def _factors(
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = (0 if heat is None else heat.dim) + (0 if system.creep is None else len(system.creep.beginning()))
+    dim += 0 if system.layers.debris is None else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
         state = states[phase] if states else None
         tangent = phase_tangent(system, phase, pressure[phase], heat, state, conductance, implicit=implicit, worn=rest)
-        cycle = tangent @ cycle
+        cycle, rest = tangent @ cycle, _lies_after(system, phase, pressure[phase], heat, state, rest)
     if not np.isfinite(cycle).all():
         raise ConvergenceError(
             "what disturbances become in a cycle is beyond all numbers: wear, heat or load are too large"
@@ -266,8 +270,9 @@ class _Laws:
         mu: (n,).
         rate: What each node slides for a unit of the stroke's law (n,): friction heat is mu p times that.
         mu_p: To the pressure of the same node (n,), 1/MPa.
-        mu_s: To the state of the heat (n, dim).
+        mu_s: To the state of the heat, and to the thickness of debris at its start where there is any (n, dim).
         worn_p, worn_s: Of the gap that the wear of the phase opens (n, n) and (n, dim).
+        lies: Of the thickness of debris at its end (n, n) and (n, dim); None without.
     """
 
     mu: Array
@@ -276,20 +281,73 @@ class _Laws:
     mu_s: Array
     worn_p: Array
     worn_s: Array
+    lies: tuple[Array, Array] | None = None
 
 
 def _rested(
     system: Tribosystem, pressure: Array, heat: CycleHeat | None, states: Sequence[HeatState]
 ) -> WornDepths | None:
-    """Return what laws remember at rest at pressures and temperatures of the phases; None without."""
-    if system.layers.memory is None:
+    """Return what laws remember, and debris, at rest at pressures and temperatures of the phases; None without.
+
+    Raises:
+        ConvergenceError: debris has no thickness at which as much is lost as comes.
+    """
+    layers = system.layers
+    if layers.memory is None and layers.debris is None:
         return None
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
     if heat is not None and states:
         warm = [heat.exchange.contact_temperatures(state, phase - 1) for phase, state in enumerate(states)]
-    return system.rested(
-        [system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))]
-    )
+    conditions = [
+        system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))
+    ]
+    rest = system.rested(conditions)
+    if layers.debris is None:
+        return rest
+    thickness = np.asarray(layers.thickness(rest))
+    for _ in range(MAX_ITERATIONS):
+        now = [replace(one, debris=thickness) for one in conditions]
+        passing, before = system.passing(system.wear.phases(now), None, None, now), thickness
+        thickness = np.asarray(passing.resting(pressure))
+        if not layers.varies and not system.asks("debris"):
+            break
+        if np.abs(thickness - before).max() <= CLOSE * float(thickness.max()):
+            break
+    else:
+        raise ConvergenceError("debris does not come to a thickness at which as much is lost as comes")
+    return layers.with_thickness(rest, thickness)
+
+
+def _lies_after(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    worn: WornDepths | None,
+) -> WornDepths | None:
+    """Return what lies between after a phase, of what does at its start."""
+    if worn is None or system.layers.debris is None:
+        return worn
+    conditions = _conditions(system, phase, pressure, heat, state, worn)
+    passing = system.passing(system.wear.phases([conditions], [phase]), [phase], None, [conditions])
+    added, _ = passing.debris_changes(pressure[None], worn, None)
+    return system.layers.with_thickness(worn, np.asarray(system.layers.thickness(worn)) + added)
+
+
+def _conditions(
+    system: Tribosystem,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    worn: WornDepths | None,
+) -> ContactConditions:
+    """Return the conditions of a phase, at temperatures and with what lies between at its start."""
+    surfaces = None
+    if heat is not None and state is not None:
+        surfaces = heat.exchange.contact_temperatures(state, phase - 1)
+    return system.conditions(phase, pressure, surfaces, worn)
 
 
 def _laws(
@@ -300,14 +358,12 @@ def _laws(
     state: HeatState | None,
     worn: WornDepths | None = None,
 ) -> _Laws:
-    n, conditions = len(pressure), system.conditions(phase, pressure, worn=worn)
-    surfaces = conditions.temperatures
-    if heat is not None and state is not None:
-        surfaces = heat.exchange.contact_temperatures(state, phase - 1)
-    around = (pressure, *surfaces)
+    n, conditions = len(pressure), _conditions(system, phase, pressure, heat, state, worn)
+    lies = () if conditions.debris is None else (conditions.debris,)
+    around = (pressure, *conditions.temperatures, *lies)
 
-    def at(p: Array, punch: Array, strip: Array) -> ContactConditions:
-        return replace(conditions, pressure=p, temperatures=(punch, strip))
+    def at(p: Array, punch: Array, strip: Array, *debris: Array) -> ContactConditions:
+        return replace(conditions, pressure=p, temperatures=(punch, strip), debris=debris[0] if debris else None)
 
     def friction(*values: Array) -> Array:
         return system.friction.values(at(*values))
@@ -319,12 +375,31 @@ def _laws(
 
     wear = system.wear.phases([at(*around)], [phase])
     mu_p, *mu_t = _slopes(friction, around)
-    worn_p, *worn_t = (_opened(wear, slope) for slope in _slopes(depths, around))
-    picked = _picked(heat, phase, n)
-    mu_s: Array = (np.array(mu_t)[:, :, None] * picked).sum(axis=0)
-    worn_s: Array = (np.array(worn_t) @ picked).sum(axis=0)
-    rate = heating_friction(system, np.ones(n), phase)
-    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
+    worn = _slopes(depths, around)
+    worn_p, *worn_t = (_opened(wear, slope) for slope in worn)
+    picked, rate = _picked(heat, phase, n), heating_friction(system, np.ones(n), phase)
+    mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
+    worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
+    if not lies:
+        return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
+    mu_s, worn_s = np.hstack([mu_s, np.diag(mu_t[2])]), np.hstack([worn_s, worn_t[2]])
+    debris = system.layers.debris
+    assert debris is not None
+    taken, path = depths(*around).sum(axis=0)[None], system.path[phase][None]
+
+    def thickness(*values: Array) -> Array:
+        return values[-1] + debris.over(path, [at(*values)]).change(values[-1], taken)[0]
+
+    over = debris.over(path, [conditions])
+    lies_p, *lies_t, lies_lies = (over.slope(None)[0] * slope.sum(axis=0) for slope in worn)
+    if system.layers.varies:
+        by_loss = _slopes(thickness, around)
+        lies_p, lies_lies = lies_p + by_loss[0], lies_lies + by_loss[3]
+        lies_t = [own + more for own, more in zip(lies_t, by_loss[1:3], strict=True)]
+    else:
+        lies_lies = lies_lies + np.exp(-over.loss)
+    lies_s: Array = np.hstack([(np.array(lies_t)[:, :, None] * picked).sum(axis=0), np.diag(lies_lies)])
+    return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s, (np.diag(lies_p), lies_s))
 
 
 def phase_tangent(
@@ -348,8 +423,9 @@ def phase_tangent(
 
         dw' + G ds' + S dp + S_tau p dtau + H da = 0,   E dp + E_tau p dtau = 0,
 
-    with dw in place of dw' where the wear is explicit. What creeps stands beside the temperatures, after them: s has
-    its state, S is that of the grown compliances, and G of a state what it opens at the end of the phase.
+    with dw in place of dw' where the wear is explicit. Debris stands beside the temperatures, after them: s has its
+    thickness, which closes the gap, by that at the start of the phase where the wear is explicit. So does what creeps:
+    s has its state, S is that of the grown compliances, and G of a state what it opens at the end of the phase.
 
     Args:
         system: The assembled problem.
@@ -359,7 +435,7 @@ def phase_tangent(
         state: Temperatures at its start; None where nothing depends on them.
         conductance: Of each node (n,), N/(mm s K); by default that of the nodes with a pressure.
         implicit: Whether the wear is.
-        worn: With the states that laws remember, which disturbances leave; by default those at the start.
+        worn: With debris, and the states that laws remember, which disturbances leave; by default those at the start.
     """
     n, interface, creep = len(pressure), system.interfaces[phase], system.creep
     laws, rigid = _laws(system, phase, pressure, heat, state, worn), interface.rigid
@@ -368,26 +444,31 @@ def phase_tangent(
     by_mu = PressureCompliance(interface, further - friction_ratio).matrix()  # all are linear in mu
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
+    of_heat = 0 if heat is None else heat.dim
     gap_rows: Array = np.zeros((n, dim))
     state_s: Array = np.zeros((dim, dim))
     state_p: Array = np.zeros((dim, n))
     if heat is not None:
-        gap_rows = heat.gap_rows[phase]
+        gap_rows[:, :of_heat] = heat.gap_rows[phase]
         if conductance is None:
             conductance = heat.exchange.conductance(pressure)
-        state_s, state_p = _heated(heat, phase, pressure, state, laws, conductance)
+        state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
+    before_s: Array = np.zeros((n, dim))  # gap by the state at the start of the phase
+    if laws.lies is not None:
+        state_p[of_heat:], state_s[of_heat:] = laws.lies
+        (gap_rows if implicit else before_s)[:, of_heat:] = -np.eye(n)
     if creep is not None:
         crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
         none: Array = np.zeros((n, len(crept.stays)))
         laws = replace(laws, worn_s=np.hstack([laws.worn_s, none]))
-        traction_s = np.hstack([traction_s, none])
+        traction_s, before_s = np.hstack([traction_s, none]), np.hstack([before_s, none])
         gap_rows = np.hstack([gap_rows, crept.opened])
         state_s = np.block([[state_s, np.zeros((dim, none.shape[1]))], [crept.by_state, np.diag(crept.stays)]])
         state_p, dim = np.vstack([state_p, crept.by_pressure]), len(state_s)
     closed = pressure > 0
     k, r, scale = int(closed.sum()), rigid.rigid_normal.shape[1], interface.elastic_length
     opened = interface.compliance(friction_ratio).matrix() + by_mu * traction_p + gap_rows @ state_p
-    by_state = by_mu @ traction_s + gap_rows @ state_s
+    by_state = by_mu @ traction_s + gap_rows @ state_s + before_s
     slope = system.layers.slope(pressure[None])
     if slope is not None:
         opened = opened + np.diag(slope[0])
@@ -452,7 +533,9 @@ def _heated(
     if state is not None and exchange.heat.conductance_per_pressure is not None:  # h_c is proportional to p
         rise = np.divide(conductance, pressure, out=np.zeros_like(pressure), where=pressure > 0)
         by_pressure += exchange.by_conductance(phase, state, pressure, conductance) * rise
-    return by_state + by_power @ (pressure[:, None] * laws.mu_s), by_pressure
+    changes: Array = by_power @ (pressure[:, None] * laws.mu_s)
+    changes[:, : heat.dim] += by_state
+    return changes, by_pressure
 
 
 def _picked(heat: CycleHeat | None, phase: int, n: int) -> Array:
@@ -474,14 +557,16 @@ def _opened(wear: PhasesWear, slope: Array) -> Array:
     return np.asarray(left[0] @ right[0])
 
 
-def _slopes(law: Callable[..., Array], around: tuple[Array, Array, Array]) -> list[Array]:
-    """Return the derivatives of a law of (p, T_punch, T_strip), node by node, to each of them.
+def _slopes(law: Callable[..., Array], around: Sequence[Array]) -> list[Array]:
+    """Return the derivatives of a law of (p, T_punch, T_strip), and of debris, node by node, to each of them.
 
     Central differences whose step is made smaller until it makes no difference; 0 where p is.
     """
     found = []
     for which, value in enumerate(around):
-        step = 0.01 * value if which == 0 else np.full(len(value), STEP)
+        step = 0.01 * value if which in (0, 3) else np.full(len(value), STEP)
+        if which == 3:
+            step = np.maximum(step, THIN)
         before: Array | None = None
         for _ in range(MAX_HALVINGS):
             ends = [law(*(v + sign * step if k == which else v for k, v in enumerate(around))) for sign in (1, -1)]

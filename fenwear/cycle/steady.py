@@ -354,7 +354,7 @@ def _result(problem: SteadyInequality, solved: Solved, heat: CycleHeat | None, h
         coordinates=system.pair.punch.x,
         system=system,
         conductances=None if heat is None else solved.conductances,
-        debris=system.passing(problem.wear).resting(contact.pressure),
+        debris=system.passing(problem.wear, conditions=problem.conditions).resting(contact.pressure),
         crept=None if system.creep is None or crept is None else system.creep.depth(crept),
         states={} if held is None or system.layers.memory is None else system.layers.memory.by_name(held),
     )

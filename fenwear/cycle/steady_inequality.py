@@ -47,6 +47,7 @@ class SteadyInequality:
         m, n, r = len(system.motion.phases), len(system.pair.weights), len(rigid.resultant)
         self.m, self.n, self.r = m, n, r
         self.wear, self.closure = system.phases_wear, system.layers.closure
+        self.conditions: Sequence[ContactConditions] | None = None
         self.p_scale = rigid.mean_pressure
         self.gap_scale = self.p_scale * interface.elastic_length
         self.wear_scale = float(self.wear.opening(np.full((m, n), self.p_scale)).max()) / m
@@ -95,7 +96,7 @@ class SteadyInequality:
 
     def take(self, conditions: Sequence[ContactConditions], evolution: Evolution | None = None) -> None:  # noqa: ARG002
         """Take friction and wear at the conditions of the phases; what states of laws do there, they have done."""
-        self.wear = self.system.wear.phases(conditions)
+        self.wear, self.conditions = self.system.wear.phases(conditions), conditions
         self._known = None
         if not self.system.friction.constant:
             ratios = self.system.friction_ratios(conditions)

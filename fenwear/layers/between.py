@@ -33,7 +33,7 @@ from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.interface import ContactPair
 from fenwear.interface.placement import in_space
 from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
-from fenwear.layers.debris import Debris
+from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
 from fenwear.sliding.wear import WornDepths
 
@@ -84,6 +84,11 @@ class Layers:
         return found if self.closure is None else found + self.closure.closure(pressure)
 
     @property
+    def varies(self) -> bool:
+        """Whether debris is lost by a law that changes with more than the place."""
+        return self.debris is not None and self.debris.law is not None
+
+    @property
     def curved(self) -> bool:
         """Whether something gives way by a law that is not linear."""
         return self.closure is not None or self.hardness < np.inf
@@ -103,6 +108,20 @@ class Layers:
         first = len(self.rows) - len(self.begun.contact)
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
         return Held(contact, worn.carried if len(worn.carried) else self.begun.strip)
+
+    def thickness(self, worn: WornDepths | None) -> Array | None:
+        """Return the thickness of the debris (n,), mm, by default that at the start; None without."""
+        if self.debris is None:
+            return None
+        if worn is None or not len(worn.between):
+            return np.full(self.nodes, self.debris.initial)
+        return np.asarray(worn.between[self.row(DEBRIS[0])])
+
+    def with_thickness(self, worn: WornDepths, thickness: Array) -> WornDepths:
+        """Return the depths with debris of another thickness (n,), mm."""
+        state = worn.between.copy()
+        state[self.row(DEBRIS[0])] = thickness
+        return replace(worn, between=state)
 
     def known(
         self, pair: ContactPair, worn: WornDepths | None, held: Held | None = None
@@ -253,8 +272,9 @@ def layers_of(
             closure = _rough(law, modulus, _at_nodes(law, place, n))
     third = contact.third_body
     if third is not None:
-        life = place_values(third.life, place, n, "mm", "contact.third_body.life")
-        debris = Debris(third.share, life, third.initial)
+        of_state = isinstance(third.life, Dependence) and third.life.varies
+        life = None if of_state else place_values(third.life, place, n, "mm", LIFE)
+        debris = Debris(third.share, life, third.initial, third if third.varies else None)
     hardness = np.inf if contact.hardness is None else contact.hardness
     memory = memory_of(contact.friction, wear, temperature)
     begun = None if memory is None else memory.beginning(pair)

@@ -2,13 +2,17 @@
 
 With the depth w worn off both bodies, the thickness t of what lies at a place follows its sliding distance s:
 
-    dt/ds = share dw/ds - t / life,        gap = geometry + w - t
+    dt/ds = share dw/ds - q t,        gap = geometry + w - t
+
+with q = 1 / life, and at the distance d from an edge of the contact exp(-d / edge_length) / edge_life more: debris
+leaves there. Where q changes with the state of a place, or with t itself, it is that of each phase: of the pressure in
+it and of the thickness at its start; in the implicit step of jumps and in the steady state of the thickness there.
 
 (M. Godet, Wear 100, 1984, 437, for the flows; J. Ding et al., Wear 263, 2007, 481, and P. Arnaud and S. Fouvry, Wear
 412-413, 2018, 92, for layers that act by their thickness). Over a phase of the motion, in which a node slides by d and
 wears W at a constant rate, that is exactly
 
-    t -> e t + share W (1 - e) / x,        x = d / life,   e = exp(-x),
+    t -> e t + share W (1 - e) / x,        x = d q,   e = exp(-x),
 
 and one phase after the other makes a cycle t -> E t + G, linear in t. At a constant G that is the solution after whole
 cycles n of dt/dn = X (G / (1 - E) - t), X = -ln E, so that jumps take this as its rate. What is ejected in a march is
@@ -17,11 +21,17 @@ metered by its own integral: there worn = stored + ejected is a check.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fenwear.arrays import Array
+from fenwear.case import Dependence
+from fenwear.case.layers import ThirdBody
+from fenwear.sliding.friction import ContactConditions
+
+LIFE, LEAST = "contact.third_body.life", 1e-300
 
 
 @dataclass(frozen=True)
@@ -30,17 +40,52 @@ class Debris:
 
     Attributes:
         share: Of what is worn, that stays.
-        life: Sliding distance over which 1 - 1/e is lost (n,), mm.
+        life: Sliding distance over which 1 - 1/e is lost (n,), mm; None where it changes with the state.
         initial: Thickness at the start, mm.
+        law: With what changes: a life that depends on the state, and what edges lose; None where nothing does.
     """
 
     share: float
-    life: Array
+    life: Array | None
     initial: float = 0.0
+    law: ThirdBody | None = None
 
-    def over(self, slid: Array) -> DebrisCycle:
-        """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm."""
-        x = slid / self.life
+    def lost(self, conditions: ContactConditions) -> Array:
+        """Return what is lost over the sliding distance, of what is there (n,), 1/mm.
+
+        Raises:
+            CaseError: a life is not positive.
+        """
+        law, shape = self.law, conditions.shape
+        if self.life is not None:
+            found = 1 / self.life
+        else:
+            assert law is not None
+            assert isinstance(law.life, Dependence)
+            found = 1 / law.life.values(conditions.of("punch"), shape, law.life.scale("mm"), LIFE, LEAST)
+        if (
+            law is not None
+            and law.edge_life is not None
+            and law.edge_length is not None
+            and conditions.edge is not None
+        ):
+            found = found + np.exp(-conditions.edge / law.edge_length) / law.edge_life
+        return np.broadcast_to(found, shape)
+
+    def over(self, slid: Array, conditions: Sequence[ContactConditions] | None = None) -> DebrisCycle:
+        """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm.
+
+        Args:
+            slid: The distances.
+            conditions: Of the phases, for a loss that changes with them.
+        """
+        if self.law is None:
+            assert self.life is not None
+            x = slid / self.life
+        elif conditions is None:
+            raise ValueError("expected the conditions of the phases where what is lost depends on them")
+        else:
+            x = slid * np.array([self.lost(one) for one in conditions])
         kept = np.divide(-np.expm1(-x), x, out=np.ones_like(x), where=x > 0)
         after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]
         return DebrisCycle(self.share, kept * np.exp(-after), x.sum(axis=0))
@@ -53,7 +98,7 @@ class DebrisCycle:
     Attributes:
         share: Of what is worn, that stays.
         kept: Of what stays in each phase, what is left at the end of the cycle (m, n).
-        loss: X, the sliding distance over the life (n,).
+        loss: X, the sum of x over the phases (n,).
     """
 
     share: float

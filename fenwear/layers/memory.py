@@ -369,6 +369,8 @@ class Evolution:
             "v": none,
             "depth": self.strip_depth,
             "s": slid,
+            "debris": none,
+            "edge": none,
             "cs": none,
             "pm": none,
             WEAR: none,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from fenwear.arrays import Array
 from fenwear.layers.between import DEBRIS, PLASTIC, Layers
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Evolution, Held
+from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import PhasesWear, StepWear, WornDepths
 
 NUDGE = 1e-6  # of the largest pressure, for differences
@@ -34,9 +36,16 @@ class LayerEvolution:
     ended: Held | None = None
 
     @classmethod
-    def over(cls, layers: Layers, wear: PhasesWear, slid: Array, evolution: Evolution | None = None) -> LayerEvolution:
-        """Return what phases do that slide by these distances (m, n), mm."""
-        return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid), evolution)
+    def over(
+        cls,
+        layers: Layers,
+        wear: PhasesWear,
+        slid: Array,
+        evolution: Evolution | None = None,
+        conditions: Sequence[ContactConditions] | None = None,
+    ) -> LayerEvolution:
+        """Return what phases do that slide by these distances (m, n), mm, at conditions that debris may be lost by."""
+        return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid, conditions), evolution)
 
     def worn(
         self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | None = None

@@ -38,6 +38,8 @@ class ContactConditions:
         cycle: Cross-shear and mean pressure of the cycle; None where they are not known, which counts as sliding
             straight at the present pressure.
         states: That laws of one's own remember (n,), by their names: as those of punch and strip know them.
+        debris: Thickness of the third body (n,), mm; None without.
+        edge: Distance from the edge of the contact (n,), mm; None where nothing asks for it.
         covered: How much of the friction of both bodies' coatings is left (n,), see `fenwear.sliding.coating`; None
             for a body without one, or where all is worn through.
     """
@@ -52,6 +54,8 @@ class ContactConditions:
     cycle: CycleShear | None = None
     states: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     covered: tuple[Array | None, Array | None] = (None, None)
+    debris: Array | None = None
+    edge: Array | None = None
 
     @classmethod
     def at(cls, pressure: Array, speed: float = 0.0, temperatures: tuple[Array, Array] | None = None) -> Self:
@@ -80,6 +84,8 @@ class ContactConditions:
             "z": z,
             "depth": self.depths[own],
             "s": self.slid,
+            "debris": np.zeros(self.shape) if self.debris is None else self.debris,
+            "edge": np.zeros(self.shape) if self.edge is None else self.edge,
             "cs": np.zeros(self.shape) if self.cycle is None else self.cycle.ratio[own],
             "pm": self.pressure if self.cycle is None else self.cycle.pressure,
             **{f"region {name}": share for name, share in self.regions[own].items()},

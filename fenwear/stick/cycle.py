@@ -16,6 +16,7 @@ from fenwear.interface import ContactPair
 from fenwear.interface.placement import HERE, Placement, in_model
 from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS, PLASTIC
+from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
 from fenwear.sliding.coating import CoatedBody
 from fenwear.sliding.friction import ContactConditions
@@ -373,7 +374,8 @@ class PartialSlipProblem:
         pressure = at.contact.pressure if at.near is None else at.near[0]
         for _ in range(MOST_FRICTIONS):
             states = self.interface.layers.known(position.pair, at.worn, at.held)
-            conditions = laws.conditions(position.pair, pressure, **self._known(at), states=states)
+            touching = at.contact.pressure > 0  # in the step before: nodes that open and close in turn end nowhere
+            conditions = laws.conditions(position.pair, pressure, **self._known(at), states=states, touching=touching)
             after = self._advanced(at, step, laws.friction.values(conditions))
             change, pressure = np.abs(after.contact.pressure - pressure).max(), after.contact.pressure
             if change <= SAME_FRICTION * max(float(pressure.max()), 1e-300):
@@ -389,7 +391,8 @@ class PartialSlipProblem:
         if self.heat is not None and at.temperature is not None:
             punch, strip = self.heat.surfaces(at.temperature)
             warm = punch, strip
-        return {"temperatures": warm, "worn": at.worn, "slid": at.slid, "speed": 0.0 if at.speed is None else at.speed}
+        speed, debris = 0.0 if at.speed is None else at.speed, self.interface.layers.thickness(at.worn)
+        return {"temperatures": warm, "worn": at.worn, "slid": at.slid, "speed": speed, "debris": debris}
 
     def _advanced(self, at: PartialSlipState, step: TimeStep, friction: Array) -> PartialSlipState:
         """Return the state after a time step with friction mu (n,)."""
@@ -510,7 +513,7 @@ class PartialSlipProblem:
         layers, now = self.interface.layers, before.worn
         changes = np.zeros_like(now.between)
         if layers.debris is not None:
-            over = layers.debris.over(records.slip_magnitude)
+            over = self.debris_over(records, replace(before, next_step=first))
             taken = self._taken(records.punch_depth, records.strip_depth, before)
             rows = [layers.row(name) for name in DEBRIS]
             thickness = now.between[rows[0]]
@@ -523,6 +526,15 @@ class PartialSlipProblem:
             return found
         held = layers.held(now)
         return layers.with_held(found, evolution.rate(held)[0] if rate else evolution.after(held) - held)
+
+    def debris_over(self, records: TimeStepRecords, before: PartialSlipState) -> DebrisCycle:
+        """Return what the steps of a record that begin at a state do to debris."""
+        debris = self.interface.layers.debris
+        assert debris is not None
+        if not self.interface.layers.varies:
+            return debris.over(records.slip_magnitude)
+        slips = _Slips(records.pressure, records.slip_magnitude, records.duration, records.temperature)
+        return debris.over(slips.slid, self._conditions(slips, before))
 
     def evolution(self, records: TimeStepRecords, before: PartialSlipState) -> Evolution | None:
         """Return what the steps of a record that begin at a state do to the states that laws remember; None without."""
@@ -560,6 +572,7 @@ class PartialSlipProblem:
                 temperatures=warm[k],
                 worn=before.worn,
                 slid=slid[k],
+                debris=known["debris"],
             )
             for k, pair in enumerate(self._pairs(slips, before))
         ]

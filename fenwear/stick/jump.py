@@ -206,7 +206,7 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     start = _slid_on(now, cycles)
     middle = _rate(problem, start, parted(risen(begin + cycles * first)), now.number + cycles, now)
     second = solve(whole(middle.rate) - 2 * first)
-    worn = parted(risen(begin + cycles * (1.5 * first + 0.5 * second)))
+    worn = _balanced(problem, now.worn, parted(risen(begin + cycles * (1.5 * first + 0.5 * second))))
     end = whole(problem.measured(worn))
     then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
     missing = solve(end - begin - cycles / 2 * (rate + whole(then.rate)))
@@ -220,6 +220,23 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     of_states = 0.0 if remembered is None else remembered.error(missing, begin, end)
     of_creep = _creep_error(problem, missing[size:], (end - begin)[size:], end[size:])
     return replace(then, error=max(error, then.error, of_states, of_creep))
+
+
+def _balanced(problem: PartialSlipProblem, before: WornDepths, after: WornDepths) -> WornDepths:
+    """Return depths whose ejected debris is what was worn and does not lie there, to rounding.
+
+    Else it would not be where depths are kept from falling, or coatings end. What is ejected opens nothing: what is
+    missing of it is spread evenly.
+    """
+    layers, pair = problem.interface.layers, problem.interface.middle.pair
+    if layers.debris is None:
+        return after
+    change, rows = after - before, [layers.row(name) for name in DEBRIS]
+    worn = pair.weights @ change.punch + pair.strip.weights @ change.strip
+    missing = worn - float(pair.weights @ change.between[rows].sum(axis=0))
+    between = after.between.copy()
+    between[rows[1]] += missing / pair.weights.sum()
+    return replace(after, between=between)
 
 
 def _creep_error(problem: PartialSlipProblem, missing: Array, change: Array, end: Array) -> float:
@@ -333,7 +350,8 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
     A, found = np.zeros((total, total)), list[_Group]()
     slid, groups = records.slip_magnitude, dict[tuple[float | Placement, bytes], list[int]]()
-    fed = None if debris is None else debris.over(slid).fed
+    over = None if debris is None else problem.debris_over(records, _begun(now))
+    fed = None if over is None else over.fed
     for k in range(len(records)):
         place = steps[(now.first_step + k) % len(steps)].offset if problem.interface.moves else 0.0
         groups.setdefault((place, _answering(layers, records.pressure[k]).tobytes()), []).append(k)
@@ -368,11 +386,16 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
         A -= left @ (answer @ np.concatenate(right, axis=1))
         share = float(records.duration[members].sum() / records.duration.sum())
         found.append(_Group(position, closed, answer, left, share))
-    if debris is not None:
-        lost, at = debris.over(slid).loss, np.arange(n)
+    if over is not None:
+        lost, at = over.loss, np.arange(n)
         A[stored + at, stored + at] -= lost
         A[ejected + at, stored + at] += lost
     return (A if remembered is None else A + remembered.slopes(total)), found
+
+
+def _begun(now: FrettingCycle) -> PartialSlipState:
+    """Return the state that the records of a cycle begin at, as far as laws ask for it."""
+    return replace(now.end, worn=now.worn, held=None, next_step=now.first_step)
 
 
 def _answering(layers: Layers, pressure: Array) -> Mask:
@@ -403,7 +426,7 @@ class _Remembered:
     def of(cls, problem: PartialSlipProblem, now: FrettingCycle, depths: int) -> _Remembered | None:
         """Return those of a cycle, behind so many depths; None without."""
         layers, pair, memory = problem.interface.layers, problem.interface.middle.pair, problem.interface.layers.memory
-        evolution = problem.evolution(now.records, replace(now.end, worn=now.worn, held=None, next_step=now.first_step))
+        evolution = problem.evolution(now.records, _begun(now))
         if memory is None or evolution is None:
             return None
         begin = depths + now.worn.between.size - len(pair.weights) * len(memory.contact)

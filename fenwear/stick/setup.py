@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.assembly import Bodies, build_bodies, make_sliding
+from fenwear.assembly.bodies import edges_of
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.case import Case, Cycle, Oscillation
@@ -74,11 +75,16 @@ def unheated_problem(
     of_punch, of_strip = bodies.regions
     regions = of_punch, {name: middle.pair.wear_interpolation @ share for name, share in of_strip.items()}
     initial = 0.0 if case.heat is None else case.heat.initial
-    laws = LocalLaws(sliding.friction, sliding.wear, regions, initial, coatings_of(middle.pair, sliding.wear))
+    coatings = coatings_of(middle.pair, sliding.wear)
+    edges = edges_of(bodies, middle.pair.punch) if case.contact.asks("edge", sliding.wear) else None
+    laws = LocalLaws(sliding.friction, sliding.wear, regions, initial, coatings, edges)
     mean = np.full(len(middle.pair.weights), middle.rigid.mean_pressure)
-    conditions = laws.conditions(middle.pair, mean, states=interface.layers.known(middle.pair, None))
+    layers = interface.layers
+    conditions = laws.conditions(
+        middle.pair, mean, states=layers.known(middle.pair, None), debris=layers.thickness(None)
+    )
     wear, mu = laws.wear_at(conditions), laws.friction.values(conditions)
-    changing = None if laws.constant else laws
+    changing = None if laws.constant and not layers.varies else laws
     coated = laws.coated(middle.pair, conditions)
     return PartialSlipProblem(interface, make_program(case, steps), wear, mu, laws=changing, coatings=coated)
 

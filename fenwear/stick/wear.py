@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fenwear.arrays import Array
+from fenwear.arrays import Array, Mask
 from fenwear.case import WearLaw
 from fenwear.interface import ContactPair
+from fenwear.interface.edges import Edges
 from fenwear.interface.placement import in_space
 from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.friction import ContactConditions, Friction
@@ -71,6 +72,7 @@ class LocalLaws:
         regions: Shares of the regions of punch and strip at the contact nodes (n,), by their names.
         initial: Temperature without heat, K.
         coatings: Thickness of both bodies' coatings at their own contact nodes, mm; None without.
+        edges: Distances from the edge of the contact; None where nothing depends on them.
     """
 
     friction: Friction
@@ -78,6 +80,7 @@ class LocalLaws:
     regions: tuple[Mapping[str, Array], Mapping[str, Array]] = field(default_factory=lambda: ({}, {}))
     initial: float = 0.0
     coatings: tuple[Array | None, Array | None] = (None, None)
+    edges: Edges | None = None
 
     @property
     def constant(self) -> bool:
@@ -100,6 +103,8 @@ class LocalLaws:
         worn: WornDepths | None = None,
         slid: Array | None = None,
         states: States = ({}, {}),
+        debris: Array | None = None,
+        touching: Mask | None = None,
     ) -> ContactConditions:
         """Return what coefficients depend on.
 
@@ -111,6 +116,8 @@ class LocalLaws:
             worn: Depths; by default none.
             slid: What each node has slipped from the start (n,), mm; by default nothing.
             states: That laws remember, as those of punch and strip know them.
+            debris: Thickness of the third body (n,), mm; None without.
+            touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
         """
         none, x = np.zeros_like(pressure), pair.punch.x
         initial = np.full_like(pressure, self.initial)
@@ -124,6 +131,8 @@ class LocalLaws:
             self.regions,
             states=states,
             covered=covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
+            debris=debris,
+            edge=None if self.edges is None else self.edges.distance(pressure > 0 if touching is None else touching),
         )
 
     def wear_at(self, conditions: ContactConditions) -> LocalWear:

@@ -12,7 +12,6 @@ from fenwear import Tribosystem, assemble, load_case, steady
 from fenwear.arrays import Array
 from fenwear.cycle import Block, evolve, growth_rate, march
 from fenwear.cycle.stability import _lies_after, phase_tangent
-from fenwear.sliding.wear import WornDepths
 
 WORN = {"gross-sliding": 1e-6, "coulomb": 2e-5}  # 1/MPa: the scar grows by some nodes
 EDGES = "contact.third_body={share=0.9, life='30 mm', edge_life='0.3 mm', edge_length='0.02 mm'}"

@@ -289,8 +289,7 @@ class Case(Part):
             if self.contact.lubrication is not None:
                 key, value = self.contact.lubrication.given
                 given[f"contact.lubrication.{key}"] = value
-            if self.contact.third_body is not None:
-                given["contact.third_body.life"] = self.contact.third_body.life
+            given["contact.third_body.life"] = getattr(self.contact.third_body, "life", None)
             for body, law in self.wear.by_body.items():
                 if law is not None:
                     given[f"wear.{body}.{law.coefficient_key}"] = law.given_coefficient
@@ -305,21 +304,25 @@ class Case(Part):
                 for name, material in self.materials.items()
                 for key in material.dependent
             ]
-        if self.contact.third_body is None:
-            felt: dict[str, Any] = {"contact.friction": self.contact.friction}
-            pairs = self.wear.by_body.items()
-            felt |= {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in pairs if law}
-            problems += [
-                f"{key}: depends on the thickness of debris, which a case without contact.third_body does not know"
-                for key, value in felt.items()
-                if isinstance(value, Dependence) and value.depends_on("debris")
-            ]
-        problems += self._region_problems()
+        problems += self._debris_problems() + self._region_problems()
         friction = self.contact.friction
         for body, law in self.wear.by_body.items():
             if law is not None and (law.beta, law.energy) != (None, None) and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
+
+    def _debris_problems(self) -> list[str]:
+        """Return which coefficients ask for the thickness of debris where there is none."""
+        if self.contact.third_body is not None:
+            return []
+        felt: dict[str, Any] = {"contact.friction": self.contact.friction}
+        pairs = self.wear.by_body.items()
+        felt |= {f"wear.{body}.{law.coefficient_key}": law.given_coefficient for body, law in pairs if law}
+        return [
+            f"{key}: depends on the thickness of debris, which a case without contact.third_body does not know"
+            for key, value in felt.items()
+            if isinstance(value, Dependence) and value.depends_on("debris")
+        ]
 
     def _region_problems(self) -> list[str]:
         """Return what is wrong with coefficients that are given by regions."""

@@ -168,8 +168,8 @@ class PhaseStep:
     ) -> LayerEvolution:
         """Take friction and wear at this pressure, and at temperature and depths at the start of the phase.
 
-        Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes that
-        touch, by default those that carry this pressure.
+        Where it is that of the end, the states of laws are those at the end. Edges of the contact are those of nodes
+        that touch, by default those that carry this pressure.
         """
         system = self.system
         surfaces = None

@@ -444,19 +444,7 @@ def phase_tangent(
     by_mu = PressureCompliance(interface, further - friction_ratio).matrix()  # all are linear in mu
     balance_by_mu = rigid.equilibrium(further) - rigid.equilibrium(friction_ratio)
     traction_p, traction_s = pressure * laws.mu_p, pressure[:, None] * laws.mu_s
-    of_heat = 0 if heat is None else heat.dim
-    gap_rows: Array = np.zeros((n, dim))
-    state_s: Array = np.zeros((dim, dim))
-    state_p: Array = np.zeros((dim, n))
-    if heat is not None:
-        gap_rows[:, :of_heat] = heat.gap_rows[phase]
-        if conductance is None:
-            conductance = heat.exchange.conductance(pressure)
-        state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
-    before_s: Array = np.zeros((n, dim))  # gap by the state at the start of the phase
-    if laws.lies is not None:
-        state_p[of_heat:], state_s[of_heat:] = laws.lies
-        (gap_rows if implicit else before_s)[:, of_heat:] = -np.eye(n)
+    gap_rows, before_s, state_s, state_p = _goes_on(laws, phase, pressure, heat, state, conductance, implicit=implicit)
     if creep is not None:
         crept = _creeping(creep, phase, (friction_ratio, further), traction_p, traction_s)
         none: Array = np.zeros((n, len(crept.stays)))
@@ -489,6 +477,36 @@ def phase_tangent(
     change[:dim] += state_p @ answer
     change[dim:] += laws.worn_p @ answer
     return change
+
+
+def _goes_on(
+    laws: _Laws,
+    phase: int,
+    pressure: Array,
+    heat: CycleHeat | None,
+    state: HeatState | None,
+    conductance: Array | None,
+    *,
+    implicit: bool,
+) -> tuple[Array, Array, Array, Array]:
+    """Return what the state of heat and debris does in a phase.
+
+    Returns:
+        The gap by it at the end and at the start of the phase (n, dim), and itself at the end by what it was at the
+        start (dim, dim) and by the pressure (dim, n).
+    """
+    n, dim = laws.mu_s.shape
+    of_heat = 0 if heat is None else heat.dim
+    gap_rows, before_s, state_s, state_p = (np.zeros(shape) for shape in ((n, dim), (n, dim), (dim, dim), (dim, n)))
+    if heat is not None:
+        gap_rows[:, :of_heat] = heat.gap_rows[phase]
+        if conductance is None:
+            conductance = heat.exchange.conductance(pressure)
+        state_s[:of_heat], state_p[:of_heat] = _heated(heat, phase, pressure, state, laws, conductance)
+    if laws.lies is not None:
+        state_p[of_heat:], state_s[of_heat:] = laws.lies
+        (gap_rows if implicit else before_s)[:, of_heat:] = -np.eye(n)
+    return gap_rows, before_s, state_s, state_p
 
 
 class _Creeping(NamedTuple):

@@ -339,8 +339,8 @@ class Coupled:
         assert self._passing is not None
         if passing is None:
             return np.asarray(self._passing.resting(pressure))
-        added, _ = self._passing.debris_changes(pressure, passing.before, passing.cycles)
-        return np.asarray(self.system.layers.thickness(passing.before) + passing.cycles * added)
+        before = np.asarray(self.system.layers.thickness(passing.before))
+        return before + passing.cycles * self._passing.debris_changes(pressure, passing.before, passing.cycles)[0]
 
     def _update(
         self,

@@ -375,8 +375,8 @@ def _laws(
 
     wear = system.wear.phases([at(*around)], [phase])
     mu_p, *mu_t = _slopes(friction, around)
-    worn = _slopes(depths, around)
-    worn_p, *worn_t = (_opened(wear, slope) for slope in worn)
+    by_depths = _slopes(depths, around)
+    worn_p, *worn_t = (_opened(wear, slope) for slope in by_depths)
     picked, rate = _picked(heat, phase, n), heating_friction(system, np.ones(n), phase)
     mu_s: Array = (np.array(mu_t[:2])[:, :, None] * picked).sum(axis=0)
     worn_s: Array = (np.array(worn_t[:2]) @ picked).sum(axis=0)
@@ -391,7 +391,7 @@ def _laws(
         return values[-1] + debris.over(path, [at(*values)]).change(values[-1], taken)[0]
 
     over = debris.over(path, [conditions])
-    lies_p, *lies_t, lies_lies = (over.slope(None)[0] * slope.sum(axis=0) for slope in worn)
+    lies_p, *lies_t, lies_lies = (over.slope(None)[0] * slope.sum(axis=0) for slope in by_depths)
     if system.layers.varies:
         by_loss = _slopes(thickness, around)
         lies_p, lies_lies = lies_p + by_loss[0], lies_lies + by_loss[3]

@@ -86,16 +86,17 @@ def _of_time_steps(last: Block, steps: Steps) -> TableCycle:
 PRINCIPAL = tuple(f"principal_{axis}" for axis in "xyz")
 
 
+_OVER = ("half_cycle", "x")
+_MOST = "direction with most of the work of friction in a cycle"
+VARIABLES: dict[str, tuple[tuple[str, ...], str, str]] = {
+    "cross_shear": (_OVER, "1", "cross-shear ratio of a cycle on the punch: share of the work across its direction"),
+    **{name: (_OVER, "1", f"{_MOST}, along {name[-1]}") for name in PRINCIPAL},
+}
+
+
 def variables(placed: ContactSetup) -> dict[str, tuple[tuple[str, ...], str, str]]:
     """Return the variables of a history of solids that slide in directions of their own at each place."""
-    if not placed.slides_many_ways:
-        return {}
-    over = ("half_cycle", "x")
-    of_cycle = "direction with most of the work of friction in a cycle"
-    return {
-        "cross_shear": (over, "1", "cross-shear ratio of a cycle on the punch: share of the work across its direction"),
-        **{name: (over, "1", f"{of_cycle}, along {name[-1]}") for name in PRINCIPAL},
-    }
+    return VARIABLES if placed.slides_many_ways else {}
 
 
 def values(block: Block) -> dict[str, Array]:

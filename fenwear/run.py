@@ -12,7 +12,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fenwear.arrays import Mask
-from fenwear.assembly import Preparation, Tribosystem, renewed
+from fenwear.assembly import Preparation, Tribosystem, regridded, renewed
 from fenwear.case import Case, plausibility_warnings
 from fenwear.cycle import (
     Block,
@@ -24,7 +24,7 @@ from fenwear.cycle import (
     stationary_growth,
 )
 from fenwear.cycle.program import at_loads
-from fenwear.cycle.state import RunState, joined
+from fenwear.cycle.state import RunState, joined, on_other_grid
 from fenwear.cycle.totals import none_yet
 from fenwear.errors import (
     CaseError,
@@ -55,6 +55,7 @@ from fenwear.results.history import (
     HISTORY,
     HistoryWriter,
     free_directory,
+    grid_of,
     make_directory,
     write_case,
     write_summary,
@@ -185,16 +186,25 @@ class _Run:
         self.watch = StateMonitor(system)
         start: RunState | None = None
         if resume:
+            grid = checkpoint.grid(directory, system)
+            if grid is not None:
+                system = regridded(system, grid)
             followed = checkpoint.followed(directory, system)
             warmed = checkpoint.warmed(directory, system)
             if followed is not None or warmed is not None:
                 system = renewed(system, followed, warmed)
             start = checkpoint.load(directory, system)
+            laid = on_root(self.comm, lambda: grid_of(directory, system))
+            if laid is not None and laid != system.pair.punch.grid:  # killed just after it had grown
+                before, system = system, regridded(system, laid)
+                start = on_other_grid(start, before, system)
             if start.half_cycle >= self.case.run.half_cycles:
                 message = f"the run is at half-cycle {start.half_cycle} already; expected more to go on to"
                 raise CaseError(InputError("run.half_cycles", message))
         else:
             on_root(self.comm, lambda: make_directory(directory))
+        if system.pair.punch.grid != self.watch.system.pair.punch.grid:
+            self.watch.move(system)
         self.system = system
         on_root(self.comm, lambda: write_case(directory, self.case))
         self.writer: HistoryWriter | None = None  # of rank 0
@@ -299,6 +309,8 @@ class _Run:
     def _take(self, block: Block) -> None:
         if block.system.bodies.followed is not self.system.bodies.followed:
             self.log(f"after half-cycle {self.state.half_cycle:,} the meshes follow the worn shape")
+        elif block.system.pair.punch.grid != self.system.pair.punch.grid:
+            self._take_grid(block.system)
         elif block.system.bodies.warmed is not self.system.bodies.warmed:
             self.log(f"after half-cycle {self.state.half_cycle:,} properties are those of the temperatures there")
         if block.system.exchange is not self.system.exchange:
@@ -321,6 +333,16 @@ class _Run:
         self._on_history(lambda writer: writer.add(block))
         if int(block.half_cycle[-1]) in self._fields_at:
             self._write_fields(block)
+
+    def _take_grid(self, system: Tribosystem) -> None:
+        """Go on with another contact grid; collective."""
+        grid, before = system.pair.punch.grid, self.system
+        if grid is None:
+            return
+        nodes, step = " x ".join(map(str, grid.counts)), max(grid.spacing)
+        self.log(f"after half-cycle {self.state.half_cycle:,} the contact grid has {nodes} nodes, {step:.3g} mm apart")
+        self.watch.move(system)
+        self._on_history(lambda writer: writer.relay(before, system))
 
     def _tell_remedies(self, block: Block) -> None:
         for name, count in block.remedies.items():

@@ -17,6 +17,7 @@ from fenwear.errors import CaseError
 LONGEST = 400  # phases that are marched again one by one; longer runs go by jumps
 TOLERANCE = 1e-3  # of these jumps
 FEWEST = 9  # nodes of a contact grid that is coarsened
+LEAST = 8  # nodes across a contact whose grid grows
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,11 @@ class Again:
 
 def coarser(case: Case) -> Case | None:
     """Return the case on elements of the next lower degree, on a grid with half the nodes; None where there is none."""
-    if case.grid is not None:
-        return changed(case, grid={"nodes": (case.grid.nodes - 1) // 2 + 1}) if case.grid.nodes >= FEWEST else None
+    grid = case.grid
+    if grid is not None and grid.across is not None:
+        return changed(case, grid={"across": grid.across // 2}) if grid.across >= 2 * LEAST else None
+    if grid is not None and grid.nodes is not None:
+        return changed(case, grid={"nodes": (grid.nodes - 1) // 2 + 1}) if grid.nodes >= FEWEST else None
     degree = case.geometry.degree
     return None if degree == 1 else changed(case, geometry={"degree": degree - 1})
 

@@ -15,6 +15,8 @@ from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elas
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import Clock, ContactSetup, place, place_at_rest
 from fenwear.assembly.creep import Creep, CreepStage
+from fenwear.assembly.growing import at_rim, carried, grows, kept_volume, node_maps, on_first_contact, on_nodes, outgrown
+from fenwear.assembly.growing import regridded
 from fenwear.assembly.laws import law_named, register_contact_law
 from fenwear.assembly.resource_report import body_lines, resources_text
 from fenwear.assembly.resources import Resources, body_resources
@@ -52,21 +54,29 @@ __all__ = [
     "Sliding",
     "Tribosystem",
     "assemble",
+    "at_rim",
     "body_lines",
     "body_resources",
     "build_bodies",
     "build_conduction",
+    "carried",
     "choose_solvers",
     "elastic",
     "elastic_body",
     "expansions",
     "friction_power",
+    "grows",
     "heating_friction",
     "heating_frictions",
     "in_parts",
     "joined",
+    "kept_volume",
     "law_named",
     "make_sliding",
+    "node_maps",
+    "on_first_contact",
+    "on_nodes",
+    "outgrown",
     "place",
     "place_at_rest",
     "place_case",
@@ -74,6 +84,7 @@ __all__ = [
     "properties_outdated",
     "property_change",
     "register_contact_law",
+    "regridded",
     "renewed",
     "resources_of",
     "resources_text",

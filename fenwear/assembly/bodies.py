@@ -156,13 +156,18 @@ def build_bodies(
         body.surface = replace(body.surface, made=before)
     check_coatings(case, punch, strip)
     lay_grids(case, make_sliding(case), punch, strip)
-    regions = contact_regions(punch), contact_regions(strip)
+    heat = build_conduction(case, punch, strip, warmed)
+    return with_surfaces(case, Bodies(punch, strip, heat, followed, moved, warmed=warmed))
+
+
+def with_surfaces(case: Case, bodies: Bodies) -> Bodies:
+    """Return the bodies with what their contact nodes are made of; collective."""
+    regions = contact_regions(bodies.punch), contact_regions(bodies.strip)
     of_punch, of_strip = (
         contact_density(shares, {region: case.materials[name].density for region, name in description.regions.items()})
         for shares, description in zip(regions, (case.punch, case.strip), strict=True)
     )
-    heat = build_conduction(case, punch, strip, warmed)
-    return Bodies(punch, strip, heat, followed, moved, regions, (of_punch, of_strip), warmed)
+    return replace(bodies, regions=regions, densities=(of_punch, of_strip))
 
 
 def _owners(case: Case, comm: MPI.Comm) -> tuple[int, int] | None:
@@ -221,7 +226,7 @@ def elastic_body(case: Case, mesh: BodyMesh, description: Body, theta: Array | N
     at_mean = description.model_copy(update={"loads": tuple(load.mean() for load in case.loads_of(mesh.name))})
     body = ElasticBody(mesh, at_mean, law, case.geometry.degree, case.model.thickness, case.setup)
     if description.profile is not None:
-        body.surface = profiled(body.surface, np.array(description.profile.points))
+        body.surface = body.meshed = profiled(body.surface, np.array(description.profile.points))
     return body
 
 

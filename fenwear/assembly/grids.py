@@ -26,6 +26,9 @@ from fenwear.interface.patches import facet_side
 from fenwear.interface.transfer import dual_transfer
 
 MARGIN = 1e-9  # of the grid's sides: rounding of the strip's surface at its ends
+REACH = 65  # nodes along the longer side of the largest grid, from which the first contact is looked for
+
+Both = tuple[ElasticBody, ElasticBody]  # punch and strip
 
 
 def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody) -> None:
@@ -44,20 +47,38 @@ def lay_grids(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBo
         raise CaseError(InputError("grid", "expected contact surfaces that look at each other along one axis"))
     level = float(opposite * (surfaces[1].trace[:, axis] * opposite).max())
     own = _grid(case.grid, punch.surface, axis, level)
-    for body, grid, outward in (
-        (punch, own, side),
-        (strip, _reached(own, sliding), opposite),
-    ):
-        reading = _reading(body, grid)
-        depth = outward * (level - reading @ body.surface.trace[:, axis])
-        if body.surface.profile is not None:
-            depth = depth + reading @ (body.surface.extension @ body.surface.profile)
-        topography = (case.punch if body is punch else case.strip).topography
-        if topography is not None:
-            heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
-            depth = depth + heights.max() - heights
-        surface = surface_on(body.body.name, grid, outward, depth)
-        body.lay_grid(surface, _mortar(body, grid) if body.operator == CONDENSED else reading)
+    for body, grid in ((punch, own), (strip, _reached(own, sliding))):
+        surface, reading = _laid(case, body, grid)
+        body.lay_grid(surface, reading, None if case.grid.across is None else grid)
+
+
+def on_grid(case: Case, sliding: Sliding, punch: ElasticBody, strip: ElasticBody, grid: RegularGrid) -> Both:
+    """Return both bodies on another grid of the punch, that of the strip as much longer as the punch reaches.
+
+    Raises:
+        CaseError: a grid reaches beyond the surface.
+    """
+    on_punch, on_strip = _laid(case, punch, grid), _laid(case, strip, _reached(grid, sliding))
+    return punch.on_grid(*on_punch), strip.on_grid(*on_strip)
+
+
+def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurface, csr_array]:
+    """Return the contact surface of a body on a grid, and what takes values at the trace nodes of its mesh to it.
+
+    Raises:
+        CaseError: the grid reaches beyond the surface.
+    """
+    meshed, (axis, outward) = body.meshed, facet_side(body.meshed)
+    reading = _reading(body, grid)
+    depth = outward * (grid.level - reading @ meshed.trace[:, axis])
+    if meshed.profile is not None:
+        depth = depth + reading @ (meshed.extension @ meshed.profile)
+    topography = case.bodies[body.body.name].topography
+    if topography is not None:
+        heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
+        depth = depth + heights.max() - heights
+    surface = surface_on(body.body.name, grid, outward, depth)
+    return surface, _mortar(body, grid) if body.operator == CONDENSED else reading
 
 
 def surface_on(name: str, grid: RegularGrid, outward: float, depth: Array) -> ContactSurface:
@@ -89,11 +110,12 @@ def _grid(wanted: Grid, surface: ContactSurface, axis: int, level: float) -> Reg
     for key, value in (("size", wanted.size), ("middle", wanted.middle)):
         if value is not None and len(value) != len(low):
             raise CaseError(InputError(f"grid.{key}", f"expected {len(low)} length(s), got {len(value)}"))
-    whole = (high - low) * (wanted.nodes - 1) / (wanted.nodes + 1)  # the strip's goes on by whole spacings
+    nodes = REACH if wanted.nodes is None else wanted.nodes
+    whole = (high - low) * (nodes - 1) / (nodes + 1)  # the strip's goes on by whole spacings
     sides = whole if wanted.size is None else np.array(wanted.size)
     middle = (low + high) / 2 if wanted.middle is None else np.array(wanted.middle)
-    spacing = sides.max() / (wanted.nodes - 1)
-    counts = np.maximum(np.floor(sides / spacing + MARGIN * wanted.nodes), 1).astype(np.int64) + 1
+    spacing = sides.max() / (nodes - 1)
+    counts = np.maximum(np.floor(sides / spacing + MARGIN * nodes), 1).astype(np.int64) + 1
     steps = sides / (counts - 1)
     corner = middle - steps * (counts - 1) / 2
     return RegularGrid(tuple(corner), tuple(steps), tuple(int(k) for k in counts), axis, level)
@@ -122,7 +144,7 @@ def _mortar(body: ElasticBody, grid: RegularGrid) -> csr_array:
 
 def _charted(body: ElasticBody, grid: RegularGrid) -> ChartedSurface:
     """Return the contact surface of a body's mesh in the plane of a grid."""
-    surface = body.surface
+    surface = body.meshed
     s = np.delete(surface.trace, grid.normal, axis=1)
     return ChartedSurface(s, surface.facets, surface.cell, surface.degree, surface.nodes)
 

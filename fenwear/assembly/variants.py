@@ -10,6 +10,7 @@ from fenwear.arrays import Array
 from fenwear.assembly.bodies import build_bodies
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import ContactSetup, place
+from fenwear.assembly.growing import on_first_contact
 from fenwear.assembly.laws import law_named
 from fenwear.assembly.strokes import make_sliding
 from fenwear.assembly.tribosystem import (
@@ -66,7 +67,7 @@ def renewed(
         MeshQualityError: an element does not survive the motion of its mesh.
     """
     law: ContactLaw = system.contact_law
-    return law.renewed(system, build_bodies(system.case, system.comm, followed, warmed))
+    return on_first_contact(law.renewed(system, build_bodies(system.case, system.comm, followed, warmed)))
 
 
 def place_case(

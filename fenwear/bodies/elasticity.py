@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
@@ -22,6 +23,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.assembly import assembled, assembled_vector, compiled
 from fenwear.bodies.contact_surface import ContactSurface, contact_surface
 from fenwear.bodies.factor import Factor, make_together
+from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.guides import GuideAnswer, make_guides
 from fenwear.bodies.low_rank import LowRank
 from fenwear.bodies.material import ElasticLaw, measure, strain_of
@@ -37,6 +39,19 @@ PREFIX = "fenwear_elasticity_"
 # A factor on one rank, or over all where it is large; over all in any case; compressed; conjugate gradients.
 Solver = Literal["factor", "spread factor", "low-rank", "multigrid"]
 BY_SIZE = Setup()
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far the grid of a contact surface may grow.
+
+    Attributes:
+        grid: The largest, of any spacing.
+        reading: What takes values at the trace nodes of the mesh to its nodes (n, N_mesh).
+    """
+
+    grid: RegularGrid
+    reading: csr_array
 
 
 class ElasticBody:
@@ -62,7 +77,9 @@ class ElasticBody:
         operator: Name of how its contact surface answers to forces.
         creep: How its compliance grows under load; None where it does not.
         surface: The contact surface: the trace of the mesh, or a grid of its own (see `lay_grid`).
+        meshed: The trace of the mesh.
         reading: Of a grid, what takes values at the trace nodes of the mesh to its nodes (N, N_mesh); else None.
+        reach: How far that grid may grow; None where it stays.
         setup: How it is condensed.
         solver: What solves for its columns; set before the first solution, by the memory that there is.
         holders: How many ranks have its factor at once and share its columns; set likewise.
@@ -102,7 +119,9 @@ class ElasticBody:
         element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(dim,))
         self.space = fem.functionspace(mesh, element)
         self.surface, self.trace = contact_surface(body, self.space, measure(mesh, law.kind))
+        self.meshed = self.surface
         self.reading: csr_array | None = None
+        self.reach: Reach | None = None
         self._held = held = Supports(body, self.space, description, law.kind, self.trace)
         self.pivot, self.rigid_modes, self.mode_names = held.pivot, held.modes, held.names
         self._bcs, self.supported, self.imposed = held.conditions, held.held, held.imposed
@@ -118,6 +137,7 @@ class ElasticBody:
         self._set_loads(description.loads)
         # None or one of each, of all bodies that differ by their loads.
         self._answers: list[GuideAnswer] = []
+        self.known: dict[bytes, Any] = {}  # what an operator has solved for that does not depend on the grid
         self._factors: list[Factor] = []
         self._substructures: list[Substructures] = []
 
@@ -159,14 +179,23 @@ class ElasticBody:
             return np.zeros((*self.surface.trace.shape, 0))
         return self.on_surface(self.trace.pick(np.array(self.rigid_modes).T))
 
-    def lay_grid(self, surface: ContactSurface, reading: csr_array) -> None:
+    def lay_grid(self, surface: ContactSurface, reading: csr_array, reach: RegularGrid | None = None) -> None:
         """Let its contact surface be a grid of its own.
 
         Args:
             surface: The grid.
             reading: What takes values at the trace nodes of the mesh to it (N, N_mesh).
+            reach: How far it may grow, for which this is the reading, too; None where it stays.
         """
         self.surface, self.reading = surface, reading
+        self.reach = None if reach is None else Reach(reach, reading)
+
+    def on_grid(self, surface: ContactSurface, reading: csr_array) -> ElasticBody:
+        """Return the same body on another grid, as `lay_grid`, with the same stiffness and factor."""
+        body = copy.copy(self)
+        body.__dict__.pop("rigid_motion", None)
+        body.surface, body.reading = surface, reading
+        return body
 
     def on_surface(self, values: Array) -> Array:
         """Return values at the trace nodes of the mesh (N_mesh, ...) at those of the contact surface (N, ...)."""

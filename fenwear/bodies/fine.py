@@ -45,7 +45,7 @@ class FineBody:
 
     Attributes:
         half: The half-space, on the nodes of the grid.
-        grid: Where the correction is known.
+        grid: Where the correction is known: the contact's grid, or how far it may grow.
         correction: Between its points.
         weights: L, from values at the points to the nodes.
         unresolved: What the correction's polynomials leave out, over the half-space's mean compliance over the grid.
@@ -93,7 +93,8 @@ class FineBody:
     def at(self, x: Array) -> FineBody:
         """Return the same with its nodes at other places of the body (q, d), mm."""
         half = self.half.at(x)
-        return replace(self, half=half, weights=at_nodes(self.correction, self.grid, half.places, x[:, self.grid.axes]))
+        weights = at_nodes(self.correction, self.grid, half.places, x[:, self.grid.axes], half.spacing)
+        return replace(self, half=half, weights=weights)
 
     def apply(self, forces: Array) -> Array:
         """Return the displacements (q, a, ...), mm, of forces (q, d, ...), N, in the plane N/mm."""
@@ -128,12 +129,22 @@ def by_loads(elastic: ElasticBody, correction: Correction, along: Array) -> Arra
     return np.asarray(own @ along.T)
 
 
-def at_nodes(correction: Correction, grid: RegularGrid, places: NDArray[np.int64], x: Array) -> TensorWeights:
-    """Return what takes values at the points of a correction to nodes x (q, d - 1), mm, at places of their own grid."""
+def at_nodes(
+    correction: Correction, grid: RegularGrid, places: NDArray[np.int64], x: Array, spacing: Sequence[float]
+) -> TensorWeights:
+    """Return what takes values at the points of a correction to nodes.
+
+    Args:
+        correction: Between its points.
+        grid: Over which these stand.
+        places: Of the nodes along the axes of their own grid (q, d - 1).
+        x: Of the nodes (q, d - 1), mm.
+        spacing: Of their grid, mm.
+    """
     low, factors = places.min(axis=0), []
     for k, count in enumerate(correction.counts):
         first = x[np.argmin(places[:, k]), k]
-        along = first + grid.spacing[k] * np.arange(np.ptp(places[:, k]) + 1)
+        along = first + spacing[k] * np.arange(np.ptp(places[:, k]) + 1)
         factors.append(interpolation(count, grid.corner[k], grid.corner[k] + grid.sides[k], along))
     return TensorWeights(tuple(factors), places - low)
 
@@ -168,16 +179,23 @@ def fine(request: Request) -> FineBody:
         depth=ground.depth,
         along=along,
     )
-    correction, unresolved = _resolved(elastic, ground, half.directions[0].T, key)
-    weights = at_nodes(correction, grid, half.places, x)
-    correction = replace(correction, guided=_guided(request, correction.moments, weights))
-    loaded = by_loads(elastic, correction, half.directions[0])
-    correction = _held(correction, half.directions[0])
-    elastic.free_factor()
-    return FineBody(half, grid, correction, weights, unresolved, loaded)
+    direction = np.ascontiguousarray(half.directions[0])
+    found = elastic.known.get(direction.tobytes())
+    if found is None:
+        correction, unresolved = _resolved(elastic, ground, direction.T, key)
+        guided = _guided(request, correction, at_nodes(correction, ground.grid, half.places, x, grid.spacing))
+        found = _held(replace(correction, guided=guided), direction), unresolved
+        elastic.free_factor()
+        if elastic.reach is not None:  # it stays while the grid grows
+            elastic.known[direction.tobytes()] = found
+    correction, unresolved = found
+    weights = at_nodes(correction, ground.grid, half.places, x, grid.spacing)
+    return FineBody(half, ground.grid, correction, weights, unresolved, by_loads(elastic, correction, direction))
 
 
-def _guided(request: Request, moments: Array, weights: TensorWeights) -> tuple[GuideAnswer, Array, Array] | None:
+def _guided(
+    request: Request, correction: Correction, weights: TensorWeights
+) -> tuple[GuideAnswer, Array, Array] | None:
     """Return what a body answers to its guides, and rotations and displacements by couples at points; collective.
 
     The correction is of supports at points, about which couples turn the body far: what turns goes by the moments that
@@ -185,18 +203,22 @@ def _guided(request: Request, moments: Array, weights: TensorWeights) -> tuple[G
 
     Args:
         request: Of the body.
-        moments: Of unit forces at points about what guides hold (m, d, g).
+        correction: With the moments of unit forces at its points about what guides hold (m, d, g).
         weights: L, from values at the points to the nodes, of a whole grid.
 
     Returns:
         Of the whole body, and (m, d, g) of each at the points.
     """
-    elastic = request.elastic
-    answer = elastic.guide_answer
+    elastic, moments = request.elastic, correction.moments
+    answer, reach = elastic.guide_answer, elastic.reach
     if answer is None:
         return None
     bent = answer.moved_there - answer.rotations_there @ answer.turning
-    seen = request.seen(elastic.on_surface(bent))
+    if reach is None:
+        seen = request.seen(elastic.on_surface(bent))
+    else:
+        seen = np.asarray(reach.reading @ bent.reshape(len(bent), -1))
+        weights = at_nodes(correction, reach.grid, reach.grid.places, reach.grid.flat, reach.grid.spacing)
     fit = weights.fitted(seen.reshape(len(seen), -1))
     return answer, moments, fit.reshape(moments.shape) + moments @ answer.turning
 
@@ -281,6 +303,8 @@ def _ground(elastic: ElasticBody, key: str) -> Ground:
         CaseError: several materials touch, or the body is not isotropic.
     """
     grid, comm = elastic.surface.grid, elastic.body.mesh.comm
+    if elastic.reach is not None:
+        grid = elastic.reach.grid
     assert grid is not None
     if not isinstance(elastic.law, Isotropic):
         raise CaseError(InputError(key, "expected 'condensed' for a stress of one's own: 'fine' is isotropic"))

@@ -7,7 +7,7 @@ the slope of a curved surface changes is of the order of the square of contact w
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -52,6 +52,16 @@ class RegularGrid:
         """Its middle (d - 1,), mm."""
         return np.array(self.corner) + self.sides / 2
 
+    @property
+    def numbers(self) -> Array:
+        """Corner, spacing and counts (3, d - 1): all that grids of one plane differ by."""
+        return np.array([self.corner, self.spacing, self.counts])
+
+    def with_numbers(self, numbers: Array) -> RegularGrid:
+        """Return the grid of this plane with other ones."""
+        corner, spacing, counts = (tuple(float(one) for one in row) for row in numbers)
+        return replace(self, corner=corner, spacing=spacing, counts=tuple(int(one) for one in counts))
+
     @cached_property
     def flat(self) -> Array:
         """Coordinates of the nodes along the grid (n, d - 1), mm, the first axis the slowest."""
@@ -71,6 +81,26 @@ class RegularGrid:
             own = np.full(count, step)
             own[[0, -1]] /= 2
             whole = np.multiply.outer(whole, own).ravel()
+        return whole
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """Whole numbers of the nodes along its axes (n, d - 1), from 0."""
+        return np.indices(self.counts).reshape(len(self.counts), -1).T
+
+    def of_other(self, other: RegularGrid) -> NDArray[np.int64]:
+        """Return the node of another grid, as fine or finer, at the place of each node here (n,); -1 for none.
+
+        Args:
+            other: A grid whose lines go through all nodes here that it reaches.
+        """
+        whole: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+        for k, count in enumerate(other.counts):
+            away = self.corner[k] + self.spacing[k] * np.arange(self.counts[k]) - other.corner[k]
+            at = np.rint(away / other.spacing[k]).astype(np.int64)
+            within = (at >= 0) & (at < count)
+            known = np.logical_and.outer(whole >= 0, within)
+            whole = np.where(known, np.add.outer(whole * count, at), -1).ravel()
         return whole
 
     @property

@@ -68,17 +68,31 @@ class Geometry(Part):
 class Grid(Part):
     """A regular grid of contact nodes in the tangent plane of the contact, whatever the meshes are there."""
 
-    nodes: Annotated[int, Field(ge=5, le=2049, strict=True)] = Field(
-        default=65, description="along the longer side of the grid"
+    nodes: Annotated[int, Field(ge=5, le=2049, strict=True)] | None = Field(
+        default=None, description="along the longer side of a grid that stays; by default 65"
+    )
+    across: Annotated[int, Field(ge=8, le=1024, strict=True)] | None = Field(
+        default=None,
+        description="in place of nodes: along the longer side of the first contact, such as 64; the grid begins "
+        "around it, grows with the scar up to size, and coarsens where there are twice as many",
     )
     size: Annotated[tuple[Annotated[Length, Field(gt=0)], ...], Field(min_length=1, max_length=2)] | None = Field(
         default=None,
-        description="its sides, [x] in the plane and [x, y] in solids; by default those of the "
-        "contact, less a spacing at each end",
+        description="its sides, [x] in the plane and [x, y] in solids, or with across the largest; by default those of "
+        "the contact, less a spacing at each end",
     )
     middle: Annotated[tuple[Length, ...], Field(min_length=1, max_length=2)] | None = Field(
         default=None, description="where its middle is; by default that of the contact surface"
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_number(cls, data: object) -> object:
+        if not isinstance(data, Mapping) or data.get("across") is None:
+            return {"nodes": 65, **data} if isinstance(data, Mapping) else data
+        if data.get("nodes") is not None:
+            raise ValueError("across: expected either nodes, of a grid that stays, or across, of one that grows")
+        return data
 
 
 class Model(Part):

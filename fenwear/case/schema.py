@@ -130,9 +130,25 @@ class Case(Part):
             f"grid: missing, but required with {name}.topography: the nodes that have its heights" for name in bare
         ]
         grid = lacking + [f"grid: expected none {why}" for why, so in against.items() if so and self.grid is not None]
+        grid += self._growing_problems()
         return grid + [
             f"{name}.operator: expected '{CONDENSED}' {why}" for name in others for why, so in against.items() if so
         ]
+
+    def _growing_problems(self) -> list[str]:
+        """Return what does not go with a contact grid that grows."""
+        if self.grid is None or self.grid.across is None:
+            return []
+        meshed = [name for name, body in self.bodies.items() if body.operator == CONDENSED]
+        rough = [name for name, body in self.bodies.items() if body.topography is not None]
+        against = {
+            f"with {' and '.join(f'{name}.operator' for name in meshed)} = '{CONDENSED}', one solution for each node; "
+            "or 'fine'": bool(meshed),
+            f"with {' and '.join(f'{name}.topography' for name in rough)}, which a coarser grid would lose": bool(rough),
+            "with a program": self.program is not None,
+            "with creep": any(body.creep is not None for body in self.bodies.values()),
+        }
+        return [f"grid.across: expected grid.nodes, of a grid that stays, {why}" for why, so in against.items() if so]
 
     def _kind_problems(self) -> list[str]:
         """Return what does not go with a plane, an axisymmetric or a solid model."""
@@ -437,6 +453,9 @@ class Case(Part):
             ),
             "wear: expected coefficients of coating and base that go by one ratio: constants, or energies,": any(
                 law.coating is not None and not self._one_ratio(law) for law in self.wear.laws
+            ),
+            "grid.across: expected grid.nodes, of a grid that stays,": (
+                self.grid is not None and self.grid.across is not None
             ),
             "stick.force: expected none for a motion that turns": (
                 self.stick.force is not None and isinstance(self.motion, Oscillation)

@@ -1,4 +1,4 @@
-"""What changes slowly: the run goes on with meshes that follow the worn shape, and with properties of its temperature.
+"""What changes slowly: meshes follow the worn shape, contact grids the contact, properties the temperature.
 
 Small wear is an offset of the gap. When it grows past a share of the elements' height at the contact,
 both meshes move by the depths worn so far, all operators are made anew, and temperatures keep their
@@ -21,10 +21,19 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem, properties_outdated, renewed, warmed_system, warming_key
+from fenwear.assembly import (
+    Tribosystem,
+    outgrown,
+    properties_outdated,
+    regridded,
+    renewed,
+    warmed_system,
+    warming_key,
+)
 from fenwear.bodies.assembly import interpolate
+from fenwear.bodies.grid import RegularGrid
 from fenwear.cycle.block import Block
-from fenwear.cycle.state import RunState
+from fenwear.cycle.state import RunState, carried_by, on_other_grid
 from fenwear.heat.field import HeatState
 
 # Runs a system from a state, or the beginning, and leaves at the first state for which it is told to.
@@ -59,6 +68,9 @@ def follow(
             system = moved
         elif state is not None and state.temperature is not None and _is_warm(system, state):
             system = adapt(warmed_system(system, state.temperature))
+        elif state is not None and (grid := _Leaving(system).larger(state)) is not None:
+            before, system = system, regridded(system, grid)
+            state, system = on_other_grid(state, before, system), adapt(system)
 
         leave = _Leaving(system)
         for block in integrate(system, state, leave):
@@ -79,11 +91,17 @@ class _Leaving:
     def __call__(self, state: RunState) -> bool:
         """Return whether wear or warmth is large; collective, or for rank 0 that leads."""
         team = self.system.team
-        return self.is_worn(state) or (bool(warming_key(self.system)) and team.each(self, "is_warm", state))
+        if self.is_worn(state) or self.larger(state) is not None:
+            return True
+        return bool(warming_key(self.system)) and team.each(self, "is_warm", state)
 
     def is_worn(self, state: RunState) -> bool:
         """Return whether the meshes are to follow the wear; collective, or for rank 0 that leads."""
         return self.system.team.lead(partial(self.system.mesh_update_due, state.worn))
+
+    def larger(self, state: RunState) -> RegularGrid | None:
+        """Return the grid that the contact asks for, None where it has room; collective, or for rank 0 that leads."""
+        return self.system.team.lead(lambda: outgrown(self.system, carried_by(state)))
 
     def is_warm(self, state: RunState) -> bool:
         """Return whether a whole cycle ends at temperatures for which properties are to be taken anew; collective."""

@@ -17,11 +17,14 @@ from fenwear.assembly import (
     Preparation,
     Sliding,
     Tribosystem,
+    at_rim,
     build_conduction,
     elastic,
+    grows,
     heating_frictions,
     joined,
     make_sliding,
+    on_first_contact,
     place,
     preparation,
     property_change,
@@ -38,7 +41,7 @@ from fenwear.cycle.jump_error import ORDER
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
-from fenwear.cycle.state import RunState, known_pressures
+from fenwear.cycle.state import RunState, carried_by, known_pressures
 from fenwear.cycle.steady import SteadyState, steady_state
 from fenwear.errors import CaseError, ConvergenceError, InputError
 from fenwear.heat.field import HeatState
@@ -125,6 +128,9 @@ class Jumps:
                 stepper.system.remedies.note(SHORTER_JUMPS)
                 length = max(1, tried // 4)
                 continue
+            if tried > 1 and at_rim(stepper.system, carried_by(end)):  # the grid grows before it is reached
+                length = max(1, tried // 2)
+                continue
             largest = estimate.largest
             factor = SAFETY * (tolerance / max(largest, 1e-300)) ** (1 / (ORDER + 1))
             warmed = tried > 1 and stepper.system.team.each(self, "change", end.temperature) > WARMED
@@ -150,7 +156,7 @@ class GrossSliding:
 
     def of_bodies(self, case: Case, bodies: Bodies, *, heat: Preparation, fresh: bool) -> Tribosystem:
         """Return the system of a case whose bodies are built; collective."""
-        system = elastic(self._placed(case, bodies), fresh=fresh)
+        system = on_first_contact(elastic(self._placed(case, bodies), fresh=fresh))
         if heat == "none":
             return system
         return (with_reduced_heat if heat == "reduced" else with_exchange)(system, keep=True, fresh=fresh)
@@ -223,6 +229,9 @@ class GrossSliding:
 
     def end(self, system: Tribosystem, properties_within: float | None = None) -> SteadyState:
         """Return the cyclic steady state; collective."""
+        if grows(system):
+            message = "expected grid.nodes: the end that wear leads to is looked for on a grid that stays"
+            raise CaseError(InputError("grid.across", message))
         return steady_state(system, properties_within)
 
     def half_cycles(self, system: Tribosystem, watch: Watch, loading: Loading, *, implicit: bool) -> HalfCycles:

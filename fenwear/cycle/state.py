@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.arrays import Array, Mask
+from fenwear.assembly import Tribosystem, carried, node_maps, on_nodes
 from fenwear.contact import ContactState
 from fenwear.cycle.totals import Totals, none_yet
 from fenwear.errors import ConvergenceError
@@ -51,6 +51,37 @@ def with_phases(state: RunState | None, count: int) -> RunState | None:
 def beginning(system: Tribosystem, temperature: HeatState | None) -> RunState:
     """Return the unworn bodies at their initial temperature."""
     return RunState(0, system.unworn(), (None,) * len(system.motion.phases), temperature, none_yet(system))
+
+
+def carried_by(state: RunState) -> Mask:
+    """Return the nodes of the punch that touch in some phase or have worn (n,)."""
+    found: Mask = state.worn.punch > 0
+    for contact in state.contacts:
+        if contact is not None:
+            found = found | (contact.pressure[0] > 0)
+    return found
+
+
+def on_other_grid(state: RunState, before: Tribosystem, after: Tribosystem) -> RunState:
+    """Return the state on another contact grid; worn volumes are kept."""
+    nodes, _ = node_maps(before, after)
+    none, totals = np.zeros(len(nodes)), state.totals
+    contacts = [
+        None
+        if one is None
+        else replace(
+            one, pressure=on_nodes(one.pressure, nodes, none), gap=on_nodes(one.gap, nodes, after.pair.initial_gap)
+        )
+        for one in state.contacts
+    ]
+    return replace(
+        state,
+        worn=carried(state.worn, before, after),
+        contacts=tuple(contacts),
+        totals=replace(
+            totals, energy=on_nodes(totals.energy, nodes, none), pressure=on_nodes(totals.pressure, nodes, none)
+        ),
+    )
 
 
 def joined(contacts: tuple[ContactState | None, ...]) -> ContactState | None:

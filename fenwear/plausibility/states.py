@@ -41,6 +41,10 @@ class StateMonitor:
         self._first = True  # block
         self._thick: dict[str, Array] = {}
 
+    def move(self, system: Tribosystem) -> None:
+        """Look at another contact grid from now on; collective."""
+        self.system, self.limits, self._thick = system, contact_limits(system), {}
+
     def see(self, block: Block) -> list[str]:
         """Take the next block and return what is to be said of it that was not said of an earlier one."""
         case, weights = self.system.case, block.system.pair.weights

@@ -24,7 +24,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from fenwear.arrays import Array
-from fenwear.assembly import Tribosystem
+from fenwear.assembly import Tribosystem, grows
+from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case, OneWay, Rotation
 from fenwear.contact import ContactState
 from fenwear.cycle.state import RunState
@@ -52,6 +53,7 @@ WARMED = "warmed"  # temperatures that the properties of materials are taken at,
 MEMORY, REMEMBERED = "memory", "remembered"  # what a law of contact remembers, and its temperatures
 BULK = "bulk"  # what is on its way back on a closed track; NaN where there is none
 FOLLOWED = ("followed_punch", "followed_strip")  # the wear that the meshes follow, where they do
+GRID = "grid"  # corner, spacing and counts of the contact grid (3, d - 1), where it grows
 BYTES_PER_NODE, BYTES = 56, 65536  # that a temperature with its place takes, and a file beside its values
 # A run may go on farther than it was meant to, and keep other things.
 FREE_KEYS = ("run.half_cycles", "run.periodic_within", "output.", "setup.", "title")
@@ -159,6 +161,7 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
             **_totals(state.totals),
             **_bulk(state.temperature),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
+            **({GRID: system.pair.punch.grid.numbers} if grows(system) and system.pair.punch.grid else {}),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
             **_packed(state.memory),
         )
@@ -221,6 +224,22 @@ def followed(directory: Path, system: Tribosystem) -> WornDepths | None:
     """
     arrays = on_root(system.comm, lambda: _read(find(directory), system))
     return WornDepths(*(arrays[name] for name in FOLLOWED)) if FOLLOWED[0] in arrays else None
+
+
+def grid(directory: Path, system: Tribosystem) -> RegularGrid | None:
+    """Return the contact grid of a checkpoint, None where it stays as it is; collective.
+
+    Raises:
+        CaseError: there is no checkpoint, or it is of another case.
+    """
+
+    def read() -> Array | None:
+        folder = find(directory)
+        check_case(folder, system.case)
+        return _arrays(folder).get(GRID)
+
+    found, own = on_root(system.comm, read), system.pair.punch.grid
+    return None if found is None or own is None else own.with_numbers(found)
 
 
 def warmed(directory: Path, system: Tribosystem) -> tuple[Array, Array] | None:
@@ -322,7 +341,7 @@ def reached(directory: Path) -> int | None:
 def _arrays(folder: Path) -> dict[str, Any]:
     try:
         with np.load(folder / ARRAYS) as arrays:
-            followed = FOLLOWED if set(FOLLOWED) & set(arrays) else ()
+            followed = (*(FOLLOWED if set(FOLLOWED) & set(arrays) else ()), *({GRID} & set(arrays)))
             memory = [name for name in arrays if name.startswith(f"{MEMORY}.")]
             depths = (*WEAR, BETWEEN, CREPT, CARRIED)
             return {name: arrays[name] for name in (*NUMBERS, *depths, *TOTALS, BULK, *STATES, *followed, *memory)}

@@ -16,8 +16,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from fenwear.assembly import Tribosystem
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, grows, kept_volume, node_maps, on_nodes
 from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.grid import RegularGrid
 from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
@@ -30,6 +32,7 @@ from fenwear.results.surfaces import RENAMED, Column, on_mesh, on_surfaces, part
 from fenwear.versions import versions
 
 HISTORY, SUMMARY, CASE = "history.nc", "summary.json", "case.toml"
+GRID = "contact_grid"  # corner, spacing and counts, where it grows
 SECONDS_BETWEEN_WRITES = 2.0
 SHARE = 20  # of the time between two writes over that of copying the file, which grows with it
 CHUNK = 256  # rows that a variable's storage grows by, at most
@@ -203,6 +206,46 @@ def _values(block: Block, name: str) -> NDArray[Any]:
     return block.heat.terms[:, TERMS.index(name.removeprefix("heat_"))]
 
 
+def grid_of(directory: Path, system: Tribosystem) -> RegularGrid | None:
+    """Return the contact grid that the history in a folder stands on, where grids grow; None where there is none."""
+    own = system.pair.punch.grid
+    try:
+        with h5py.File(directory / HISTORY, "r") as file:
+            numbers = file.attrs.get(GRID)
+    except OSError:
+        return None
+    return None if numbers is None or own is None else own.with_numbers(numbers)
+
+
+def _on_grid(
+    rows: dict[str, NDArray[Any]],
+    variables: dict[str, tuple[tuple[str, ...], str, str]],
+    before: Tribosystem,
+    after: Tribosystem,
+) -> dict[str, NDArray[Any]]:
+    """Return rows of variables at the nodes of another contact grid; gaps that are not known are NaN."""
+    of_punch, of_strip = node_maps(before, after)
+    surfaces = {"": (of_punch, before.pair.weights, after.pair.weights)}
+    surfaces["_strip"] = (of_strip, before.pair.strip.weights, after.pair.strip.weights)
+    found = {}
+    for name, values in rows.items():
+        last = variables[name][0][-1]
+        end = {"x": "", "node": "", "x_strip": "_strip", "node_strip": "_strip"}.get(last)
+        if end is None:
+            found[name] = values
+            continue
+        nodes, old, new = surfaces[end]
+        if name in ("wear", "wear_strip"):
+            found[name] = kept_volume(values, nodes, old, new)
+            continue
+        if name in ("weight", "weight_strip"):
+            found[name] = np.broadcast_to(new, (*values.shape[:-1], len(new)))
+            continue
+        start: Array = np.full(len(nodes), np.nan if name == "gap" else 0.0)
+        found[name] = on_nodes(values, nodes, start) if len(values) else np.zeros((*values.shape[:-1], len(nodes)))
+    return found
+
+
 def _chunk(inner: tuple[int, ...]) -> int:
     """Return the rows that a variable's storage grows by, fewer where a row is long."""
     return max(1, min(CHUNK, CHUNK_VALUES // max(math.prod(inner), 1)))
@@ -274,6 +317,31 @@ class HistoryWriter:
                 self._cut(resumed_after)
 
     def _create(self, system: Tribosystem) -> None:
+        self._lay_out(system)
+        self._twin.replace(self.path)
+
+    def relay(self, before: Tribosystem, after: Tribosystem) -> None:
+        """Go on with another contact grid, on which what is written then stands, too, worn volumes as they were.
+
+        Raises:
+            OutputError: as `add`.
+        """
+        self.flush()
+        old, self._columns = self._variables, columns_of(after)
+        with writing(self.path):
+            self._lay_out(after)
+            with h5py.File(self.path, "r") as stored, h5py.File(self._twin, "r+") as twin:
+                known = {name: stored[name][: self.rows] for name in old}
+                for name, values in _on_grid(known, old, before, after).items():
+                    twin[name].resize(self.rows, axis=0)
+                    twin[name][...] = values
+            self._twin.replace(self.path)
+        self._twin_rows = 0
+        if self._last is not None:
+            self._last = _on_grid(self._last, old, before, after)
+
+    def _lay_out(self, system: Tribosystem) -> None:
+        """Begin a file, without rows, in place of the twin."""
         columns = sum(column.values.nbytes + INDEX for column in self._columns.values())
         check_room(self.path.parent, self._bytes(0) + 4 * len(system.case.to_toml()) + columns)
         with h5netcdf.File(self._twin, "w") as file:
@@ -284,6 +352,8 @@ class HistoryWriter:
             file.attrs["conforming"] = int(conforming(system.pair))
             file.attrs["versions"] = json.dumps(versions())
             file.attrs.update(steps.attributes(system))
+            if grows(system) and system.pair.punch.grid is not None:
+                file.attrs[GRID] = system.pair.punch.grid.numbers
             sizes = self._sizes()
             file.dimensions = {"half_cycle": None, **sizes}
             if system.case.model.kind != "plane":
@@ -299,7 +369,6 @@ class HistoryWriter:
                 variable = file.create_variable(name, dimensions, kind, chunks=(_chunk(inner), *inner))
                 own = self._degrees.unit if units == KELVIN.unit else units
                 variable.attrs.update(units=own, long_name=long_name, **on_mesh(dimensions, system.pair.punch.dim))
-        self._twin.replace(self.path)
 
     def _cut(self, half_cycle: int) -> None:
         """Drop what a killed run wrote after its last checkpoint."""

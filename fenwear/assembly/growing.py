@@ -1,0 +1,187 @@
+"""Contact grids that grow: around the first contact as fine as asked for, wider with the scar, and coarser.
+
+All grids of a run are parts of lattices through one point, the middle of the largest: a wider one has the nodes of the
+one before, a coarser one every second of them. So what is known at nodes stays where it is, and nothing is interpolated;
+depths are multiplied by what keeps the worn volume, 1 but for the square of a spacing over the contact's width.
+Nothing is factored again: half-spaces answer anywhere, and what a finite body does besides is known over the largest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array, Mask
+from fenwear.assembly.bodies import with_surfaces
+from fenwear.assembly.contact_law import ContactLaw
+from fenwear.assembly.contact_setup import ContactSetup
+from fenwear.assembly.grids import on_grid
+from fenwear.assembly.tribosystem import Tribosystem
+from fenwear.bodies.grid import RegularGrid
+from fenwear.sliding.wear import WornDepths
+
+ROOM, NEAR = 0.25, 0.08  # of the contact's width beside it: what a new grid has, and below which a larger one is due
+TRIES = 8  # of grids around the first contact
+WITHIN = 0.06  # of the nodes across it: how far they may be off
+EDGE = 1e-9  # of a spacing
+
+
+def grows(placed: ContactSetup) -> bool:
+    """Return whether the contact grid of placed bodies grows."""
+    return placed.bodies.punch.reach is not None
+
+
+def on_first_contact(system: Tribosystem) -> Tribosystem:
+    """Return a system on a grid around its first contact, with as many nodes across as its case asks for; collective.
+
+    Raises:
+        ConvergenceError: a contact did not converge.
+    """
+    if not grows(system):
+        return system
+    for _ in range(TRIES):
+        grid = system.team.lead(lambda: _around_first(system))
+        if grid is None:
+            return system
+        system = regridded(system, grid)
+    return system
+
+
+def regridded(system: Tribosystem, grid: RegularGrid) -> Tribosystem:
+    """Return a system on another grid of its punch; collective."""
+    before = system.bodies
+    punch, strip = on_grid(system.case, system.sliding, before.punch, before.strip, grid)
+    law: ContactLaw = system.contact_law
+    return law.renewed(system, with_surfaces(system.case, replace(before, punch=punch, strip=strip)))
+
+
+def outgrown(system: ContactSetup, touched: Mask) -> RegularGrid | None:
+    """Return a larger or coarser grid where the contact asks for one, else None.
+
+    Args:
+        system: Placed bodies.
+        touched: Nodes of the punch that touch or have worn (n,).
+    """
+    case, grid, reach = system.case, system.pair.punch.grid, system.bodies.punch.reach
+    if grid is None or reach is None or case.grid is None or case.grid.across is None or not touched.any():
+        return None
+    low, high = _ends(grid, touched)
+    width = high - low + 1
+    coarser = bool(width.max() >= 2 * case.grid.across)
+    first, last = _within(grid, reach.grid)  # of the largest grid, in places of this one
+    beside = np.maximum(NEAR * width, 2.0)
+    close = ((low < beside) & (first < 0)) | ((np.array(grid.counts) - 1 - high < beside) & (last >= grid.counts))
+    if not coarser and not close.any():
+        return None
+    room = np.ceil(ROOM * width).astype(np.int64)
+    wider = low - room, high + room
+    if not coarser:  # what it has stays
+        wider = np.minimum(wider[0], 0), np.maximum(wider[1], np.array(grid.counts) - 1)
+    return _part(grid, reach.grid, *wider, 2 if coarser else 1)
+
+
+def at_rim(system: ContactSetup, touched: Mask) -> bool:
+    """Return whether some nodes of the punch lie on the rim of a grid that can still grow there."""
+    grid, reach = system.pair.punch.grid, system.bodies.punch.reach
+    if grid is None or reach is None or not touched.any():
+        return False
+    low, high = _ends(grid, touched)
+    first, last = _within(grid, reach.grid)
+    return bool((((low == 0) & (first < 0)) | ((high == np.array(grid.counts) - 1) & (last >= grid.counts))).any())
+
+
+def carried(worn: WornDepths, before: ContactSetup, after: ContactSetup) -> WornDepths:
+    """Return depths and states on another grid: where it has the same nodes theirs, elsewhere those of the start."""
+    (on_punch, on_strip), start = node_maps(before, after), after.unworn()
+    return replace(
+        start,
+        punch=kept_volume(worn.punch, on_punch, before.pair.weights, after.pair.weights),
+        strip=kept_volume(worn.strip, on_strip, before.pair.strip.weights, after.pair.strip.weights),
+        between=on_nodes(worn.between, on_punch, start.between),
+        carried=on_nodes(worn.carried, on_strip, start.carried),
+    )
+
+
+def node_maps(before: ContactSetup, after: ContactSetup) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the node before at the place of each node of the punch and of the strip after, -1 for none."""
+    found = []
+    for old, new in ((before.pair.punch, after.pair.punch), (before.pair.strip, after.pair.strip)):
+        assert old.grid is not None
+        assert new.grid is not None
+        found.append(new.grid.of_other(old.grid))
+    return found[0], found[1]
+
+
+def kept_volume(depth: Array, nodes: NDArray[np.int64], before: Array, after: Array) -> Array:
+    """Return depths (..., n) at other nodes, zero where none was, times what keeps the volume.
+
+    Args:
+        depth: Worn (..., n), mm.
+        nodes: The old node of each new one (n_new,), -1 for none.
+        before, after: Areas of old and new nodes, mm or mm².
+    """
+    found = on_nodes(depth, nodes, np.zeros((*depth.shape[:-1], len(nodes))))
+    volume, now = depth @ before, found @ after
+    return np.asarray(found * np.divide(volume, now, out=np.ones_like(now), where=now != 0)[..., None])
+
+
+def on_nodes(values: Array, nodes: NDArray[np.int64], start: Array) -> Array:
+    """Return values (..., n) at other nodes, where none was those at the start (..., n_new)."""
+    if not values.size:
+        return start
+    return np.where(nodes >= 0, values[..., np.maximum(nodes, 0)], start)
+
+
+def _ends(grid: RegularGrid, touched: Mask) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the least and largest places of some nodes along the axes of a grid."""
+    places = grid.places[touched]
+    return places.min(axis=0), places.max(axis=0)
+
+
+def _within(grid: RegularGrid, reach: RegularGrid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the first and last places of a grid's lattice within the largest grid."""
+    steps = np.array(grid.spacing)
+    low = (np.array(reach.corner) - np.array(grid.corner)) / steps
+    return np.ceil(low - EDGE).astype(np.int64), np.floor(low + reach.sides / steps + EDGE).astype(np.int64)
+
+
+def _part(
+    grid: RegularGrid, reach: RegularGrid, low: NDArray[np.int64], high: NDArray[np.int64], every: int
+) -> RegularGrid:
+    """Return the grid of every so many places of another one, from some on to others, within the largest grid."""
+    steps = np.array(grid.spacing)
+    middle = np.rint((reach.middle - np.array(grid.corner)) / steps).astype(np.int64)  # which all lattices go through
+    half = np.floor(reach.sides / 2 / (every * steps) + EDGE).astype(np.int64)
+    first = np.maximum(np.floor((low - middle) / every).astype(np.int64), -half)
+    last = np.minimum(np.ceil((high - middle) / every).astype(np.int64), half)
+    corner = reach.middle + first * every * steps
+    return replace(
+        grid,
+        corner=tuple(float(one) for one in corner),
+        spacing=tuple(float(every * one) for one in steps),
+        counts=tuple(int(one) for one in last - first + 1),
+    )
+
+
+def _around_first(system: Tribosystem) -> RegularGrid | None:
+    """Return a grid around the first contact with as many nodes across as asked for; None where it has them."""
+    wanted, grid, reach = system.case.grid, system.pair.punch.grid, system.bodies.punch.reach
+    assert wanted is not None
+    assert wanted.across is not None
+    assert grid is not None
+    assert reach is not None
+    touched = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure[0] > 0
+    low, high = _ends(grid, touched)
+    steps, width = np.array(grid.spacing), high - low + 1
+    longest = int(np.argmax(width * steps))
+    even = grid is not reach.grid
+    if even and abs(width[longest] - wanted.across) <= max(WITHIN * wanted.across, 1.0) and not at_rim(system, touched):
+        return None
+    spacing = float(width[longest] * steps[longest]) / wanted.across
+    middle = np.array(grid.corner) - reach.grid.middle + steps * (low + high) / 2
+    half = (0.5 + ROOM) * width * steps
+    lattice = replace(reach.grid, corner=tuple(reach.grid.middle), spacing=(spacing,) * len(steps))
+    ends = (np.floor((middle + side * half) / spacing).astype(np.int64) for side in (-1, 1))
+    return _part(lattice, reach.grid, *ends, 1)

@@ -1,0 +1,161 @@
+"""Contact grids that grow with the scar and coarsen: volumes and depths as they were, runs as on grids that stay."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from fenwear import Case, assemble, evolve, run_case
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem, node_maps, outgrown, regridded
+from fenwear.cycle.block import Block
+from fenwear.cycle.state import carried_by, on_other_grid
+
+
+def ball(grid: dict[str, Any], **more: Any) -> Case:
+    """Return a block with the profile of a ball of radius 20 on another one, as half-spaces on a grid."""
+    x = np.linspace(-1.2, 1.2, 25)
+    points = [(a, b, (a * a + b * b) / 40) for a in x for b in x]
+    body = {"operator": "half-space", "regions": {}}
+    data: dict[str, Any] = {
+        "geometry": {
+            "file": "solid_blocks.geo",
+            "degree": 1,
+            "parameters": {"width": 2.4, "depth": 2.4, "margin_x": 1, "margin_y": 1, "punch_height": 1}
+            | {"strip_height": 1, "across_x": 2, "across_y": 2, "margin_elements": 1, "punch_layers": 1}
+            | {"strip_layers": 1},
+        },
+        "model": {"kind": "solid"},
+        "materials": {"steel": {"young": 2.1e5, "poisson": 0.3}, "brass": {"young": 1.0e5, "poisson": 0.34}},
+        "punch": body
+        | {"regions": {"punch_body": "steel"}, "supports": [{"on": "punch_far", "fix": ["x", "y"]}]}
+        | {"loads": [{"on": "punch_far", "force": [0, 0, -60]}], "profile": {"points": points}}
+        | {"no_turning_about": ["x", "y", "z"]},
+        "strip": body | {"regions": {"strip_body": "brass"}, "supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+        "grid": grid,
+        "contact": {"friction": 0.3},
+        "wear": {"punch": {"coefficient": "1e-6 1/MPa"}, "strip": {"coefficient": "2e-6 1/MPa"}},
+        "motion": {"kind": "reciprocating", "amplitude": 0.12, "period": 1.0, "positions": 3},
+        "run": {"half_cycles": 60, "integration": "jump", "jump_tolerance": 0.01},
+        "output": {"report": False, "uncertainty": False, "fields_at": []},
+    }
+    return Case.model_validate({**data, **more})
+
+
+def across(system: Tribosystem, touched: Array) -> int:
+    """Return the nodes along the longer side of what touches."""
+    grid = system.pair.punch.grid
+    assert grid is not None
+    return int(np.ptp(grid.places[touched], axis=0).max() + 1)
+
+
+def profile(block: Block, body: str, at: Array) -> Array:
+    """Return the worn depths of a body along the line y = 0."""
+    surface, depth = getattr(block.system.pair, body), getattr(block.end.worn, body)
+    middle = np.abs(surface.x[:, 1]) < 1e-9
+    return np.interp(at, surface.x[middle, 0], depth[middle])
+
+
+@pytest.fixture(scope="module")
+def grown() -> list[Block]:
+    """Return the blocks of a run whose contact becomes more than twice as wide."""
+    return list(evolve(assemble(ball({"across": 10}))))
+
+
+def test_grid_begins_around_the_first_contact() -> None:
+    """As many nodes across it as asked for, and room beside it."""
+    system = assemble(ball({"across": 14}))
+    grid = system.pair.punch.grid
+    pressure = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure[0]
+    assert grid is not None
+    assert abs(across(system, pressure > 0) - 14) <= 1
+    whole = pressure.reshape(grid.counts)
+    assert whole[[0, -1]].max() == whole[:, [0, -1]].max() == 0
+    assert max(grid.counts) < 26
+
+
+def test_volumes_are_kept_and_grids_grow_and_coarsen(grown: list[Block]) -> None:
+    """To rounding, whatever happened to the grid; the contact has never too few or many nodes."""
+    grids = [block.system.pair.punch.grid for block in grown]
+    assert len({grid.spacing for grid in grids if grid}) > 1
+    assert len({grid.counts for grid in grids if grid}) > 2
+    for block in grown:
+        worn, pair, totals = block.end.worn, block.system.pair, block.end.totals
+        assert worn.punch @ pair.weights == pytest.approx(totals.of("volume_punch"), rel=1e-12)
+        assert worn.strip @ pair.strip.weights == pytest.approx(totals.of("volume_strip"), rel=1e-12)
+        assert 9 <= across(block.system, carried_by(block.end)) <= 32
+
+
+@pytest.mark.slow
+def test_depths_are_those_of_a_grid_that_stays(grown: list[Block]) -> None:
+    """Along the middle line, and nearer to them with twice the nodes across."""
+    fixed = list(evolve(assemble(ball({"nodes": 73}))))[-1]
+    finer = list(evolve(assemble(ball({"across": 20}))))[-1]
+    at = np.linspace(-0.5, 0.5, 41)
+    for body in ("punch", "strip"):
+        wanted = profile(fixed, body, at)
+        errors = [np.abs(profile(one, body, at) - wanted).max() / wanted.max() for one in (grown[-1], finer)]
+        assert errors[1] < 0.6 * errors[0]
+        assert errors[1] < 0.02
+
+
+def test_states_stay_where_they_are(grown: list[Block]) -> None:
+    """A node that both grids have keeps its depth, but for what keeps the volume, and its pressure."""
+    before = next(block for block in grown if outgrown(block.system, carried_by(block.end)) is not None)
+    grid = outgrown(before.system, carried_by(before.end))
+    assert grid is not None
+    after = regridded(before.system, grid)
+    moved, (nodes, _) = on_other_grid(before.end, before.system, after), node_maps(before.system, after)
+    known = (nodes >= 0) & (moved.worn.punch > 0)
+    ratio = moved.worn.punch[known] / before.end.worn.punch[nodes[known]]
+    assert np.ptp(ratio) < 1e-12
+    assert ratio[0] == pytest.approx(1.0, abs=1e-2)
+    old, new = before.end.contacts[0], moved.contacts[0]
+    assert old is not None
+    assert new is not None
+    assert np.array_equal(new.pressure[0, nodes >= 0], old.pressure[0, nodes[nodes >= 0]])
+    assert new.pressure[0, nodes < 0].max(initial=0.0) == 0
+
+
+@pytest.mark.slow
+def test_run_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
+    """It ends as one that was not interrupted; its history stands on the last grid, with the volumes of its sums."""
+    output = {"report": False, "uncertainty": False}
+    whole = ball({"across": 10}, output={**output, "fields_at": [20]})
+    first = ball(
+        {"across": 10}, run={"half_cycles": 20, "integration": "jump", "jump_tolerance": 0.01}, output=output
+    )
+    straight, _ = run_case(whole, output=tmp_path / "whole", log=lambda _: None)
+    run_case(first, output=tmp_path / "parts", log=lambda _: None)
+    resumed, _ = run_case(whole, output=tmp_path / "parts", log=lambda _: None, resume=True)
+    for key, value in straight.items():
+        if isinstance(value, float) and "seconds" not in key and "error" not in key:
+            assert resumed[key] == pytest.approx(value, rel=1e-9), key
+    with h5py.File(tmp_path / "parts" / "history.nc") as file, h5py.File(tmp_path / "whole" / "history.nc") as other:
+        assert len(file["x"]) == file["wear"].shape[1]
+        assert file["wear"][:] == pytest.approx(other["wear"][:], rel=1e-9, abs=1e-15)
+        volume = (file["wear"][:] * file["weight"][:]).sum(axis=1)
+        assert (np.diff(volume) > 0).all()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"grid": {"across": 64, "nodes": 65}},
+        {"strip": {"operator": "condensed"}},
+        {"contact": {"friction": 0.3, "law": "coulomb"}},
+        {"punch": {"topography": {"rms": "0.1 um", "longest": 1}}},
+        {"program": {"steps": [{"cycles": 10}]}},
+    ],
+)
+def test_what_does_not_go_with_a_grid_that_grows(more: dict[str, Any]) -> None:
+    """Is told by the key."""
+    good = ball({"across": 10}).resolved()
+    for table, values in more.items():
+        good[table] = {**good.get(table, {}), **values}
+    with pytest.raises(ValueError, match=r"across"):
+        Case.model_validate(good)

@@ -15,8 +15,17 @@ from fenwear.assembly.bodies import Bodies, build_bodies, build_conduction, elas
 from fenwear.assembly.contact_law import ContactLaw
 from fenwear.assembly.contact_setup import Clock, ContactSetup, place, place_at_rest
 from fenwear.assembly.creep import Creep, CreepStage
-from fenwear.assembly.growing import at_rim, carried, grows, kept_volume, node_maps, on_first_contact, on_nodes, outgrown
-from fenwear.assembly.growing import regridded
+from fenwear.assembly.growing import (
+    at_rim,
+    carried,
+    grows,
+    kept_volume,
+    node_maps,
+    on_first_contact,
+    on_nodes,
+    outgrown,
+    regridded,
+)
 from fenwear.assembly.laws import law_named, register_contact_law
 from fenwear.assembly.resource_report import body_lines, resources_text
 from fenwear.assembly.resources import Resources, body_resources

@@ -1,7 +1,7 @@
 """Contact grids that grow: around the first contact as fine as asked for, wider with the scar, and coarser.
 
-All grids of a run are parts of lattices through one point, the middle of the largest: a wider one has the nodes of the
-one before, a coarser one every second of them. So what is known at nodes stays where it is, and nothing is interpolated;
+All grids of a run are parts of lattices through one point, the middle of the largest: a wider one has the nodes of
+the one before, a coarser one every second of them. What is known at nodes stays there, nothing is interpolated, and
 depths are multiplied by what keeps the worn volume, 1 but for the square of a spacing over the contact's width.
 Nothing is factored again: half-spaces answer anywhere, and what a finite body does besides is known over the largest.
 """
@@ -9,6 +9,7 @@ Nothing is factored again: half-spaces answer anywhere, and what a finite body d
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ def on_first_contact(system: Tribosystem) -> Tribosystem:
     if not grows(system):
         return system
     for _ in range(TRIES):
-        grid = system.team.lead(lambda: _around_first(system))
+        grid = system.team.lead(partial(_around_first, system))
         if grid is None:
             return system
         system = regridded(system, grid)
@@ -183,5 +184,5 @@ def _around_first(system: Tribosystem) -> RegularGrid | None:
     middle = np.array(grid.corner) - reach.grid.middle + steps * (low + high) / 2
     half = (0.5 + ROOM) * width * steps
     lattice = replace(reach.grid, corner=tuple(reach.grid.middle), spacing=(spacing,) * len(steps))
-    ends = (np.floor((middle + side * half) / spacing).astype(np.int64) for side in (-1, 1))
-    return _part(lattice, reach.grid, *ends, 1)
+    first, last = (np.floor((middle + side * half) / spacing).astype(np.int64) for side in (-1, 1))
+    return _part(lattice, reach.grid, first, last, 1)

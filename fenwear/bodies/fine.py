@@ -11,6 +11,7 @@ refused. Nothing of the set-up depends on the number of contact nodes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -23,6 +23,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -106,27 +107,37 @@ class HalfSpace:
         return TRANSFORM * 2.0 ** (self.dim - 1) / 4 * float(np.prod(self._shape)) * (self.dim + len(self._directions))
 
     @cached_property
+    def _parts(self) -> Array:
+        """Displacements by unit forces at all distances of two nodes (a, d, 2 m - 1, ...), mm."""
+        found = _influences(self._shape, self.spacing, self.shear, self.poisson, self.depth)
+        into = np.eye(self.dim)[list(self.axes)]  # the model's vectors along the grid, then into the body
+        into[-1] *= -self.outward
+        return np.asarray(np.tensordot(self._directions @ into.T, np.tensordot(into.T, found, (1, 1)), (1, 1)))
+
+    @property
     def _table(self) -> Array:
-        """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
-        found = _influences(self._shape, self.spacing, self.shear, self.poisson, self.depth).copy()
-        found[..., -1, :] *= -self.outward  # from into the body to along its axis
-        found[..., -1] *= -self.outward
-        whole = np.empty_like(found)
-        whole[..., np.array(self.axes)[:, None], np.array(self.axes)] = found
-        return np.asarray(self._directions @ whole)
+        """The same (2 m - 1, ..., a, d)."""
+        return np.moveaxis(self._parts, (0, 1), (-2, -1))
 
     @cached_property
-    def _kernel(self) -> NDArray[np.complex128]:
-        """The transform of the table, its zero distance first, over twice the grid."""
-        inner = tuple(range(self.dim - 1))
-        wrapped = np.zeros((*(2 * count for count in self._shape), *self._table.shape[-2:]))
-        to = np.ix_(*(np.arange(1 - count, count) % (2 * count) for count in self._shape))
-        wrapped[to] = self._table
-        return np.asarray(scipy.fft.rfftn(wrapped, axes=inner))
+    def _kernels(self) -> dict[int, NDArray[np.complex128]]:
+        """Transforms of the table's parts (a, ...), their zero distance first, over twice the grid, by the axis."""
+        return {}
+
+    def _kernel(self, axis: int) -> NDArray[np.complex128]:
+        """Return the transform of the displacements by forces along an axis (a, ...)."""
+        if axis not in self._kernels:
+            wrapped = np.zeros((len(self._directions), *(2 * count for count in self._shape)))
+            to = np.ix_(*(np.arange(1 - count, count) % (2 * count) for count in self._shape))
+            for k in range(len(wrapped)):
+                image: Array = wrapped[k]
+                image[to] = self._parts[k, axis]
+            self._kernels[axis] = np.asarray(scipy.fft.rfftn(wrapped, axes=range(1, self.dim)))
+        return self._kernels[axis]
 
     def table(self, traction: Array) -> Array:
         """Return the displacement along the first direction by a force (d,) at all distances of two nodes."""
-        return np.asarray(self._table[..., 0, :] @ traction)
+        return np.asarray(np.tensordot(traction, self._parts[0], 1))
 
     def smooth(self, traction: Array) -> None:
         """Return what it is besides: nothing."""
@@ -150,7 +161,8 @@ class HalfSpace:
                 continue
             grid = np.zeros((len(pushed), *self._shape))
             grid[at] = force[pushed]
-            image = np.einsum("...ac,c...->a...", self._kernel[..., pushed], scipy.fft.rfftn(grid, size, axes=inner))
+            waves = scipy.fft.rfftn(grid, size, axes=inner)
+            image = sum(self._kernel(int(axis)) * wave for axis, wave in zip(pushed, waves, strict=True))
             found[:, :, k] = scipy.fft.irfftn(image, size, axes=inner)[at].T
         return found.reshape(q, -1, *rest)
 
@@ -175,16 +187,24 @@ class HalfSpace:
 def _influences(
     shape: tuple[int, ...], spacing: tuple[float, ...], shear: float, poisson: float, depth: float
 ) -> Array:
-    """Return displacements by unit forces on cells at all distances of two nodes of a grid (2 m - 1, ..., d, d)."""
-    ahead = np.stack(np.meshgrid(*(np.arange(count) for count in shape), indexing="ij"), axis=-1) * np.array(spacing)
-    own = influence(ahead.reshape(-1, len(shape)), spacing, shear, poisson, depth) / np.prod(spacing)
-    found = own.reshape(*shape, *own.shape[1:])
+    """Return displacements by unit forces on cells at all distances of two nodes of a grid (d, d, 2 m - 1, ...)."""
+    if len(shape) == 1:
+        own = _in_plane(np.asarray(spacing[0] * np.arange(shape[0])), spacing[0], shear, poisson, depth)
+    else:
+        own = _in_space_on_grid(shape, spacing, shear, poisson)
+    d = len(shape) + 1
+    found = np.zeros((d, d, *(2 * count - 1 for count in shape)))
+    every: list[Any] = [EVERY, EVERY]
+    found[tuple(every + [slice(count - 1, None) for count in shape])] = np.moveaxis(own, (-2, -1), (0, 1))
+    found /= np.prod(spacing)
     for axis, count in enumerate(shape):  # the other way along an axis what that axis has one share in changes its sign
-        turned = np.ones(len(shape) + 1)
+        turned = np.ones(d)
         turned[axis] = -1.0
-        back = np.flip(found.take(range(1, count), axis=axis), axis=axis) * np.outer(turned, turned)
-        found = np.concatenate([back, found], axis=axis)
-    return np.asarray(found)
+        behind, ahead = ([*every, *every[: len(shape)]] for _ in range(2))
+        behind[2 + axis], ahead[2 + axis] = slice(0, count - 1), slice(2 * count - 2, count - 1, -1)
+        sign = np.outer(turned, turned).reshape(d, d, *(1,) * len(shape))
+        found[tuple(behind)] = sign * found[tuple(ahead)]
+    return found
 
 
 def half_space(request: Request) -> HalfSpace:
@@ -305,22 +325,42 @@ def _in_plane(x: Array, side: float, shear: float, poisson: float, depth: float)
 
 
 def _in_space(x: Array, sides: Sequence[float], shear: float, poisson: float) -> Array:
-    square = np.zeros((6, len(x)))  # integrals of 1/r, x²/r³, y²/r³, x y/r³, x/r², y/r² over the rectangle
     far, sign = np.abs(x), np.sign(x)  # logarithms of X + r, X < 0, would lose digits
-    for i in (1, -1):
-        for j in (1, -1):
-            X, Y = far[:, 0] + i * sides[0] / 2, far[:, 1] + j * sides[1] / 2
-            r = np.hypot(X, Y)
-            xx, yy = Y * np.log(X + r), X * np.log(Y + r)
-            half = np.log(r)
-            parts = (xx + yy, xx, yy, -r, Y * half + X * np.arctan(Y / X), X * half + Y * np.arctan(X / Y))
-            square += i * j * np.array(parts)
-    over_r, xx, yy, xy, fx, fy = square
-    xy, fx, fy = xy * sign.prod(axis=1), fx * sign[:, 0], fy * sign[:, 1]
-    found = np.zeros((len(x), 3, 3))
-    found[:, 0, 0], found[:, 1, 1] = (1 - poisson) * over_r + poisson * xx, (1 - poisson) * over_r + poisson * yy
-    found[:, 0, 1] = found[:, 1, 0] = poisson * xy
-    found[:, 2, 2] = (1 - poisson) * over_r
+    square = sum(
+        i * j * _at_corners(far[:, 0] + i * sides[0] / 2, far[:, 1] + j * sides[1] / 2)
+        for i in (1, -1)
+        for j in (1, -1)
+    )
+    return _from_squares(np.asarray(square), sign, shear, poisson)
+
+
+def _in_space_on_grid(shape: Sequence[int], sides: Sequence[float], shear: float, poisson: float) -> Array:
+    """Return the same at all nodes of a grid from 0 on (m, n, d, d): each corner of its cells serves four of them."""
+    across, along = (side * (np.arange(count + 1) - 0.5) for side, count in zip(sides, shape, strict=True))
+    at = _at_corners(*np.broadcast_arrays(across[:, None], along))
+    square = at[:, 1:, 1:] - at[:, 1:, :-1] - at[:, :-1, 1:] + at[:, :-1, :-1]
+    sign = np.ones((*shape, 2))
+    sign[0, :, 0] = sign[:, 0, 1] = 0.0
+    return _from_squares(square, sign, shear, poisson)
+
+
+def _at_corners(X: Array, Y: Array) -> Array:
+    """Return what integrals of x²/r³, y²/r³, x y/r³, x/r² and y/r² over a rectangle are differences of (5, ...)."""
+    r = np.hypot(X, Y)
+    half = np.log(r)
+    parts = (Y * np.log(X + r), X * np.log(Y + r), -r, Y * half + X * np.arctan(Y / X), X * half + Y * np.arctan(X / Y))
+    return np.array(parts)
+
+
+def _from_squares(square: Array, sign: Array, shear: float, poisson: float) -> Array:
+    """Return displacements (..., d, d) from these integrals (5, ...), and the signs of the coordinates (..., 2)."""
+    xx, yy, xy, fx, fy = square
+    xy, fx, fy = xy * sign.prod(axis=-1), fx * sign[..., 0], fy * sign[..., 1]
+    found = np.zeros((*xx.shape, 3, 3))
+    over_r = xx + yy
+    found[..., 0, 0], found[..., 1, 1] = (1 - poisson) * over_r + poisson * xx, (1 - poisson) * over_r + poisson * yy
+    found[..., 0, 1] = found[..., 1, 0] = poisson * xy
+    found[..., 2, 2] = (1 - poisson) * over_r
     for k, f in enumerate((fx, fy)):
-        found[:, 2, k], found[:, k, 2] = (0.5 - poisson) * f, -(0.5 - poisson) * f
+        found[..., 2, k], found[..., k, 2] = (0.5 - poisson) * f, -(0.5 - poisson) * f
     return np.asarray(found / (2 * np.pi * shear))

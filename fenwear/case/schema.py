@@ -144,7 +144,9 @@ class Case(Part):
         against = {
             f"with {' and '.join(f'{name}.operator' for name in meshed)} = '{CONDENSED}', one solution for each node; "
             "or 'fine'": bool(meshed),
-            f"with {' and '.join(f'{name}.topography' for name in rough)}, which a coarser grid would lose": bool(rough),
+            f"with {' and '.join(f'{name}.topography' for name in rough)}, which a coarser grid would lose": bool(
+                rough
+            ),
             "with a program": self.program is not None,
             "with creep": any(body.creep is not None for body in self.bodies.values()),
         }

@@ -90,6 +90,8 @@ class Convolution:
 
     def entries(self, rows: Nodes, columns: Nodes) -> Array:
         """Return the numbers of some rows and columns."""
+        if isinstance(rows, slice) and isinstance(columns, slice) and columns == EVERY:
+            return self._rows(rows)
         apart = self.places[rows][:, None] - self.places[columns] + np.array(self.shape) - 1
         found = self.numbers[tuple(np.moveaxis(apart, -1, 0))]
         for points, response in self.smooth:
@@ -99,6 +101,21 @@ class Convolution:
             every = np.arange(len(self.weights))
             i, j = np.equal.outer(every[rows], every[columns]).nonzero()
             found[i, j] += self.local[rows][i]
+        return found
+
+    def _rows(self, rows: slice) -> Array:
+        """Return all numbers of some rows: the table about each of their nodes, turned round."""
+        nodes, at = np.arange(len(self.weights))[rows], tuple(self.places.T)
+        found = np.empty((len(nodes), len(self.weights)))
+        turned = self.numbers[(slice(None, None, -1),) * len(self.shape)]
+        for k, place in enumerate(self.places[rows]):
+            window = tuple(slice(m - 1 - here, 2 * m - 1 - here) for m, here in zip(self.shape, place, strict=True))
+            found[k] = turned[window][at]
+        for points, response in self.smooth:
+            found += points.to_nodes((points.rows(rows) @ response).T).T
+        found *= self.weights
+        if self.local is not None:
+            found[np.arange(len(nodes)), nodes] += self.local[nodes]
         return found
 
     def columns(self, nodes: Nodes, rows: Nodes = EVERY) -> Array:

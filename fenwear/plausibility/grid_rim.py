@@ -24,8 +24,8 @@ def grid_limits(system: Tribosystem, grid: RegularGrid) -> ContactEnds | Contact
     corner, sides, slack = np.array(grid.corner), grid.sides, BESIDE * np.array(grid.spacing)
     within: Mask = np.stack([corner - low > slack, high - corner - sides > slack])
     if (reach := system.bodies.punch.reach) is not None:  # it grows, where it is not at its end
-        ends, steps = np.array(reach.grid.corner), np.array(grid.spacing)
-        within &= np.stack([corner - ends < steps, ends + reach.grid.sides - corner - sides < steps])
+        first, steps = np.array(reach.grid.corner), np.array(grid.spacing)
+        within &= np.stack([corner - first < steps, first + reach.grid.sides - corner - sides < steps])
     if not within.any():
         return None
     if len(grid.counts) == 1:

@@ -161,12 +161,17 @@ def _write(new: Path, system: Tribosystem, state: RunState) -> None:
             **_totals(state.totals),
             **_bulk(state.temperature),
             **({} if system.bodies.followed is None else _depths(FOLLOWED, system.bodies.followed)),
-            **({GRID: system.pair.punch.grid.numbers} if grows(system) and system.pair.punch.grid else {}),
+            **_grid(system),
             **{name: np.concatenate([getattr(c, name) for c in contacts]) for name in STATES},
             **_packed(state.memory),
         )
         file.flush()
         os.fsync(file.fileno())
+
+
+def _grid(system: Tribosystem) -> dict[str, Any]:
+    own = system.pair.punch.grid
+    return {} if own is None or not grows(system) else {GRID: own.numbers}
 
 
 def _remembered(memory: Any) -> tuple[HeatState, ...]:

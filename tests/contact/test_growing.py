@@ -126,9 +126,7 @@ def test_run_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
     """It ends as one that was not interrupted; its history stands on the last grid, with the volumes of its sums."""
     output = {"report": False, "uncertainty": False}
     whole = ball({"across": 10}, output={**output, "fields_at": [20]})
-    first = ball(
-        {"across": 10}, run={"half_cycles": 20, "integration": "jump", "jump_tolerance": 0.01}, output=output
-    )
+    first = ball({"across": 10}, run={"half_cycles": 20, "integration": "jump", "jump_tolerance": 0.01}, output=output)
     straight, _ = run_case(whole, output=tmp_path / "whole", log=lambda _: None)
     run_case(first, output=tmp_path / "parts", log=lambda _: None)
     resumed, _ = run_case(whole, output=tmp_path / "parts", log=lambda _: None, resume=True)

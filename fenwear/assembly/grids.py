@@ -73,11 +73,11 @@ def _laid(case: Case, body: ElasticBody, grid: RegularGrid) -> tuple[ContactSurf
     depth = outward * (grid.level - reading @ meshed.trace[:, axis])
     if meshed.profile is not None:
         depth = depth + reading @ (meshed.extension @ meshed.profile)
-    topography = case.bodies[body.body.name].topography
+    topography, heights = case.bodies[body.body.name].topography, None
     if topography is not None:
         heights = heights_on(grid, topography, f"{body.body.name}.topography", case.folder)
         depth = depth + heights.max() - heights
-    surface = surface_on(body.body.name, grid, outward, depth)
+    surface = replace(surface_on(body.body.name, grid, outward, depth), heights=heights)
     return surface, _mortar(body, grid) if body.operator == CONDENSED else reading
 
 

@@ -61,6 +61,7 @@ class ContactSurface:
         arc: Of a curve that is no graph over x the arc length at the trace nodes (N,), mm, see `arc_length`; else None.
         grid: Of a surface that is a regular grid and no trace of a mesh; else None.
         made: The same as its mesh was made, where that has followed the wear since; else None.
+        heights: Of a topography on it (n,), mm; None without.
     """
 
     body: str
@@ -78,6 +79,7 @@ class ContactSurface:
     contact: NDArray[np.int64] | None = None
     grid: RegularGrid | None = None
     made: ContactSurface | None = None
+    heights: Array | None = None
 
     @cached_property
     def part(self) -> NDArray[np.int64]:

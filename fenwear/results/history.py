@@ -24,7 +24,7 @@ from fenwear.case import Case
 from fenwear.cycle import Block
 from fenwear.errors import CaseError, InputError
 from fenwear.heat.exchange import TERMS
-from fenwear.results import between, coating, creep, place, sheet, steps, table_cycle
+from fenwear.results import between, coating, creep, place, roughness, sheet, steps, table_cycle
 from fenwear.results.degrees import KELVIN, degrees_in, degrees_of
 from fenwear.results.disk import check_room, claim, write_text, writing
 from fenwear.results.scar import conforming
@@ -126,6 +126,7 @@ def variables_of(system: Tribosystem) -> dict[str, tuple[tuple[str, ...], str, s
         **between.variables(system),
         **coating.variables(system),
         **creep.variables(system),
+        **roughness.variables(system),
         **place.variables(system),
         **steps.variables(system),
         **table_cycle.variables(system),
@@ -185,7 +186,7 @@ def _outline(surface: ContactSurface, end: str) -> dict[str, Column]:
 
 def rows_of(block: Block, names: Iterable[str]) -> dict[str, NDArray[Any]]:
     """Return the values of variables over a block's half-cycles."""
-    rooms = (sheet, between, coating, creep, place, steps, table_cycle)
+    rooms = (sheet, between, coating, creep, place, roughness, steps, table_cycle)
     own = {name: value for room in rooms for name, value in room.values(block).items()}
     return {name: own[name] if name in own else _values(block, name) for name in names}
 

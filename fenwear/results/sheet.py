@@ -16,6 +16,8 @@ In the plane worn area is volume over thickness.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import reduce
+from operator import or_
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,7 +27,7 @@ from fenwear.assembly import ContactSetup
 from fenwear.bodies.contact_surface import ContactSurface
 from fenwear.case.names import Names
 from fenwear.cycle import Block
-from fenwear.results import coating, creep, table_cycle
+from fenwear.results import coating, creep, roughness, table_cycle
 from fenwear.results.scar import ScarGeometry, scar_geometry
 from fenwear.results.zone import without_noise
 
@@ -285,6 +287,12 @@ LINES = {
     "least_coating_mm": Line("... least that is left", "µm", 1e3),
     "creep_volume_mm3": Line("crept volume, apart from wear", "mm³"),
     "largest_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
+    "roughness_Sa_mm": Line("roughness Sa where it has worn, without its form", "µm", 1e3),
+    "roughness_Sq_mm": Line("... Sq", "µm", 1e3),
+    "roughness_Ssk": Line("... Ssk", ""),
+    "bearing_height_10_percent_mm": Line("... height above which 10 % lie", "µm", 1e3),
+    "bearing_height_50_percent_mm": Line("... 50 %", "µm", 1e3),
+    "bearing_height_90_percent_mm": Line("... 90 %", "µm", 1e3),
     "layer_creep_volume_mm3": Line("crept volume of the layer", "mm³"),
     "largest_layer_creep_depth_mm": Line("... depth, largest", "µm", 1e3),
     "largest_depth_mm": Line("largest worn depth", "µm", 1e3),
@@ -348,7 +356,8 @@ def sheet(last: Block) -> dict[str, Any]:
         own = {key: float(row[f"{name}{end}"]) for key, name in OF_SUMMARY.items() if f"{name}{end}" in known}
         if own:
             own |= _diameters(own) | table_cycle.body_numbers(last, body)
-        if own := own | creep.body_numbers(last, body) | coating.body_numbers(last, body):
+        rooms = (creep, coating, roughness)
+        if own := reduce(or_, (room.body_numbers(last, body) for room in rooms), own):
             found[body] = own
     return found
 

@@ -1,0 +1,105 @@
+"""Roughness of worn surfaces in history.nc and summary.json: what a topography is, less what has worn off it.
+
+Numbers are those of ISO 25178 (Sa, Sq, Ssk), in the plane of ISO 4287 (Ra, Rq, Rsk), of the smallest rectangle of the
+contact grid around all that has worn, its form taken off: the polynomial of second order that is nearest by least
+squares, as a scar's own shape is no roughness. Before anything has worn it is that of the whole grid.
+
+The bearing curve (Abbott and Firestone) has what share of that rectangle lies above a height over its mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fenwear.arrays import Array
+from fenwear.assembly import Tribosystem
+from fenwear.bodies.contact_surface import ContactSurface
+from fenwear.bodies.grid import RegularGrid
+from fenwear.bodies.topography import roughness
+from fenwear.cycle import Block
+
+Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
+FEWEST = 8  # nodes along each axis of the rectangle, below which the whole grid is taken
+SHARES = (0.1, 0.5, 0.9)  # of the rectangle, whose heights of the bearing curve the summary has
+NAMES = {
+    "roughness_mean": ("mm", "mean height of the {} over its mean and form (Sa) where it has worn, at the end"),
+    "roughness_rms": ("mm", "root mean square of the same heights (Sq) of the {}"),
+    "roughness_skewness": ("1", "skewness of the same heights (Ssk) of the {}"),
+}
+ENDS = {"punch": "", "strip": "_strip"}
+
+
+def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
+    """Return the surfaces with a topography, by their bodies."""
+    both = {"punch": system.pair.punch, "strip": system.pair.strip}
+    return {body: one for body, one in both.items() if one.heights is not None and one.grid is not None}
+
+
+def variables(system: Tribosystem) -> dict[str, Variable]:
+    """Return the variables of rough surfaces."""
+    return {
+        f"{name}{ENDS[body]}": (("half_cycle",), unit, text.format(body))
+        for body in _rough(system)
+        for name, (unit, text) in NAMES.items()
+    }
+
+
+def values(block: Block) -> dict[str, Array]:
+    """Return them for each half-cycle of a block by name (k,)."""
+    found = {}
+    for body in _rough(block.system):
+        rows = [roughness(worn_heights(block, body, k)) for k in range(len(block))]
+        numbers = np.array([(one.mean, one.rms, one.skewness) for one in rows]).reshape(len(rows), 3)
+        for name, column in zip(NAMES, numbers.T, strict=True):
+            found[f"{name}{ENDS[body]}"] = column
+    return found
+
+
+def body_numbers(last: Block, body: str) -> dict[str, float]:
+    """Return the roughness of a body at the end of a run, for its part of summary.json; none of one without."""
+    if body not in _rough(last.system):
+        return {}
+    z = worn_heights(last, body, len(last) - 1)
+    found = roughness(z)
+    bearing = bearing_heights(z, np.array(SHARES))
+    return {
+        "roughness_Sa_mm": found.mean,
+        "roughness_Sq_mm": found.rms,
+        "roughness_Ssk": found.skewness,
+        **{f"bearing_height_{100 * share:g}_percent_mm": float(h) for share, h in zip(SHARES, bearing, strict=True)},
+    }
+
+
+def worn_heights(block: Block, body: str, row: int) -> Array:
+    """Return heights of a rough surface at the end of a half-cycle, without its form, mm, as `levelled`."""
+    surface, depth = _rough(block.system)[body], {"punch": block.wear, "strip": block.wear_strip}[body][row]
+    assert surface.grid is not None
+    assert surface.heights is not None
+    return levelled(surface.grid, surface.heights - depth, depth > 0)
+
+
+def levelled(grid: RegularGrid, heights: Array, worn: NDArray[np.bool_]) -> Array:
+    """Return heights over their mean and form in the rectangle around what has worn (m,), mm.
+
+    Args:
+        grid: Where they are.
+        heights: (n,), mm.
+        worn: Which nodes have worn (n,).
+    """
+    places, chosen = grid.places, np.ones(len(heights), dtype=bool)
+    if worn.any():
+        low, high = places[worn].min(axis=0), places[worn].max(axis=0)
+        if (high - low >= FEWEST).all():
+            chosen = ((places >= low) & (places <= high)).all(axis=1)
+    x = 2.0 * (places[chosen] - places[chosen].mean(axis=0)) / np.maximum(np.ptp(places[chosen], axis=0), 1)
+    powers = [x[:, k] for k in range(x.shape[1])]
+    powers += [x[:, i] * x[:, j] for i in range(x.shape[1]) for j in range(i + 1)]
+    form = np.column_stack([np.ones(len(x)), *powers])
+    z = heights[chosen]
+    return np.asarray(z - form @ np.linalg.lstsq(form, z)[0])
+
+
+def bearing_heights(z: Array, shares: Array) -> Array:
+    """Return the heights over the mean above which these shares of a surface lie, mm."""
+    return np.asarray(np.quantile(z, 1 - shares))

@@ -116,3 +116,26 @@ def test_a_box_cuts_the_whole() -> None:
     np.testing.assert_allclose(found, whole[:, box.nodes], rtol=0, atol=1e-13 * whole.max())
     rows = np.array([one.matrix() @ p for one, p in zip(of, pressure, strict=True)])
     np.testing.assert_allclose(whole, rows, rtol=0, atol=1e-12 * whole.max())
+
+
+def test_pressures_are_those_of_tamaas() -> None:
+    """At every node, where it is installed: both spread pressures evenly over squares, and have no periods.
+
+    L. Frérot et al., J. Open Source Software 5, 2020; its conjugate gradients are those of Polonsky and Keer.
+    """
+    tamaas = pytest.importorskip("tamaas")
+    system = assemble(ball(grid={"nodes": 45, "size": [2.2, 2.2]}, contact={"friction": 0.0}))
+    gap, grid = system.gap(0, system.unworn()), system.pair.punch.grid
+    pressure = system.phase_contact((0,)).solve(gap).pressure[0]
+    assert grid is not None
+    sides = np.array(grid.spacing) * grid.counts
+    model = tamaas.Model(tamaas.model_type.basic_2d, list(sides), list(grid.counts))
+    model.E, model.nu = 1 / sum((1 - nu**2) / young for young, nu in ((2.1e5, 0.3), (1.0e5, 0.34))), 0.0
+    tamaas.ModelFactory.registerNonPeriodic(model, "dcfft")
+    solver = tamaas.PolonskyKeerRey(model, np.ascontiguousarray(-gap.reshape(grid.counts)), 1e-12)
+    solver.setIntegralOperator("dcfft")
+    solver.max_iter = 3000
+    solver.solve(600 / float(sides.prod()))
+    other = np.asarray(model.traction).ravel()
+    assert np.array_equal(pressure > 0, other > 0)
+    assert np.abs(pressure - other).max() < 1e-6 * pressure.max()

@@ -16,7 +16,7 @@ from fenwear.bodies.ready import ready_geometries
 from fenwear.case import builtin_cases
 from fenwear.case.keys import Key, all_keys
 from fenwear.cli import app as command_line
-from fenwear.results import history, sheet, steps, surfaces, table_cycle
+from fenwear.results import history, roughness, sheet, steps, surfaces, table_cycle
 from fenwear_verify.suite import registered
 
 
@@ -137,6 +137,7 @@ class Results(Written):
             "With heat.track": history.BULK,
             "Of solids and rings instead, or as well": _of_surfaces(),
             "Of solids in a cycle that is a table": surfaces.on_surfaces(table_cycle.VARIABLES),
+            "Of rough surfaces, with _strip of the strip": roughness.of_body("punch"),
             "With contact.law = coulomb": steps.VARIABLES,
             "With contact.law = coulomb and heat": steps.HEAT_VARIABLES,
             "With contact.law = coulomb in a solid instead, or as well": steps.of_solids(),

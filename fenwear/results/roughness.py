@@ -23,7 +23,7 @@ Variable = tuple[tuple[str, ...], str, str]  # dimensions, units, long name
 FEWEST = 8  # nodes along each axis of the rectangle, below which the whole grid is taken
 SHARES = (0.1, 0.5, 0.9)  # of the rectangle, whose heights of the bearing curve the summary has
 NAMES = {
-    "roughness_mean": ("mm", "mean height of the {} over its mean and form (Sa) where it has worn, at the end"),
+    "roughness_mean": ("mm", "mean distance of the {} from its mean and form (Sa) where it has worn, at the end"),
     "roughness_rms": ("mm", "root mean square of the same heights (Sq) of the {}"),
     "roughness_skewness": ("1", "skewness of the same heights (Ssk) of the {}"),
 }
@@ -38,11 +38,12 @@ def _rough(system: Tribosystem) -> dict[str, ContactSurface]:
 
 def variables(system: Tribosystem) -> dict[str, Variable]:
     """Return the variables of rough surfaces."""
-    return {
-        f"{name}{ENDS[body]}": (("half_cycle",), unit, text.format(body))
-        for body in _rough(system)
-        for name, (unit, text) in NAMES.items()
-    }
+    return {name: one for body in _rough(system) for name, one in of_body(body).items()}
+
+
+def of_body(body: str) -> dict[str, Variable]:
+    """Return the variables of a rough body."""
+    return {f"{name}{ENDS[body]}": (("half_cycle",), unit, text.format(body)) for name, (unit, text) in NAMES.items()}
 
 
 def values(block: Block) -> dict[str, Array]:

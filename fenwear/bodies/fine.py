@@ -91,6 +91,16 @@ class FineBody:
         """Return L, and what forces along a traction (d,) at points do along the first direction (m, m)."""
         return self.weights, self.correction.response[:, 0] @ traction
 
+    @property
+    def tables(self) -> Array:
+        """The half-space's displacements by unit forces at all distances (2 m - 1, ..., a, d), mm."""
+        return self.half.tables
+
+    @property
+    def mixed(self) -> tuple[TensorWeights, Array]:
+        """L, and what forces at points do along the directions (m, a, m, d)."""
+        return self.weights, self.correction.response
+
     def at(self, x: Array) -> FineBody:
         """Return the same with its nodes at other places of the body (q, d), mm."""
         half = self.half.at(x)

@@ -143,6 +143,16 @@ class HalfSpace:
         """Return what it is besides: nothing."""
         del traction
 
+    @property
+    def tables(self) -> Array:
+        """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
+        return self._table
+
+    @property
+    def mixed(self) -> None:
+        """What it is besides, along all axes: nothing."""
+        return
+
     def at(self, x: Array) -> HalfSpace:
         """Return the same with its nodes at other places (q, d), mm: it does not know where they are."""
         flat = x[:, list(self.axes[:-1])]

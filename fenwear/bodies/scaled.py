@@ -83,6 +83,17 @@ class ScaledConvolution(Scaled):
         """Return the displacement by a force (d,) at all distances of two nodes (2 m - 1, ...)."""
         return np.asarray(self.factor * self.operator.table(traction))
 
+    @property
+    def tables(self) -> Array:
+        """Displacements by unit forces at all distances of two nodes (2 m - 1, ..., a, d), mm."""
+        return np.asarray(self.factor * self.operator.tables)
+
+    @property
+    def mixed(self) -> tuple[Any, Array] | None:
+        """Values at points to the nodes, and what forces at points do (k, a, k, d); None for none."""
+        found = self.operator.mixed
+        return None if found is None else (found[0], self.factor * found[1])
+
     def smooth(self, traction: Array) -> tuple[Array, Array] | None:
         """Return values at points to the nodes (q, k), and what forces along it at points do (k, k); None for none."""
         found = self.operator.smooth(traction)

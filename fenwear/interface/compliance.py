@@ -24,12 +24,14 @@ from fenwear.bodies.condensation import product
 from fenwear.bodies.operators import SurfaceOperator
 from fenwear.interface.convolution import Convolution, convolution
 from fenwear.interface.equilibrium import RigidEquilibrium
+from fenwear.interface.frame_convolution import FrameConvolution, frame_convolution
 from fenwear.interface.pair import ContactPair
 from fenwear.interface.placement import ZERO
 from fenwear.parallel import Rows
 
 EVERY, RUN = slice(None), 512  # rows that are taken at once, where whole matrices would take memory
 MATRIX = 1000  # nodes up to which a matrix in memory is faster than products, asked for again and again
+GRIDDED = 400  # nodes of a grid from where products along all axes are faster
 SOME = 64  # nodes whose rows tell the scale of gaps where no numbers are in memory
 
 
@@ -336,6 +338,14 @@ class FrameCompliance:
         return np.einsum("iajc,jcb->bjai", self.interface.asked(rows, nodes), self._force[nodes], optimize=True)
 
     @cached_property
+    def on_grid(self) -> FrameConvolution | None:
+        """The same as a convolution; None where the surfaces are on no common grid, or pass each other."""
+        own = self.interface
+        if self._n < GRIDDED or own.strip_moves or own.cost is None or own.pair.placement.turn != ZERO:
+            return None
+        return frame_convolution([own.punch, own.strip], own.axes, own.pair.weights, own.layer)
+
+    @cached_property
     def _columns(self) -> Array:
         """C^T, so that what a component moves lies together in memory."""
         size = self._n * self._force.shape[2]
@@ -343,12 +353,16 @@ class FrameCompliance:
 
     @cached_property
     def _diagonal(self) -> Array:
+        if self.on_grid is not None:
+            return self.on_grid.diagonal
         if self._numbers:
             return self._columns.diagonal().copy()
         return np.einsum("iac,ica->ai", self.interface.diagonal(), self._force).ravel()
 
     def apply(self, traction: Array) -> Array:
         """Return the displacements (d n,) of tractions (d n,)."""
+        if self.on_grid is not None:
+            return self.on_grid.apply(traction)
         if self._numbers:
             loaded = np.flatnonzero(traction)
             return traction[loaded] @ self._columns[loaded]

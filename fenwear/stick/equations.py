@@ -21,6 +21,7 @@ answers (A. Klarbring, Ing.-Archiv 60, 1990). The sign of the determinant of the
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,9 @@ from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position
 from fenwear.stick.state import Imposed, StickState
 
+CLOSE = 1e-10  # residual of the laws over the largest pressure
+FEW = 8  # Newton steps from where it should take one or two
+NEVER = 1000
 ROUNDING = 1e-12  # of what the largest pressure gives way: no slip
 
 
@@ -61,13 +65,17 @@ class SurfaceDisplacement(NamedTuple):
 
 
 class StatusSolution(NamedTuple):
-    """What solves the equations of a contact status: f (d n,), a, delta, the sign of the determinant, what moves."""
+    """What solves the equations of a contact status: f (d n,), a, delta, the sign of the determinant, what moves.
+
+    `jump` is what f moves the surfaces by against each other (d n,), where it is known.
+    """
 
     f: Array
     rigid: Array
     displacement: float
     sign: int
     moved: SurfaceDisplacement | None = None
+    jump: Array | None = None
 
 
 class Step:
@@ -80,6 +88,9 @@ class Step:
         imposed: At the end.
         friction: mu (n,).
     """
+
+    close, few = CLOSE, FEW  # residual that is enough; Newton steps that may be taken from a near status
+    patience = NEVER  # Newton steps without success that end it
 
     def __init__(
         self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
@@ -118,6 +129,11 @@ class Step:
         self.units = self.length / np.maximum(np.abs(position.modes).max(axis=0, initial=0.0), 1e-300)
         self.area = float(position.pair.weights.sum())
 
+    @cached_property
+    def reachable(self) -> Mask:
+        """Which nodes may touch at first (n,)."""
+        return np.ones(self.n, dtype=bool)
+
     def _crept(self, creep: StickCreep) -> tuple[Displaced, Displaced]:
         """Return what has crept at the end of the step but for what its tractions add, and at its start.
 
@@ -133,8 +149,9 @@ class Step:
 
     def jumps(self, found: StatusSolution) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
-        position = self.position
-        j = position.compliance.apply(found.f) if found.moved is None else found.moved.jump
+        position, j = self.position, found.jump
+        if j is None:
+            j = position.compliance.apply(found.f) if found.moved is None else found.moved.jump
         j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
         if self.closure is not None:
             j[: self.n] += self.closure.closure(found.f[: self.n])
@@ -242,7 +259,7 @@ class Step:
         stuck = status.closed & (~status.slipping | (np.abs(slip) <= rounding).all(axis=1))
         slip = np.where(stuck[:, None], 0.0, slip)
         f = np.concatenate([pressure, traction.T.ravel()])
-        moved = found.moved or self._moved(f)
+        moved = found.moved or self._moved(f, found.jump)
         crept = self.before.crept
         if self.creep is not None and self.imposed.loaded.by_force is not None:
             forced = self.imposed.loaded.by_force
@@ -267,8 +284,14 @@ class Step:
             flowed=flowed if self.hardness < np.inf else None,
         )
 
-    def _moved(self, f: Array) -> SurfaceDisplacement:
-        """Return what tractions (d n,) move; the jump, which is known then, is left out."""
+    def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:
+        """Return what tractions (d n,) move, and the surfaces against each other, where it is known: that is left out.
+
+        Args:
+            f: Tractions.
+            jump: What they move the surfaces by (d n,); None where it is not known.
+        """
+        del jump
         position, interface = self.position, self.interface
         force = position.in_space(f * position.weights)
         back = position.reading.T @ position.pair.placement.back(force)

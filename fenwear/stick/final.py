@@ -40,6 +40,8 @@ from fenwear.stick.heat import HeatHistory
 
 FAR = 1e3  # times the largest gap: never closes
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
+INSIDE = 0.12  # of a side of squares: how far inside of their edge a zone of them carries (measured, as a falls in)
+LEFT, NEAR, BEYOND, FITTED = 0.25, 1.0, 4.0, 12  # nodes: what is left of an edge, and where slip is read; of them many
 DOUBLED, HALVED = 40, 60  # times that bounds are doubled and halved to share a depth between coated bodies
 
 
@@ -187,6 +189,8 @@ def _final_shape(problem: PartialSlipProblem, stick: Mask | Sequence[Edge] | Non
     if isinstance(stick, np.ndarray):
         return _of_nodes(problem, stick)
     if stick is None and problem.interface.middle.pair.punch.dim == 3:
+        if problem.interface.middle.compliance.on_grid is not None:
+            return _of_grid(problem, _second_cycle(problem))
         return _of_surface(problem, stick_zone(problem))
     edges = stick_zone_edges(problem) if stick is None else stick
     found = _of_edges(problem, edges) if len(edges) == 2 else None
@@ -211,6 +215,39 @@ def _of_surface(problem: PartialSlipProblem, zone: Mask) -> FinalShape:
     other = [_of_nodes(problem, one) if one.any() else found for one in (zone | wider, inner)]
     deepest, volume = _ranges(problem, [one.depth for one in other])
     return replace(found, deepest=deepest, volume=volume, within=float(problem.weights @ wider) / 2)
+
+
+def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShape:
+    """Return the shape with a zone as large as the slip beside those nodes tells that stick in a cycle, on a grid.
+
+    From the edge of the zone on slip grows as distance^(3/2), so that the root of the area with less slip grows evenly
+    with slip^(2/3), from that of the zone. A zone of squares carries as one whose edge is INSIDE of a side farther in.
+    """
+    weights, stuck = problem.weights, records.stuck
+    if not stuck.any():
+        return _of_nodes(problem, stuck)
+    slid = np.where(stuck, 0.0, records.slip_magnitude.sum(axis=0))
+    slid = np.where(records.touched, slid, np.inf)
+    order = np.argsort(slid, kind="stable")
+    area, level = np.cumsum(weights[order]) - weights[order] / 2, slid[order] ** (2 / 3)
+    least = float(weights @ stuck)
+    side = float(np.sqrt(np.median(weights)))
+    size, ring = least, 2 * np.sqrt(np.pi * least) * side
+    beyond = (area > least + NEAR * ring) & (area < least + BEYOND * ring) & np.isfinite(level)
+    if beyond.sum() > FITTED:
+        size = float(np.polynomial.polynomial.polyfit(level[beyond], np.sqrt(area[beyond]), 1)[0] ** 2)
+
+    def zone(more: float) -> Mask:
+        """Return the nodes that slip least, as many as carry like a zone so many nodes wider."""
+        carried = size + (more + INSIDE) * ring
+        found = np.zeros(len(weights), dtype=bool)
+        found[order[: max(int(np.searchsorted(area, carried)), 1)]] = True
+        return found
+
+    found = _of_nodes(problem, zone(0.0))
+    other = [_of_nodes(problem, zone(more)) for more in (LEFT, -LEFT)]
+    deepest, volume = _ranges(problem, [one.depth for one in other])
+    return replace(found, size=size, deepest=deepest, volume=volume, within=LEFT * ring)
 
 
 def _of_edges(problem: PartialSlipProblem, edges: Sequence[Edge]) -> FinalShape | None:

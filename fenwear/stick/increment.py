@@ -13,11 +13,11 @@ from fenwear.stick.equations import ContactStatus, StatusSolution, Step
 from fenwear.stick.full import FullStep
 from fenwear.stick.interface import OppositeBodies
 from fenwear.stick.position import Position, along_tangents
+from fenwear.stick.products import GridStep
 from fenwear.stick.state import Imposed, StickState
 
 MOST = 60  # Newton steps
-FEW = 8  # from where it should take one or two
-CLOSE = 1e-10  # residual of the laws over the largest pressure
+IDLE = 0.5  # of a residual: steps that lessen it by less, all of a step's patience, go round
 HALVINGS = 6  # of a step that does not converge
 TOO_LARGE = "friction is so large that the step may have no or several answers; expected less friction"
 
@@ -55,7 +55,7 @@ def advance(
     if near is not None:
         step = _step(interface, position, before, end, friction)
         try:
-            return _from(step, _status(*near, friction, step.hardness), FEW)
+            return _from(step, _status(*near, friction, step.hardness), step.few)
         except ConvergenceError:
             pass
     try:
@@ -67,8 +67,11 @@ def advance(
 
 
 def _step(interface: OppositeBodies, position: Position, before: StickState, end: Imposed, friction: Array) -> Step:
-    """Return the equations of a time step, on all displacements where the bodies are wanted whole."""
-    return (FullStep if interface.full else Step)(interface, position, before, end, friction)
+    """Return the equations of a time step: on all displacements where the bodies are wanted whole, or on a grid."""
+    if interface.full:
+        return FullStep(interface, position, before, end, friction)
+    gridded = position.compliance.on_grid is not None
+    return (GridStep if gridded else Step)(interface, position, before, end, friction)
 
 
 def _check_force(
@@ -140,8 +143,8 @@ def _newton(step: Step) -> StickState:
         ConvergenceError: none does.
     """
     first = _status(step.before.pressure, step.before.trial, step.mu, step.hardness)
-    none = np.zeros_like(first.closed)
-    starts = [first, first._replace(slipping=none), first._replace(closed=~none, slipping=none, flowing=none)]
+    first, none = first._replace(closed=first.closed & step.reachable), np.zeros_like(first.closed)
+    starts = [first, first._replace(slipping=none), first._replace(closed=step.reachable, slipping=none, flowing=none)]
     failure = ConvergenceError("the contact with stick did not converge")
     for status in starts:
         try:
@@ -203,18 +206,19 @@ def _from(step: Step, status: ContactStatus, most: int = MOST) -> StickState:
 
 
 def _iterate(step: Step, status: ContactStatus, most: int = MOST) -> tuple[StatusSolution, int, bool]:
-    wrong, signs = np.inf, set[int]()
+    wrong, signs, course = np.inf, set[int](), list[float]()
     for iteration in range(1, most + 1):
         found = _solve(step, status)
         signs.add(found.sign)
         status, wrong = step.status_of(found)
-        if wrong < CLOSE:
+        course.append(wrong)
+        if wrong < step.close:
             return found, iteration, min(signs) > 0
+        if iteration > step.patience and min(course[-step.patience :]) > IDLE * min(course[: -step.patience]):
+            break
         if not status.closed.any():
-            status = status._replace(closed=np.ones_like(status.closed), flowing=np.zeros_like(status.closed))
-    failed = (
-        f"the contact with stick did not converge in {most} Newton steps, residual {wrong:.3g} of the largest pressure"
-    )
+            status = status._replace(closed=step.reachable, flowing=np.zeros_like(status.closed))
+    failed = f"the contact with stick did not converge in {iteration} Newton steps, residual {wrong:.3g}"
     if len(signs) > 1:
         raise ManyAnswersError(f"{failed}: {TOO_LARGE}")
     raise ConvergenceError(f"{failed}: take more steps, or less friction")

@@ -18,12 +18,13 @@ is computed again until both belong together; the trapezoidal rule gives its err
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, hstack, vstack
 
 from fenwear.arrays import Array, Mask
 from fenwear.errors import ConvergenceError
@@ -35,13 +36,12 @@ from fenwear.layers.step import NUDGE
 from fenwear.sliding.wear import WornDepths
 from fenwear.stick.creep import ACCURATE, CreepStep, opened_by_creep
 from fenwear.stick.cycle import PartialSlipProblem, PartialSlipState, TimeStepRecords
+from fenwear.stick.grid_jump import TOO_LARGE, Answering, GridJump
 from fenwear.stick.heat import HeatHistory
-from fenwear.stick.position import Position
 
 MOST_HEATINGS, SAME_HEAT = 20, 1e-6  # cycles that a jump's temperatures take; their change, over the warmest
 GAMMA = 1 + np.sqrt(0.5)
 CREPT = 1e-2  # of all that has crept: near its end errors are no longer measured by what a jump adds
-TOO_LARGE = "what many cycles wear is too large for numbers: expected a smaller wear coefficient"
 REST = 1e-3  # of all depths: near the end of wear, errors are no longer measured by what a jump wears alone
 SAFETY, LEAST, MOST = 0.85, 0.25, 3.0  # of the next jump's length over the last one's
 
@@ -269,34 +269,56 @@ class _Implicit:
 
     def __init__(self, problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> None:
         self.problem, self.now, self.cycles = problem, now, cycles
-        derivative, self.groups = _derivative(problem, now)
-        self._size = len(derivative)
-        matrix = np.eye(self._size) - GAMMA * cycles * derivative
-        if not np.isfinite(matrix).all():
-            raise ConvergenceError(TOO_LARGE)
-        self._factor = scipy.linalg.lu_factor(matrix)
+        self._size = len(now.worn.punch) + len(now.worn.strip) + now.worn.between.size + now.worn.carried.size
+        self.groups, itself = _derivative(problem, now)
         creep = problem.interface.creep
+        self._solve: Callable[[Array], Array]
+        if creep is None and all(group.position.compliance.on_grid is not None for group in self.groups):
+            self._solve = GridJump(self.groups, itself, GAMMA * cycles, problem.interface.layers.closure).solve
+        else:
+            self._solve = self._factored(itself)
         self._creep = (
             None if creep is None else CreepStep(creep, problem.interface.middle, problem.program.period, cycles)
         )
         if self._creep is not None:
             self._creep.answering(self._answer())
 
+    def _factored(self, itself: csr_array) -> Callable[[Array], Array]:
+        """Return the solution operator by a factor of all unknowns."""
+        derivative = itself.toarray()
+        for group in self.groups:
+            derivative -= group.left @ (self._answer_of(group) @ group.right.toarray())
+        matrix = np.eye(self._size) - GAMMA * self.cycles * derivative
+        if not np.isfinite(matrix).all():
+            raise ConvergenceError(TOO_LARGE)
+        factor = scipy.linalg.lu_factor(matrix)
+        return lambda right: np.asarray(scipy.linalg.lu_solve(factor, right))
+
+    def _answer_of(self, group: Answering) -> Array:
+        """Return how pressures of a group fall by a depth at each (k, k), MPa/mm, which is kept."""
+        if id(group) not in self._answers:
+            self._answers[id(group)] = _stiffness(self.problem, group)
+        return self._answers[id(group)]
+
+    @cached_property
+    def _answers(self) -> dict[int, Array]:
+        return {}
+
     def _answer(self) -> Array:
         """Return how pressures fall by a depth that stays all through the cycle (n, n), on the mean of its steps."""
         found = np.zeros((len(self.problem.weights),) * 2)
         for group in self.groups:
-            found[np.ix_(group.closed, group.closed)] += group.share * group.answer
+            found[np.ix_(group.closed, group.closed)] += group.share * self._answer_of(group)
         return found
 
     def solve(self, right: Array) -> Array:
         """Return z."""
         rest = right[: self._size]
         if self._creep is None:
-            return np.asarray(scipy.linalg.lu_solve(self._factor, rest))
+            return self._solve(rest)
         crept = self._creep.solve(right[self._size :])
         rest = rest + ACCURATE * self.cycles * self._by_creep(crept)
-        return np.concatenate([scipy.linalg.lu_solve(self._factor, rest), crept])
+        return np.concatenate([self._solve(rest), crept])
 
     def _by_creep(self, crept: Array) -> Array:
         """Return how a cycle's wear, and what lies between, change by what creeps (n + n_s + rows n)."""
@@ -305,7 +327,7 @@ class _Implicit:
             return found
         for group in self.groups:
             opened = opened_by_creep(group.position, creep, crept)[group.closed]
-            found -= group.left @ (group.answer @ opened)
+            found -= group.left @ (self._answer_of(group) @ opened)
         return found
 
 
@@ -317,30 +339,12 @@ def _slid_on(now: FrettingCycle, cycles: int) -> PartialSlipState:
     return replace(now.end, slid=slid + max(cycles - 1, 0) * now.records.slip_magnitude.sum(axis=0))
 
 
-@dataclass(frozen=True)
-class _Group:
-    """Time steps of a cycle in one place of the strip, with the same nodes closed.
-
-    Attributes:
-        position: The place.
-        closed: The nodes (k,).
-        answer: How their pressures fall by a depth at each (k, k), MPa/mm.
-        left: What their pressures add to a cycle's wear and to what lies between (total, k).
-        share: Of the cycle's time.
-    """
-
-    position: Position
-    closed: NDArray[np.int64]
-    answer: Array
-    left: Array
-    share: float
-
-
-def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array, list[_Group]]:
+def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[Answering], csr_array]:
     """Return A, the derivative of a cycle's wear to depths and what lies between, at the contact zone and slip of now.
 
-    Square, of the depths (n + n_s), the state of what lies between (rows n) and of the strip's material (rows n_s); and
-    the time steps that it is made of.
+    Square, of the depths (n + n_s), the state of what lies between (rows n) and of the strip's material (rows n_s): of
+    the time steps in one place with the same nodes closed, on grids with any closed, the part by their pressures; and
+    what states do to themselves.
     """
     records, steps, n = now.records, problem.program.steps, len(now.worn.punch)
     depths, layers = n + len(now.worn.strip), problem.interface.layers
@@ -348,49 +352,53 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[Array,
     remembered = _Remembered.of(problem, now, depths)
     of_punch, of_strip = problem.slopes(now.worn)
     stored, ejected = (0, 0) if debris is None else (depths + n * layers.row(name) for name in DEBRIS)
-    A, found = np.zeros((total, total)), list[_Group]()
     slid, groups = records.slip_magnitude, dict[tuple[float | Placement, bytes], list[int]]()
     over = None if debris is None else problem.debris_over(records, _begun(now))
-    fed = None if over is None else over.fed
+    fed, found = None if over is None else over.fed, list[Answering]()
+    answering = np.array([_answering(layers, pressure) for pressure in records.pressure])
     for k in range(len(records)):
         place = steps[(now.first_step + k) % len(steps)].offset if problem.interface.moves else 0.0
-        groups.setdefault((place, _answering(layers, records.pressure[k]).tobytes()), []).append(k)
+        gridded = problem.interface.position(place).compliance.on_grid is not None
+        groups.setdefault((place, b"" if gridded else answering[k].tobytes()), []).append(k)
     for (place, _), members in groups.items():
         position = problem.interface.position(place)
-        closed = np.flatnonzero(_answering(layers, records.pressure[members[0]]))
-        answer = _stiffness(problem, position, closed, records.pressure[members[0]])  # of pressure to depth
-        left = np.zeros((total, len(closed)))
+        closed = np.flatnonzero(answering[members].any(axis=0))
         slopes, kept = np.zeros((2, n)), np.zeros(n)
         lost = np.array([of_punch, position.pair.wear_interpolation @ of_strip])
         for row, law in enumerate((problem.wear.punch, problem.wear.strip)):
             if law is not None:
                 for k in members:
                     step = steps[(now.first_step + k) % len(steps)]
-                    own = law.slope(records.pressure[k], slid[k], step.duration)
+                    own = law.slope(records.pressure[k], slid[k], step.duration) * answering[k]
                     slopes[row] += own
                     kept += 0.0 if fed is None else fed[k] * own * lost[row]
-        left[closed, np.arange(len(closed))] = slopes[0, closed]
-        left[n:depths] = position.pair.wear_projection[:, closed].toarray() * slopes[1, closed]
-        right = [of_punch * np.eye(n)[closed], of_strip * position.pair.wear_interpolation[closed].toarray()]
+        left = [(closed, slopes[0])]
+        fills = [] if debris is None else [(stored, 1.0)]
         if debris is not None:
-            left[stored + closed, np.arange(len(closed))] = kept[closed]
-            left[ejected + closed, np.arange(len(closed))] = ((slopes * lost).sum(axis=0) - kept)[closed]
-        between = np.zeros((len(closed), total - depths))
-        if debris is not None:
-            between[:, stored - depths : stored - depths + n] = -np.eye(n)[closed]
+            left += [(stored + closed, kept), (ejected + closed, (slopes * lost).sum(axis=0) - kept)]
         if remembered is not None:
-            for rows, fills, rate in remembered.filling(members):
-                left[rows.start + closed, np.arange(len(closed))] = rate[closed]
-                between[:, rows.start - depths : rows.stop - depths] = -fills * np.eye(n)[closed]
-        right.append(between)
-        A -= left @ (answer @ np.concatenate(right, axis=1))
+            for rows, filled, rate in remembered.filling(members):
+                left.append((rows.start + closed, rate))
+                fills.append((rows.start, filled))
+        count, every = len(closed), np.arange(len(closed))
+        put = csr_array(position.pair.wear_projection)[:, closed] @ diags_array(slopes[1, closed])
+        onto = [csr_array((rate[closed], (rows, every)), shape=(total, count)) for rows, rate in left]
+        onto.append(csr_array(vstack([csr_array((n, count)), put, csr_array((total - depths, count))])))
+        read = diags_array(of_strip)
+        seen = csr_array(position.pair.wear_interpolation)[closed] @ read
+        own = csr_array((of_punch[closed], (every, closed)), shape=(count, n))
+        by = csr_array(hstack([own, seen, csr_array((count, total - depths))]))
+        for first, filled in fills:
+            by = by - csr_array((np.full(count, filled), (every, first + closed)), shape=(count, total))
         share = float(records.duration[members].sum() / records.duration.sum())
-        found.append(_Group(position, closed, answer, left, share))
+        pressure = records.pressure[members].mean(axis=0)
+        found.append(Answering(position, closed, pressure, csr_array(sum(onto[1:], onto[0])), csr_array(by), share))
+    itself = csr_array((total, total))
     if over is not None:
         lost, at = over.loss, np.arange(n)
-        A[stored + at, stored + at] -= lost
-        A[ejected + at, stored + at] += lost
-    return (A if remembered is None else A + remembered.slopes(total)), found
+        for rows, rate in ((stored, -lost), (ejected, lost)):
+            itself = itself + csr_array((rate, (rows + at, stored + at)), shape=(total, total))
+    return found, csr_array(itself if remembered is None else itself + remembered.slopes(total))
 
 
 def _begun(now: FrettingCycle) -> PartialSlipState:
@@ -457,20 +465,22 @@ class _Remembered:
         contact = zip(self.rows, self.fills, change.contact, strict=False)
         return [(row, fills, np.asarray(rate)) for row, fills, rate in contact if fills]
 
-    def slopes(self, total: int) -> Array:
+    def slopes(self, total: int) -> csr_array:
         """Return how the rates follow the states themselves, among all unknowns (total, total)."""
-        found, slopes = np.zeros((total, total)), self.evolution.rate(self.held)[1]
+        found, slopes = csr_array((total, total)), self.evolution.rate(self.held)[1]
         q = slopes.contact.shape[1]
         for own, part in ((self.rows[:q], slopes.contact), (self.rows[q:], slopes.strip)):
+            at = np.arange(part.shape[0])
             for i, one in enumerate(own):
                 for j, other in enumerate(own):
-                    at = np.arange(part.shape[0])
-                    found[one.start + at, other.start + at] = part[:, i, j]
-        return found
+                    entries = part[:, i, j], (one.start + at, other.start + at)
+                    found = found + csr_array(entries, shape=(total, total))
+        return csr_array(found)
 
 
-def _stiffness(problem: PartialSlipProblem, position: Position, closed: NDArray[np.int64], pressure: Array) -> Array:
+def _stiffness(problem: PartialSlipProblem, group: Answering) -> Array:
     """Return how the pressures of closed nodes fall by a depth at each, under a constant load (k, k), MPa/mm."""
+    position, closed = group.position, group.closed
     k, r = len(closed), position.modes.shape[1]
     n = len(position.pair.weights)
     unit = float(np.median(position.compliance.diagonal()[:n]))
@@ -478,7 +488,7 @@ def _stiffness(problem: PartialSlipProblem, position: Position, closed: NDArray[
     system[:k, :k] = position.compliance.entries(closed, closed) / unit
     closure = problem.interface.layers.closure
     if closure is not None:
-        system[np.arange(k), np.arange(k)] += closure.slope(pressure)[closed] / unit
+        system[np.arange(k), np.arange(k)] += closure.slope(group.pressure)[closed] / unit
     system[:k, k:] = position.modes[closed]
     system[k:, :k] = position.balance[:, closed]
     right = np.eye(k + r)[:, :k]

@@ -18,6 +18,8 @@ from fenwear.stick.interface import StickInterface, meshed
 from fenwear.stick.program import far_enough, make_program
 from fenwear.stick.wear import LocalLaws
 
+MOST_PASSING = 3000  # nodes of a grid under which a strip passes
+
 
 def partial_slip_problem(
     case: Case,
@@ -60,6 +62,7 @@ def unheated_problem(
 ) -> PartialSlipProblem:
     """Return the same without heat; collective. Arguments as of `partial_slip_problem`."""
     sliding, surface = make_sliding(case), bodies.punch.surface
+    _check_passing(case, surface)
     interface = StickInterface(
         bodies,
         sliding,
@@ -101,6 +104,23 @@ def heated(problem: PartialSlipProblem, case: Case) -> PartialSlipProblem:
     steps = len(problem.program.steps) // problem.program.half_cycles
     heat = stick_heat(meshed(problem.interface), case, steps)
     return problem.with_heat(heat)
+
+
+def _check_passing(case: Case, surface: ContactSurface) -> None:
+    """Make sure that a strip which passes under the punch does not do so on a grid that is too fine for factors.
+
+    Raises:
+        CaseError: it does.
+    """
+    if surface.grid is not None and len(surface.x) > MOST_PASSING and _moves(case, surface):
+        raise CaseError(
+            InputError(
+                "motion.positions",
+                f"with stick, a strip that passes under the punch is solved by factors of its contact nodes, up to "
+                f"{MOST_PASSING:,} of a grid, got {len(surface.x):,}: expected 1 (surfaces stay opposite each other, "
+                "and any number of nodes goes), or fewer grid.nodes",
+            )
+        )
 
 
 def _moves(case: Case, surface: ContactSurface) -> bool:

@@ -8,7 +8,15 @@ import pytest
 from fenwear.stick import Imposed, Position, StickState
 
 
-def check_laws(position: Position, before: StickState, state: StickState, end: Imposed, mu: float, load: float) -> None:
+def check_laws(
+    position: Position,
+    before: StickState,
+    state: StickState,
+    end: Imposed,
+    mu: float,
+    load: float,
+    close: float = 1e-9,
+) -> None:
     """All laws of a step, from the displacements of both bodies rather than the compliance that was solved with."""
     p, t, s, n = state.pressure, state.traction, state.slip, len(state.pressure)
     size, top = np.linalg.norm(t, axis=1), p.max()
@@ -19,9 +27,9 @@ def check_laws(position: Position, before: StickState, state: StickState, end: I
     if state.parts == 1:
         slid = np.linalg.norm(s, axis=1)
         moved = state.closed & (slid > 0)
-        assert np.abs(size - mu * p)[moved].max(initial=0) < 1e-9 * top, "what slips carries mu p"
+        assert np.abs(size - mu * p)[moved].max(initial=0) < close * top, "what slips carries mu p"
         against = -np.einsum("nm,nm->n", t, s)
-        assert np.abs(against - size * slid)[moved].max(initial=0) < 1e-8 * top * slid.max(initial=0)
+        assert np.abs(against - size * slid)[moved].max(initial=0) < 10 * close * top * slid.max(initial=0)
         inside = state.closed & (size < (1 - 1e-7) * mu * p)
         assert not slid[inside].any(), "it sticks inside"
     jumps = []
@@ -29,13 +37,13 @@ def check_laws(position: Position, before: StickState, state: StickState, end: I
         moved_by = position.in_frame(one.on_punch - position.reading @ one.on_strip)
         jumps.append(moved_by + position.modes @ one.rigid - position.drive * one.displacement)
     scale = np.abs(jumps[1]).max()
-    assert np.abs(jumps[1][:n] + end.opening - state.gap).max() < 1e-9 * scale
+    assert np.abs(jumps[1][:n] + end.opening - state.gap).max() < close * scale
     slips = (jumps[1] - jumps[0])[n:].reshape(-1, n).T
-    assert np.abs(slips - s)[state.closed].max() < 1e-9 * scale
+    assert np.abs(slips - s)[state.closed].max() < close * scale
     f = np.concatenate([p, t.T.ravel()])
-    assert np.abs(position.balance @ f + end.loaded.resultant).max() < 1e-9 * load
+    assert np.abs(position.balance @ f + end.loaded.resultant).max() < close * load
     if t.shape[1] == 1:
-        assert state.force == pytest.approx(position.pair.weights @ t[:, 0], abs=1e-9 * load)
+        assert state.force == pytest.approx(position.pair.weights @ t[:, 0], abs=close * load)
 
 
 def check_energy(position: Position, before: StickState, state: StickState, end: Imposed, load: float) -> None:

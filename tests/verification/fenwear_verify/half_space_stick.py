@@ -17,7 +17,7 @@ from scipy.sparse import csr_array, eye_array
 from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.bodies.contact_surface import ContactSurface
-from fenwear.bodies.half_space import influence
+from fenwear.bodies.half_space import HalfSpace, influence
 from fenwear.interface import ContactPair, RigidEquilibrium
 from fenwear.interface.placement import HERE
 from fenwear.sliding.field import ALONG_X
@@ -92,6 +92,42 @@ def _pressed(x: Array, spacing: float, load: float, gap: Array) -> RigidEquilibr
     )
     pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, gap)
     return RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",), of_punch=1)
+
+
+def on_grid(
+    upper: Elastic, lower: Elastic, spacing: float, counts: tuple[int, ...], load: float, radius: float
+) -> OppositeBodies:
+    """Return two half-spaces, in the plane half-planes, on a grid of their own about the middle: any number of nodes.
+
+    Args:
+        upper, lower: The bodies; the upper one is the punch, a sphere or a cylinder.
+        spacing: Of the grid, mm.
+        counts: Nodes along its axes.
+        load: That presses them together, N or N/mm.
+        radius: Of the punch, mm.
+    """
+    places = np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), axis=-1).reshape(-1, len(counts))
+    x = (places - (np.array(counts) - 1) / 2) * spacing
+    n, d = len(x), len(counts) + 1
+    trace, up = np.column_stack([x, np.zeros(n)]), np.tile(np.eye(d)[-1], (n, 1))
+    same, weights = csr_array(eye_array(n)), np.full(n, spacing ** len(counts))
+    cell, facets = "interval", np.stack([np.arange(n - 1), np.arange(1, n)], axis=1)
+    if d == 3:
+        number = np.arange(n).reshape(counts)
+        corners = (number[:-1, :-1], number[1:, :-1], number[:-1, 1:], number[1:, 1:])
+        cell, facets = "quadrilateral", np.stack(corners, axis=-1).reshape(-1, 4)
+    punch, strip = (
+        ContactSurface(body, trace, facets, cell, 1, np.arange(n), weights, outward, same)
+        for body, outward in (("punch", -up), ("strip", up))
+    )
+    pair = ContactPair(punch, strip, HERE, up, weights, same, same, same, np.sum(x**2, axis=1) / (2 * radius))
+    rigid = RigidEquilibrium(pair, up[:, :, None], np.array([-load]), ("lambda_F",), of_punch=1)
+    steps, axes, depth = (spacing,) * len(counts), tuple(range(d)), 1e3 * radius if d == 2 else np.inf
+    bodies = [
+        HalfSpace(places, steps, body.shear, body.poisson, axes, outward, depth=depth)
+        for body, outward in ((upper, -1.0), (lower, 1.0))
+    ]
+    return OppositeBodies(bodies[0], bodies[1], rigid, ALONG_X)
 
 
 def _squares(x: Array, spacing: float) -> NDArray[np.int64]:

@@ -1,0 +1,322 @@
+"""One time step of contact with stick by products alone, on a contact grid: memory linear in the nodes.
+
+Of the contact status of a Newton step the unknowns are fields on the grid: pressures dp where nodes touch, tractions u
+where they stick, and across the direction n of the trial where they slip in two directions; where they slip
+dt = mu n dp + u. With the projector Q on what is unknown, and f = N x of x = (dp, u),
+
+    Q (C N x + H a - V delta) + D x = -residual,
+
+D of what slips is (|z| - r) / (r c): the derivative of the cone's projection (`cone`), solved for the slip across n; of
+what touches, the slope of what gives way beside the bodies. It is solved by GMRES to some digits, which Newton's method
+goes on from. The preconditioner is the inverse of C on an endless grid, restricted to the unknowns, between roots of
+1 + D / C_ii, with the balances of forces held exactly: about as many iterations at any number of nodes. The sign of
+the determinant is not known: whether there are other answers is not told.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike
+
+from fenwear.arrays import Array, Mask
+from fenwear.contact.krylov import flexible
+from fenwear.errors import ConvergenceError
+from fenwear.stick.equations import ContactStatus, StatusSolution, Step, SurfaceDisplacement
+from fenwear.stick.interface import OppositeBodies
+from fenwear.stick.position import Position
+from fenwear.stick.state import Imposed, StickState
+
+CLOSE = 1e-7  # residual of the laws over the largest pressure
+FEW = 20  # Newton steps from where it should take some
+PATIENCE = 15  # Newton steps that may go by without success
+ROUGH = {2: 1e-6, 3: 1e-2}  # of a residual that is left, at most: in the plane more costs next to nothing
+AHEAD = 0.1  # of a residual that is left, over that of the laws: Newton's steps speed up
+NUMBERS = {2: np.float64, 3: np.float32}  # of the solutions by products
+FINEST = {2: 1e-10, 3: 2e-5}  # of a residual that may be left in them
+SHARE = 0.1  # of the residual of the laws that ends a step, in its last solution
+RESTART, RESTARTS = 80, 2
+FAR = 0.5  # of a residual that may be left: more is no solution
+STIFF = 1e8  # D over the diagonal of C, at most
+LOOSE = "the contact with stick has a singular step: nothing holds the bodies as they slip"
+FLAT = 1e-6  # of the largest singular value: balances that nothing holds
+
+
+class GridStep(Step):
+    """The equations of one time step on a grid; arguments as of `Step`."""
+
+    close, few, patience = CLOSE, FEW, PATIENCE
+
+    def __init__(
+        self, interface: OppositeBodies, position: Position, before: StickState, imposed: Imposed, friction: Array
+    ) -> None:
+        super().__init__(interface, position, before, imposed, friction)
+        on = self.position.compliance.on_grid
+        assert on is not None
+        self.on = on
+        self._last: StatusSolution | None = None
+        self._wrong = 1.0
+
+    @cached_property
+    def reachable(self) -> Mask:
+        """Which nodes may touch at first (n,): no farther apart than the whole load on one node would bring them."""
+        load = np.abs(self.imposed.loaded.resultant * self.units).max(initial=0.0) / self.length
+        gap = self.free[: self.n]
+        far = load / float(self.position.pair.weights.min()) * float(self.scale[0].max())
+        return np.asarray(gap <= gap.min() + far) if far > 0 else super().reachable
+
+    @cached_property
+    def _rigid(self) -> tuple[Array, Array]:
+        """Unit rigid modes, and the strip's displacement where it is free, over the length (r, d, n); their forces."""
+        position, loose = self.position, self.imposed.force is not None
+        moved = position.modes.T * (self.units / self.length)[:, None]
+        forces = position.balance * (self.units / (self.length * self.area))[:, None]
+        if loose:
+            moved = np.concatenate([moved, -position.drive[None]])
+            forces = np.concatenate([forces, position.pull[None] / self.area])
+        shape = len(moved), self.d, self.n
+        return moved.reshape(shape), forces.reshape(shape)
+
+    def solve(self, status: ContactStatus) -> StatusSolution:
+        """Return a solution of a contact status, better by some digits than the last one.
+
+        Raises:
+            ConvergenceError: its equations are singular.
+        """
+        last, piece = self._last, _Piece.of(self, status)
+        f = self._begun(status) if last is None else last.f.reshape(self.d, -1)
+        rigid, displacement = (
+            (self.before.rigid, self.before.displacement) if last is None else (last.rigid, last.displacement)
+        )
+        if self.imposed.force is None:
+            displacement = float(self.imposed.displacement or 0.0)
+        x = piece.known(f)
+        f = piece.tractions(x) + piece.fixed
+        jump = self.on.apply(f.ravel())
+        found = StatusSolution(f.ravel(), rigid, displacement, 1, jump=jump)
+        rest, forces = piece.residual(x, self._opened(found)), self._missing(found)
+        closed = piece.closed
+        moved, held = (part[:, :, closed] for part in self._rigid)
+        solver = _Solver(self, piece, moved, held)
+        size = max(float(np.sqrt(np.mean(rest[:, closed] ** 2))), float(np.abs(forces).max(initial=0.0)))
+        enough = SHARE * self.close * float(f[0].max())
+        least = max(FINEST[self.d], min(1.0, enough / max(size, 1e-300)))
+        accuracy = max(min(ROUGH[self.d], AHEAD * self._wrong), least)
+        dx, by = solver.solve(-rest[:, closed], -forces, accuracy)
+        change = np.zeros_like(x)
+        change[:, closed] = dx
+        f = piece.tractions(x + change) + piece.fixed
+        loose = self.imposed.force is not None
+        r = len(rigid)
+        displacement += float(by[-1] * self.length) if loose else 0.0
+        jump = self.on.apply(f.ravel())
+        self._last = StatusSolution(f.ravel(), rigid + by[:r] * self.units, displacement, 1, jump=jump)
+        return self._last
+
+    def status_of(self, found: StatusSolution) -> tuple[ContactStatus, float]:
+        """Return a solution's contact status, and the residual of the laws there over the largest pressure."""
+        status, self._wrong = super().status_of(found)
+        return status, self._wrong
+
+    def _begun(self, status: ContactStatus) -> Array:
+        """Return tractions (d, n) that a status came from."""
+        size = np.linalg.norm(status.trial, axis=1)
+        limit = self.mu * status.pressure
+        inside = np.where(size > limit, limit / np.maximum(size, 1e-300), 1.0)
+        return np.concatenate([status.pressure[None], (status.trial * inside[:, None]).T])
+
+    def _opened(self, found: StatusSolution) -> Array:
+        """Return gap and slip over the length (d, n)."""
+        gap, slip = self.jumps(found)
+        return np.asarray(np.concatenate([gap[None], slip.T]) / self.length)
+
+    def _missing(self, found: StatusSolution) -> Array:
+        """Return what the balances miss (r,), in means over the area."""
+        forces = self.position.balance @ found.f + self.imposed.loaded.resultant
+        forces = forces * (self.units / (self.length * self.area))
+        if self.imposed.force is None:
+            return np.asarray(forces)
+        return np.append(forces, (self.position.pull @ found.f - self.imposed.force) / self.area)
+
+    def _moved(self, f: Array, jump: Array | None) -> SurfaceDisplacement:
+        """Return what tractions (d n,) move: of the strip what the punch's displacement and the jump leave."""
+        if jump is None or self.interface.moves:
+            return super()._moved(f, jump)
+        position, bodies = self.position, jump.copy()
+        if position.interface.layer is not None:
+            bodies[: self.n] -= position.interface.layer * f[: self.n]
+        on_punch = position.interface.punch.apply(position.in_space(f * position.weights))
+        return SurfaceDisplacement(np.zeros(0), on_punch, on_punch - position.in_space(bodies))
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """The unknowns of a contact status, fields (d, n).
+
+    Attributes:
+        closed: Nodes that touch (k,).
+        pressed: Nodes whose pressure is unknown (n,).
+        kept: What of tractions is unknown: nodes that stick (n,).
+        across: Unit vectors across the trial where nodes slip in two directions, else zero (m, n).
+        slides: mu n where nodes slip, else zero (m, n).
+        stiff: D over the length (d, n), of u along `across`.
+        fixed: Tractions that are known: what flows (d, n).
+    """
+
+    closed: Array
+    pressed: Mask
+    kept: Mask
+    across: Array
+    slides: Array
+    stiff: Array
+    fixed: Array
+
+    @classmethod
+    def of(cls, step: GridStep, status: ContactStatus) -> _Piece:
+        """Return those of a status."""
+        closed, slips = status.closed, status.closed & status.slipping
+        flows = closed & status.flowing
+        size = np.maximum(np.linalg.norm(status.trial, axis=1), 1e-300)
+        direction = np.where(slips, status.trial.T / size, 0.0)
+        slides = step.mu * direction
+        across, stiff = np.zeros_like(direction), np.zeros((step.d, step.n))
+        scale = step.scale / step.length
+        if step.m == 2:
+            across = np.stack([-direction[1], direction[0]])
+            over = (size - status.radius) / np.maximum(status.radius, size / STIFF)
+            stiff[1:] = np.where(slips, scale[1:] * np.clip(over, 0.0, STIFF), 0.0)
+        if step.closure is not None:
+            stiff[0] = np.where(closed, step.closure.slope(status.pressure) / step.length, 0.0)
+        fixed = np.zeros((step.d, step.n))
+        if flows.any():
+            fixed[0, flows] = step.hardness
+            fixed[1:] = slides * fixed[0]
+        every = np.flatnonzero(closed)
+        return cls(every, closed & ~flows, closed & ~slips, across, slides, stiff, fixed)
+
+    def of_numbers(self, dtype: DTypeLike) -> _Piece:
+        """The same in another precision."""
+        rest = (self.across, self.slides, self.stiff, self.fixed)
+        return _Piece(self.closed, self.pressed, self.kept, *(one.astype(dtype) for one in rest))
+
+    @cached_property
+    def on_closed(self) -> _Piece:
+        """The same on the nodes that touch alone."""
+        k = self.closed
+        rest = (self.across, self.slides, self.stiff, self.fixed)
+        return _Piece(np.arange(len(k)), self.pressed[k], self.kept[k], *(one[:, k] for one in rest))
+
+    def known(self, f: Array) -> Array:
+        """Return the unknowns (d, n) that tractions have."""
+        return self.unknown(np.concatenate([f[:1], f[1:] - self.slides * f[:1]]))
+
+    @cached_property
+    def _projector(self) -> Array:
+        """Q of the normal, and of the tangents with themselves, and in two directions with each other (d or 4, n)."""
+        kept, across = self.kept.astype(self.stiff.dtype), self.across
+        found = [self.pressed.astype(self.stiff.dtype), *(kept + part * part for part in across)]
+        return np.array(found if len(across) == 1 else [*found, across[0] * across[1]])
+
+    def unknown(self, fields: Array) -> Array:
+        """Return Q of fields (d, n)."""
+        Q, d = self._projector, len(fields)
+        found = Q[:d] * fields
+        if d == 3:
+            found[1] += Q[3] * fields[2]
+            found[2] += Q[3] * fields[1]
+        return found
+
+    def tractions(self, x: Array) -> Array:
+        """Return N x (d, n)."""
+        found = x.copy()
+        if x[0].any():
+            found[1:] += self.slides * x[0]
+        return found
+
+    def residual(self, x: Array, opened: Array) -> Array:
+        """Return Q of gap and slip, with D of what slips; what gives way is in the gap."""
+        return np.concatenate([(opened[0] * self.pressed)[None], self.unknown(opened)[1:] + self.stiff[1:] * x[1:]])
+
+
+class _Solver:
+    """The linear equations of a piece on the nodes that touch (k).
+
+    Args:
+        step: What they are of.
+        piece: The unknowns.
+        moved, held: Unit rigid modes and their forces there (r, d, k).
+
+    Raises:
+        ConvergenceError: nothing holds the bodies.
+    """
+
+    def __init__(self, step: GridStep, piece: _Piece, moved: Array, held: Array) -> None:
+        self.dtype: np.dtype[Any] = np.dtype(NUMBERS[step.d])
+        self.piece, self.length = piece.on_closed.of_numbers(self.dtype), float(step.length)
+        if not len(piece.closed):
+            raise ConvergenceError(LOOSE)
+        self.on, self.at = step.on.around(piece.closed)
+        scale = step.scale[:, piece.closed] / step.length
+        self.shrunk = (1 / np.sqrt(1 + self.piece.stiff / scale)).astype(self.dtype)
+        moved, held = moved.astype(self.dtype), held.astype(self.dtype)
+        self.moved = np.array([self.piece.unknown(one) for one in moved]).reshape(len(moved), -1)
+        self.held = np.array([self._weighed(one) for one in held]).reshape(len(held), -1)
+        self.by_moved = np.array([self._inverse(one) for one in self.moved]).reshape(self.moved.shape)
+        self.schur = self.held @ self.by_moved.T
+        if len(held):
+            singular = np.linalg.svd(self.schur, compute_uv=False)
+            if not singular.min() > FLAT * max(singular.max(), 1e-300):
+                raise ConvergenceError(LOOSE)
+
+    def _weighed(self, force: Array) -> Array:
+        """Return what forces of tractions (d, k) take of the unknowns: N^T."""
+        own = self.piece.unknown(force)
+        own[0] += (self.piece.slides * force[1:]).sum(axis=0) * self.piece.pressed
+        return own
+
+    def _grid(self, fields: Array) -> Array:
+        whole = np.zeros((self.on.d, int(np.prod(self.on.counts))), dtype=fields.dtype)
+        whole[:, self.at] = fields
+        return whole.reshape(self.on.d, *self.on.counts)
+
+    def _nodes(self, fields: Array) -> Array:
+        return np.asarray(fields.reshape(self.on.d, -1)[:, self.at])
+
+    def _inverse(self, fields: Array) -> Array:
+        """Return what the endless grid makes of residuals (d k,): unknowns."""
+        shrunk = fields.reshape(self.on.d, -1) * self.shrunk
+        found = self._nodes(self.on.endless.solve(self._grid(shrunk))) * (self.shrunk * self.length)
+        return np.asarray(self.piece.unknown(found)).ravel()
+
+    def _precondition(self, r: Array) -> Array:
+        cut = self.moved.shape[1]
+        x = self._inverse(r[:cut])
+        y = np.linalg.solve(self.schur, self.held @ x - r[cut:]) if len(self.held) else r[cut:]
+        return np.concatenate([x - y @ self.by_moved, y], dtype=self.dtype)
+
+    def _multiply(self, z: Array) -> Array:
+        cut = self.moved.shape[1]
+        x, y = z[:cut].reshape(self.on.d, -1), z[cut:]
+        opened = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x)))) / self.length
+        found = self.piece.unknown(opened) + self.piece.stiff * x
+        return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[:cut]], dtype=self.dtype)
+
+    def solve(self, rest: Array, forces: Array, accuracy: float) -> tuple[Array, Array]:
+        """Return unknowns (d, k) and rigid motions (r,) for what misses, to so much of it.
+
+        Raises:
+            ConvergenceError: nothing holds the bodies.
+        """
+        size = max(float(np.abs(rest).max(initial=0.0)), float(np.abs(forces).max(initial=0.0)), 1e-300)
+        right = np.concatenate([self.piece.unknown(rest).ravel(), forces]) / size
+        x, left, self.iterations = flexible(
+            self._multiply, self._precondition, right.astype(self.dtype), accuracy, RESTART, RESTARTS
+        )
+        x = x.astype(np.float64) * size
+        if not (left <= FAR and np.isfinite(x).all()):
+            raise ConvergenceError(LOOSE)
+        cut = self.moved.shape[1]
+        return x[:cut].reshape(self.on.d, -1), x[cut:]

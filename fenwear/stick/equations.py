@@ -149,9 +149,8 @@ class Step:
 
     def jumps(self, found: StatusSolution) -> tuple[Array, Array]:
         """Return the gap (n,) and the slip of the step (n, m)."""
-        position, j = self.position, found.jump
-        if j is None:
-            j = position.compliance.apply(found.f) if found.moved is None else found.moved.jump
+        position, known = self.position, found.jump if found.moved is None else found.moved.jump
+        j = position.compliance.apply(found.f) if known is None else known
         j = j + position.modes @ found.rigid - position.drive * found.displacement + self.free
         if self.closure is not None:
             j[: self.n] += self.closure.closure(found.f[: self.n])

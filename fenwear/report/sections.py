@@ -178,7 +178,7 @@ class _Names:
         within = [one for one in self.found if left <= one[0] <= right and low <= one[1] <= high]
         apart = LINE_OF_TEXT * (high - low)
         figure: Any = self.ax.figure
-        beside = WORDS[figure.get_size_inches()[0] < NARROW]
+        beside = WORDS[bool(figure.get_size_inches()[0] < NARROW)]
         taken: list[tuple[float, float]] = []
         for x, z, text, colour, upright in sorted(within, key=lambda one: -one[1]):
             level = z

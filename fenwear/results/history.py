@@ -415,9 +415,14 @@ class HistoryWriter:
             OutputError: as `add`.
         """
         if self._last is not None:
-            seen = {int(n) for rows in self._pending for n in rows["half_cycle"]}
-            stored = max(self._stored_tail(), default=0)  # what comes before it has no place any more
-            new = np.array([int(n) not in seen and int(n) > stored for n in self._last["half_cycle"]])
+            last, stored = self._last["half_cycle"], self._stored_tail()
+            known = stored | {int(n) for rows in self._pending for n in rows["half_cycle"]}
+            missing = [int(n) for n in last if int(n) not in known]
+            first = min(missing, default=0)
+            again = {n for n in stored if missing and n > first}  # a write came between: what follows is written anew
+            self.rows -= len(again)
+            self._twin_rows = min(self._twin_rows, self.rows)
+            new = np.isin(last, [*missing, *again])
             self._pending.append({name: values[new] for name, values in self._last.items()})
         self.flush()
         with writing(self._twin):

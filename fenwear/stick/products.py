@@ -20,7 +20,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike
+from numpy.typing import DTypeLike, NDArray
 
 from fenwear.arrays import Array, Mask
 from fenwear.contact.krylov import flexible
@@ -166,7 +166,7 @@ class _Piece:
         fixed: Tractions that are known: what flows (d, n).
     """
 
-    closed: Array
+    closed: NDArray[np.int64]
     pressed: Mask
     kept: Mask
     across: Array
@@ -288,7 +288,7 @@ class _Solver:
     def _inverse(self, fields: Array) -> Array:
         """Return what the endless grid makes of residuals (d k,): unknowns."""
         shrunk = fields.reshape(self.on.d, -1) * self.shrunk
-        found = self._nodes(self.on.endless.solve(self._grid(shrunk))) * (self.shrunk * self.length)
+        found: Array = self._nodes(self.on.endless.solve(self._grid(shrunk))) * (self.shrunk * self.length)
         return np.asarray(self.piece.unknown(found)).ravel()
 
     def _precondition(self, r: Array) -> Array:
@@ -300,7 +300,7 @@ class _Solver:
     def _multiply(self, z: Array) -> Array:
         cut = self.moved.shape[1]
         x, y = z[:cut].reshape(self.on.d, -1), z[cut:]
-        opened = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x)))) / self.length
+        opened: Array = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x)))) / self.length
         found = self.piece.unknown(opened) + self.piece.stiff * x
         return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[:cut]], dtype=self.dtype)
 

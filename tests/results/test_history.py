@@ -86,11 +86,15 @@ def test_every(tmp_path: Path, name: str, every: int, count: int, kept: list[int
     assert history.half_cycle.values.tolist() == kept
 
 
-def test_blocks_are_written_without_gaps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Written block by block instead of at the end, the history is the same."""
-    settings = ("run.half_cycles=450", "output.every=3")
+@pytest.mark.parametrize(("every", "count"), [(3, 450), (2, 5), (4, 17)])
+def test_blocks_are_written_without_gaps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, every: int, count: int
+) -> None:
+    """Written block by block instead of at the end, the history is the same: with all of the last cycle, too."""
+    settings = (f"run.half_cycles={count}", f"output.every={every}")
     at_once, _ = save(tmp_path / "one", *settings)
     monkeypatch.setattr("fenwear.results.history.SECONDS_BETWEEN_WRITES", 0.0)
+    monkeypatch.setattr("fenwear.cycle.driver.LOOK", 0.0)
     in_blocks, _ = save(tmp_path / "two", *settings)
     xarray.testing.assert_identical(at_once, in_blocks.assign_attrs(at_once.attrs))
 

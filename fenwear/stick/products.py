@@ -300,7 +300,7 @@ class _Solver:
     def _multiply(self, z: Array) -> Array:
         cut = self.moved.shape[1]
         x, y = z[:cut].reshape(self.on.d, -1), z[cut:]
-        opened: Array = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x)))) / self.length
+        opened = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x)))) * (1 / self.length)
         found = self.piece.unknown(opened) + self.piece.stiff * x
         return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[:cut]], dtype=self.dtype)
 

@@ -396,8 +396,8 @@ def _derivative(problem: PartialSlipProblem, now: FrettingCycle) -> tuple[list[A
     itself = csr_array((total, total))
     if over is not None:
         lost, at = over.loss, np.arange(n)
-        for first, rate in ((stored, -lost), (ejected, lost)):
-            itself = itself + csr_array((rate, (first + at, stored + at)), shape=(total, total))
+        for row, rate in ((stored, -lost), (ejected, lost)):
+            itself = itself + csr_array((rate, (row + at, stored + at)), shape=(total, total))
     return found, csr_array(itself if remembered is None else itself + remembered.slopes(total))
 
 

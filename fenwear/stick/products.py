@@ -194,7 +194,7 @@ class _Piece:
         if flows.any():
             fixed[0, flows] = step.hardness
             fixed[1:] = slides * fixed[0]
-        every = np.flatnonzero(closed)
+        every = np.flatnonzero(closed).astype(np.int64)
         return cls(every, closed & ~flows, closed & ~slips, across, slides, stiff, fixed)
 
     def of_numbers(self, dtype: DTypeLike) -> _Piece:
@@ -207,7 +207,7 @@ class _Piece:
         """The same on the nodes that touch alone."""
         k = self.closed
         rest = (self.across, self.slides, self.stiff, self.fixed)
-        return _Piece(np.arange(len(k)), self.pressed[k], self.kept[k], *(one[:, k] for one in rest))
+        return _Piece(np.arange(len(k), dtype=np.int64), self.pressed[k], self.kept[k], *(one[:, k] for one in rest))
 
     def known(self, f: Array) -> Array:
         """Return the unknowns (d, n) that tractions have."""
@@ -261,7 +261,7 @@ class _Solver:
         self.on, self.at = step.on.around(piece.closed)
         scale = step.scale[:, piece.closed] / step.length
         self.shrunk = (1 / np.sqrt(1 + self.piece.stiff / scale)).astype(self.dtype)
-        moved, held = moved.astype(self.dtype), held.astype(self.dtype)
+        moved, held = (np.asarray(one, dtype=self.dtype) for one in (moved, held))
         self.moved = np.array([self.piece.unknown(one) for one in moved]).reshape(len(moved), -1)
         self.held = np.array([self._weighed(one) for one in held]).reshape(len(held), -1)
         self.by_moved = np.array([self._inverse(one) for one in self.moved]).reshape(self.moved.shape)
@@ -300,7 +300,8 @@ class _Solver:
     def _multiply(self, z: Array) -> Array:
         cut = self.moved.shape[1]
         x, y = z[:cut].reshape(self.on.d, -1), z[cut:]
-        opened = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x)))) * (1 / self.length)
+        opened: Array = self._nodes(self.on.on_grid(self._grid(self.piece.tractions(x))))
+        opened /= self.length
         found = self.piece.unknown(opened) + self.piece.stiff * x
         return np.concatenate([found.ravel() + y @ self.moved, self.held @ z[:cut]], dtype=self.dtype)
 

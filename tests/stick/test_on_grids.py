@@ -52,8 +52,8 @@ def path(bodies: OppositeBodies, *, by_force: bool) -> Iterator[tuple[StickState
     if by_force:
         start = replace(start, displacement=None, force=state.force)
     for shift in SHIFTS:
-        how = {"force": shift / 1.6e-3 * FRICTION * LOAD} if by_force else {"displacement": shift}
-        end = replace(start, **how)
+        force = shift / 1.6e-3 * FRICTION * LOAD
+        end = replace(start, force=force) if by_force else replace(start, displacement=shift)
         after = advance(bodies, state, start, end, np.full(len(end.opening), FRICTION))
         yield state, after, end
         state, start = after, end
@@ -119,7 +119,7 @@ def test_sphere_in_partial_slip() -> None:
     a = (3 * LOAD * RADIUS / (4 * modulus)) ** (1 / 3)
     top, c = FRICTION * 1.5 * LOAD / (np.pi * a**2), a * (1 - q) ** (1 / 3)
     gives = 3 * FRICTION * LOAD * 2 * (2 - poisson) / body.shear / (16 * a) * (1 - (1 - q) ** (2 / 3))
-    errors = []
+    found = []
     for nodes in (24, 48, 96):
         bodies = on_grid(body, body, 2 * a / nodes, (nodes + 4,) * 2, LOAD, RADIUS)
         state, start = pressed(bodies)
@@ -129,9 +129,9 @@ def test_sphere_in_partial_slip() -> None:
         r = np.linalg.norm(bodies.middle.pair.punch.x, axis=1)
         exact = top * (_cap(r / a) - c / a * _cap(r / c))
         wrong = np.abs(state.traction[:, 0] - exact) / top
-        errors.append((np.sqrt(np.mean(wrong**2)), wrong.max(), abs(state.displacement / gives - 1)))
+        found.append((np.sqrt(np.mean(wrong**2)), wrong.max(), abs(state.displacement / gives - 1)))
         assert np.abs(state.traction[:, 1]).max() < 1e-6 * top
-    errors = np.array(errors)
+    errors = np.array(found)
     assert (errors[1:] < 0.75 * errors[:-1]).all()
     assert errors[-1, 0] < 3e-3
     assert errors[-1, 2] < 1e-4

@@ -40,7 +40,7 @@ from fenwear.stick.heat import HeatHistory
 
 FAR = 1e3  # times the largest gap: never closes
 MOST_TIMES, SAME = 30, 1e-9  # times that contact and temperatures are found; their change, over the warmest
-INSIDE = 0.12  # of a side of squares: how far inside of their edge a zone of them carries (measured, as a falls in)
+INSIDE = 0.12  # of a side of squares: by which a flat punch of them is as stiff as a smaller round one, F = 2 E* a d
 LEFT, NEAR, BEYOND, FITTED = 0.25, 1.0, 4.0, 12  # nodes: what is left of an edge, and where slip is read; of them many
 DOUBLED, HALVED = 40, 60  # times that bounds are doubled and halved to share a depth between coated bodies
 
@@ -221,7 +221,8 @@ def _of_grid(problem: PartialSlipProblem, records: TimeStepRecords) -> FinalShap
     """Return the shape with a zone as large as the slip beside those nodes tells that stick in a cycle, on a grid.
 
     From the edge of the zone on slip grows as distance^(3/2), so that the root of the area with less slip grows evenly
-    with slip^(2/3), from that of the zone. A zone of squares carries as one whose edge is INSIDE of a side farther in.
+    with slip^(2/3), from that of the zone. A zone of squares carries as a round one whose radius is INSIDE of a side
+    less than that of its area: so does a flat punch of squares, on 8 to 36 of them to a radius.
     """
     weights, stuck = problem.weights, records.stuck
     if not stuck.any():

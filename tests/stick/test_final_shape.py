@@ -13,7 +13,7 @@ from fenwear.arrays import Array
 from fenwear.bodies.condensation import CondensedBody
 from fenwear.case import Case
 from fenwear.stick.cycle import PartialSlipProblem
-from fenwear.stick.final import final_shape, stick_zone
+from fenwear.stick.final import INSIDE, final_shape, stick_zone
 from fenwear.stick.setup import partial_slip_problem
 
 LOAD, RADIUS, E_STAR = 120.0, 6.0, 2e5 / (2 * (1 - 0.3**2))
@@ -110,3 +110,21 @@ def test_jumps_end_in_the_final_shape_where_theory_is_exact(monkeypatch: pytest.
     assert driven.weights @ np.where(zone, pressure, 0) == pytest.approx(LOAD, rel=1e-5)
     assert np.abs(pressure - end.pressure)[zone].max() < 2e-3 * pressure.max()
     assert driven.weights @ depth == pytest.approx(driven.weights @ end.depth, rel=2e-3)
+
+
+@pytest.mark.parametrize("squares", [8, 20])
+def test_zones_of_squares_carry_as_smaller_round_ones(squares: int) -> None:
+    """A flat punch of squares on a half-space against F = 2 E* a d: how far inside of their edge it carries."""
+
+    def moved(x: Array, y: Array) -> Array:
+        """Return pi E* times what unit pressure on a unit square moves a place by (Love)."""
+        corners = [(x + a, y + b, 4 * a * b) for a in (0.5, -0.5) for b in (0.5, -0.5)]
+        far = [(p, q, np.hypot(p, q), sign) for p, q, sign in corners]
+        return np.asarray(sum(sign * (p * np.log(q + r) + q * np.log(p + r)) for p, q, r, sign in far))
+
+    grid = np.arange(-squares - 1, squares + 2.0)
+    x, y = (one.ravel() for one in np.meshgrid(grid + 0.3, grid + 0.1, indexing="ij"))
+    x, y = x[np.hypot(x, y) < squares], y[np.hypot(x, y) < squares]
+    compliance = moved(x[:, None] - x, y[:, None] - y) / np.pi
+    force = np.linalg.solve(compliance, np.ones(len(x))).sum()
+    assert np.sqrt(len(x) / np.pi) - force / 2 == pytest.approx(INSIDE, abs=0.01)

@@ -127,9 +127,12 @@ def edited() -> Callable[..., Case]:
 
 
 def process_environment() -> dict[str, str]:
-    """Return the environment of processes: the session's own MPI must not show through to what they start."""
+    """Return the environment of processes: the session's own MPI must not show through to what they start.
+
+    Ranks that wait leave their cores to other tests, which run beside them.
+    """
     inherited = {k: v for k, v in os.environ.items() if not k.startswith(("PMIX", "PRTE", "OMPI_COMM", "OMPI_FILE"))}
-    return {**inherited, "OMP_NUM_THREADS": "1"}
+    return {**inherited, "OMP_NUM_THREADS": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 
 
 @pytest.fixture(scope="session")

@@ -325,7 +325,7 @@ class Recorder:
             np.concatenate([middle.contact.rigid for middle in middles]),
             _stacked([row.totals for row in rows]),
             _stacked(adds),
-            np.abs(pressure - optima) @ weights / (2 * np.maximum(pressure @ weights, 1e-300)),
+            _weighed(np.abs(pressure - optima), weights) / (2 * np.maximum(_weighed(pressure, weights), 1e-300)),
             changes,
             self._balances(),
             self._complementarity(),
@@ -400,6 +400,11 @@ class Recorder:
             except ConvergenceError:
                 self._optima[key] = np.full(len(zone), np.nan)
         return self._optima[key]
+
+
+def _weighed(values: Array, weights: Array) -> Array:
+    """Return the integrals of rows (k, n) by weights (n,); a product would round as the places in memory have it."""
+    return np.asarray((values * weights).sum(axis=1))
 
 
 def _stacked(totals: Sequence[Totals]) -> Totals:

@@ -126,13 +126,13 @@ def pair(
         parts = [_around(part, punch) for part in parts]
     transfer = dual_transfer(parts)
     material = _material(parts, transfer)
-    normal = unit(material @ strip_outward)
+    of_facets = unit(material @ strip_outward)
     shape = round_shape(parts, punch, strip, placement, transfer, material)
-    normal = unit(normal + shape.turned)
+    normal = unit(of_facets + shape.turned)
     facing = -np.einsum("ic,ic->i", punch.outward, normal)
     _check_facing(punch, normal, facing, placement)
-    if halfway:
-        normal = common_normal(punch, normal)
+    if halfway:  # by the facets of both, opposite each other: mirror images have the plane between them
+        normal = common_normal(punch, of_facets)
         facing = -np.einsum("ic,ic->i", punch.outward, normal)
     apart = punch.spread.T @ punch.trace - transfer @ strip_trace + shape.moved
     gap = np.einsum("ic,ic->i", normal, apart) + _profiles(punch, strip, material)

@@ -183,7 +183,9 @@ def test_own_law_in_python(assembled: Assemble) -> None:
         fenwear.register_law("my law", abs)
     with pytest.raises(CaseError, match="expected a function"):
         fenwear.register_law("mine", 3)
-    with pytest.raises(CaseError, match="expected a list of some of T, p, v, x, y, z, depth, s, cs, pm, got 'q'"):
+    with pytest.raises(
+        CaseError, match="expected a list of some of T, p, v, x, y, z, depth, s, debris, edge, cs, pm, got 'q'"
+    ):
         fenwear.register_law("mine", abs, of=["p", "q"])
 
 

@@ -212,10 +212,7 @@ class ContactSetup:
     @cached_property
     def ways(self) -> SlidingWays:
         """What slides how far and where to in each phase of a cycle: tensors, cross-shear."""
-        laws = [law.given_coefficient for law in self.sliding.wear if law is not None]
-        given = [self.friction.contact.friction, *laws]
-        asked = any(isinstance(one, Dependence) and (one.depends_on("cs") or one.depends_on("pm")) for one in given)
-        mean = self.rigid.mean_pressure
+        mean, asked = self.rigid.mean_pressure, self.asks("cs") or self.asks("pm")
         return SlidingWays(self.pairs, self.pair, self.path, self.sliding_directions, self.strip_wears, mean, asked)
 
     def friction_in_space(self, phase: int, mu: Array) -> Array:

@@ -104,12 +104,6 @@ class FrameConvolution:
     def _kernels(self) -> dict[Any, Waves]:
         return {np.dtype(np.float64): self.kernel(self._size, [count - 1 for count in self.counts])}
 
-    def _kernel(self, dtype: DTypeLike) -> Waves:
-        kept = self._kernels
-        if np.dtype(dtype) not in kept:
-            kept[np.dtype(dtype)] = kept[np.dtype(np.float64)].astype(np.result_type(dtype, np.complex64))
-        return kept[np.dtype(dtype)]
-
     def spread(self, values: Array) -> Array:
         """Return values at the nodes (..., n) on the grid, zero where no node is (..., m, ...)."""
         found = np.zeros((*values.shape[:-1], int(np.prod(self.counts))), dtype=values.dtype)
@@ -137,24 +131,36 @@ class FrameConvolution:
     def on_grid(self, fields: Array) -> Array:
         """Return the displacements (d, m, ...) of tractions (d, m, ...), in their precision."""
         force = fields * self._areas.astype(fields.dtype)
-        kernel = self._kernel(fields.dtype)
-        acting = [b for b in range(self.d) if force[b].any()]
-        found: Array = np.zeros_like(force)
-        if not acting:
+        found = self.through(_in_precision(self._kernels, fields.dtype), self._size, force)
+        if not force.any():
             return found
-        image = forward(force[acting], self._size)
-        seen = [a for a in range(self.d) if any(b in self.pairs[a] for b in acting)]
-        moved = np.empty((len(seen), *image.shape[1:]), dtype=image.dtype)
-        for row, a in enumerate(seen):
-            by = [(k, b) for k, b in enumerate(acting) if b in self.pairs[a]]
-            np.multiply(kernel[a, by[0][1]], image[by[0][0]], out=moved[row])
-            for k, b in by[1:]:
-                moved[row] += kernel[a, b] * image[k]
-        found[seen] = back(moved, self._size, self.counts)
         for factors, response in self._factors:
             self._add(factors, response, force, found)
         if self.local is not None:
             found[0] += self.spread(self.local).astype(fields.dtype) * fields[0]
+        return found
+
+    def through(self, waves: Waves, size: Sequence[int], fields: Array) -> Array:
+        """Return what waves make of fields (d, m, ...) over a period: of the components that act on each other alone.
+
+        Args:
+            waves: Of component a by component b, where `pairs` has them (d, d, ...).
+            size: The period.
+            fields: In whose precision the result is.
+        """
+        found: Array = np.zeros_like(fields)
+        acting = [b for b in range(self.d) if fields[b].any()]
+        if not acting:
+            return found
+        image = forward(fields[acting], size)
+        seen = [a for a in range(self.d) if any(b in self.pairs[a] for b in acting)]
+        moved = np.empty((len(seen), *image.shape[1:]), dtype=image.dtype)
+        for row, a in enumerate(seen):
+            by = [(k, b) for k, b in enumerate(acting) if b in self.pairs[a]]
+            np.multiply(waves[a, by[0][1]], image[by[0][0]], out=moved[row])
+            for k, b in by[1:]:
+                moved[row] += waves[a, b] * image[k]
+        found[seen] = back(moved, size, self.counts)
         return found
 
     def _add(self, factors: tuple[Array, ...], response: Array, force: Array, to: Array) -> None:
@@ -253,24 +259,14 @@ class EndlessFrame:
 
     def solve(self, fields: Array) -> Array:
         """Return the tractions (d, m, ...) of displacements (d, m, ...), in their precision."""
-        of, dtype = self.of, fields.dtype
-        if dtype not in self._inverse:
-            self._inverse[dtype] = self._inverse[np.dtype(np.float64)].astype(np.result_type(dtype, np.complex64))
-        inverse = self._inverse[dtype]
-        found: Array = np.zeros_like(fields)
-        acting = [b for b in range(of.d) if fields[b].any()]
-        if not acting:
-            return found
-        image = forward(fields[acting], self.period)
-        seen = [a for a in range(of.d) if any(b in of.pairs[a] for b in acting)]
-        moved = np.empty((len(seen), *image.shape[1:]), dtype=image.dtype)
-        for row, a in enumerate(seen):
-            moved[row] = 0
-            for k, b in enumerate(acting):
-                if b in of.pairs[a]:
-                    moved[row] += inverse[a, b] * image[k]
-        found[seen] = back(moved, self.period, of.counts)
-        return found
+        return self.of.through(_in_precision(self._inverse, fields.dtype), self.period, fields)
+
+
+def _in_precision(kept: dict[Any, Waves], dtype: DTypeLike) -> Waves:
+    """Return waves for fields of a precision, which are kept by it; those of double precision are there."""
+    if np.dtype(dtype) not in kept:
+        kept[np.dtype(dtype)] = kept[np.dtype(np.float64)].astype(np.result_type(dtype, np.complex64))
+    return kept[np.dtype(dtype)]
 
 
 def frame_convolution(

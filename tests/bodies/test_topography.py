@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray
+from waves import FULL, HEIGHT, LENGTH, wavy
 
-from fenwear import Case, CaseError
+from fenwear import CaseError
 from fenwear.assembly import assemble
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import heights_on, roughness
@@ -88,45 +88,6 @@ def test_what_no_map_is(tmp_path: Path) -> None:
         heights_on(GRID, Topography(rms=1e-3, longest=0.5, shortest=0.02), "punch.topography", None)
     with pytest.raises(ValueError, match="one of file"):
         Topography(file="map.npz", rms=1e-3, longest=1.0)
-
-
-LENGTH, HEIGHT, FULL = 0.05, 1e-4, np.pi * 2e5 / (1 - 0.3**2) * 1e-4 / 0.05  # lam, h, mm, and p* = pi E* h / lam, MPa
-
-
-def wavy(load: float, nodes: int = 1281, worn: float = 0.0, **run: Any) -> Case:
-    """Return a hard block on a wavy one of E = 200 GPa, plane strain, as half-planes over 20 waves.
-
-    Args:
-        load: Over the width, MPa.
-        nodes: Of the grid.
-        worn: Wear coefficient of the wavy one.
-        run: How far and how.
-    """
-    return Case.model_validate(
-        {
-            "geometry": {"file": "blocks.geo", "degree": 2, "parameters": {"margin": 0.2}},
-            "model": {"kind": "plane", "plane": "strain"},
-            "materials": {"steel": {"young": 2e5, "poisson": 0.3}, "hard": {"young": 2e9, "poisson": 0.3}},
-            "punch": {
-                "regions": {"punch_body": "hard"},
-                "supports": [{"on": "punch_far", "fix": ["x"]}],
-                "no_turning_about": ["y"],
-                "loads": [{"on": "punch_far", "force": [0, -load]}],
-                "operator": "half-space",
-            },
-            "strip": {
-                "regions": {"strip_body": "steel"},
-                "supports": [{"on": "strip_far", "fix": ["x", "z"]}],
-                "operator": "half-space",
-                "topography": {"amplitude": HEIGHT, "wavelength": [LENGTH]},
-            },
-            "grid": {"nodes": nodes, "size": [1.0]},
-            "contact": {"friction": 0.0},
-            "wear": {"strip": {"coefficient": worn}},
-            "motion": {"kind": "reciprocating", "amplitude": 0.01, "period": 1.0},
-            "run": {"half_cycles": 2, **run},
-        }
-    )
 
 
 def test_wavy_surface_in_part_contact() -> None:

@@ -6,44 +6,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from half_space_ball import WEAR, ball
 
-from fenwear import Case, assemble
+from fenwear import assemble
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
 from fenwear.contact import CondensedContact, ContactState
 from fenwear.contact.gridded import GriddedPhases
 from fenwear.interface.convolution import Box, OnBox
 
-WEAR = {"punch": {"coefficient": "1e-6 1/MPa"}, "strip": {"coefficient": "2e-6 1/MPa"}}
-
-
-def ball(**more: Any) -> Case:
-    """Return a block with the profile of a ball of radius 20 on another one, as half-spaces on a grid."""
-    x = np.linspace(-1.2, 1.2, 25)
-    points = [(a, b, (a * a + b * b) / 40) for a in x for b in x]
-    body = {"operator": "half-space", "regions": {}}
-    data: dict[str, Any] = {
-        "geometry": {
-            "file": "solid_blocks.geo",
-            "degree": 1,
-            "parameters": {"width": 2.4, "depth": 2.4, "margin_x": 1, "margin_y": 1, "punch_height": 1}
-            | {"strip_height": 1, "across_x": 2, "across_y": 2, "margin_elements": 1, "punch_layers": 1}
-            | {"strip_layers": 1},
-        },
-        "model": {"kind": "solid"},
-        "materials": {"steel": {"young": 2.1e5, "poisson": 0.3}, "brass": {"young": 1.0e5, "poisson": 0.34}},
-        "punch": body
-        | {"regions": {"punch_body": "steel"}, "supports": [{"on": "punch_far", "fix": ["x", "y"]}]}
-        | {"loads": [{"on": "punch_far", "force": [0, 0, -600]}], "profile": {"points": points}}
-        | {"no_turning_about": ["x", "y", "z"]},
-        "strip": body | {"regions": {"strip_body": "brass"}, "supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
-        "grid": {"nodes": 15, "size": [2.0, 1.8]},
-        "contact": {"friction": 0.3},
-        "wear": WEAR,
-        "motion": {"kind": "reciprocating", "amplitude": 0.12, "period": 1.0, "positions": 3},
-        "run": {"half_cycles": 40, "integration": "jump"},
-    }
-    return Case.model_validate({**data, **more})
+FORCE = 600.0  # N
 
 
 def solved(system: Tribosystem, *, cycles: float = 30.0) -> ContactState:
@@ -68,10 +40,10 @@ def solved(system: Tribosystem, *, cycles: float = 30.0) -> ContactState:
 )
 def test_as_by_matrices(more: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     """Pressures and gaps of six phases that meet in their wear, node by node, and the loads carried exactly."""
-    system = assemble(ball(**more))
+    system = assemble(ball(FORCE, **more))
     ours = solved(system)
     monkeypatch.setattr(CondensedContact, "_gridded", False)
-    theirs = solved(assemble(ball(**more)))
+    theirs = solved(assemble(ball(FORCE, **more)))
     touching = theirs.pressure > 0
     assert 0.1 < touching.mean() < 0.9
     scale = theirs.pressure.max()
@@ -83,7 +55,7 @@ def test_as_by_matrices(more: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -
 
 def test_products_and_solutions_are_of_each_other() -> None:
     """The solution operator of nodes in contact is that of the product's rows and columns."""
-    system = assemble(ball())
+    system = assemble(ball(FORCE))
     contact = system.phase_contact(range(len(system.motion.phases)))
     assert isinstance(contact, CondensedContact)
     operator = contact._jacobian(np.zeros(contact.size))
@@ -101,7 +73,7 @@ def test_products_and_solutions_are_of_each_other() -> None:
 
 def test_a_box_cuts_the_whole() -> None:
     """Products on a box are those of the whole grid there, of pressures within it."""
-    system = assemble(ball())
+    system = assemble(ball(FORCE))
     contact = system.phase_contact([0, 3])
     assert isinstance(contact, CondensedContact)
     of = contact._grid.of
@@ -124,7 +96,7 @@ def test_pressures_are_those_of_tamaas() -> None:
     L. Frérot et al., J. Open Source Software 5, 2020; its conjugate gradients are those of Polonsky and Keer.
     """
     tamaas = pytest.importorskip("tamaas")
-    system = assemble(ball(grid={"nodes": 45, "size": [2.2, 2.2]}, contact={"friction": 0.0}))
+    system = assemble(ball(FORCE, grid={"nodes": 45, "size": [2.2, 2.2]}, contact={"friction": 0.0}))
     gap, grid = system.gap(0, system.unworn()), system.pair.punch.grid
     pressure = system.phase_contact((0,)).solve(gap).pressure[0]
     assert grid is not None

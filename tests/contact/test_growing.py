@@ -8,6 +8,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from half_space_ball import ball
 
 from fenwear import Case, assemble, evolve, run_case
 from fenwear.arrays import Array
@@ -16,34 +17,14 @@ from fenwear.cycle.block import Block
 from fenwear.cycle.state import carried_by, on_other_grid
 
 
-def ball(grid: dict[str, Any], **more: Any) -> Case:
-    """Return a block with the profile of a ball of radius 20 on another one, as half-spaces on a grid."""
-    x = np.linspace(-1.2, 1.2, 25)
-    points = [(a, b, (a * a + b * b) / 40) for a in x for b in x]
-    body = {"operator": "half-space", "regions": {}}
-    data: dict[str, Any] = {
-        "geometry": {
-            "file": "solid_blocks.geo",
-            "degree": 1,
-            "parameters": {"width": 2.4, "depth": 2.4, "margin_x": 1, "margin_y": 1, "punch_height": 1}
-            | {"strip_height": 1, "across_x": 2, "across_y": 2, "margin_elements": 1, "punch_layers": 1}
-            | {"strip_layers": 1},
-        },
-        "model": {"kind": "solid"},
-        "materials": {"steel": {"young": 2.1e5, "poisson": 0.3}, "brass": {"young": 1.0e5, "poisson": 0.34}},
-        "punch": body
-        | {"regions": {"punch_body": "steel"}, "supports": [{"on": "punch_far", "fix": ["x", "y"]}]}
-        | {"loads": [{"on": "punch_far", "force": [0, 0, -60]}], "profile": {"points": points}}
-        | {"no_turning_about": ["x", "y", "z"]},
-        "strip": body | {"regions": {"strip_body": "brass"}, "supports": [{"on": "strip_far", "fix": ["x", "y", "z"]}]},
+def growing(grid: dict[str, Any], **more: Any) -> Case:
+    """Return the ball under a force by which its scar outgrows its first contact, on a grid."""
+    tables: dict[str, Any] = {
         "grid": grid,
-        "contact": {"friction": 0.3},
-        "wear": {"punch": {"coefficient": "1e-6 1/MPa"}, "strip": {"coefficient": "2e-6 1/MPa"}},
-        "motion": {"kind": "reciprocating", "amplitude": 0.12, "period": 1.0, "positions": 3},
         "run": {"half_cycles": 60, "integration": "jump", "jump_tolerance": 0.01},
         "output": {"report": False, "uncertainty": False, "fields_at": []},
     }
-    return Case.model_validate({**data, **more})
+    return ball(60.0, **{**tables, **more})
 
 
 def across(system: Tribosystem, touched: Array) -> int:
@@ -63,12 +44,12 @@ def profile(block: Block, body: str, at: Array) -> Array:
 @pytest.fixture(scope="module")
 def grown() -> list[Block]:
     """Return the blocks of a run whose contact becomes more than twice as wide."""
-    return list(evolve(assemble(ball({"across": 10}))))
+    return list(evolve(assemble(growing({"across": 10}))))
 
 
 def test_grid_begins_around_the_first_contact() -> None:
     """As many nodes across it as asked for, and room beside it."""
-    system = assemble(ball({"across": 14}))
+    system = assemble(growing({"across": 14}))
     grid = system.pair.punch.grid
     pressure = system.phase_contact((0,)).solve(system.gap(0, system.unworn())).pressure[0]
     assert grid is not None
@@ -93,8 +74,8 @@ def test_volumes_are_kept_and_grids_grow_and_coarsen(grown: list[Block]) -> None
 @pytest.mark.slow
 def test_depths_are_those_of_a_grid_that_stays(grown: list[Block]) -> None:
     """Along the middle line, and nearer to them with twice the nodes across."""
-    fixed = list(evolve(assemble(ball({"nodes": 73}))))[-1]
-    finer = list(evolve(assemble(ball({"across": 20}))))[-1]
+    fixed = list(evolve(assemble(growing({"nodes": 73}))))[-1]
+    finer = list(evolve(assemble(growing({"across": 20}))))[-1]
     at = np.linspace(-0.5, 0.5, 41)
     for body in ("punch", "strip"):
         wanted = profile(fixed, body, at)
@@ -125,8 +106,10 @@ def test_states_stay_where_they_are(grown: list[Block]) -> None:
 def test_run_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
     """It ends as one that was not interrupted; its history stands on the last grid, with the volumes of its sums."""
     output = {"report": False, "uncertainty": False}
-    whole = ball({"across": 10}, output={**output, "fields_at": [20]})
-    first = ball({"across": 10}, run={"half_cycles": 20, "integration": "jump", "jump_tolerance": 0.01}, output=output)
+    whole = growing({"across": 10}, output={**output, "fields_at": [20]})
+    first = growing(
+        {"across": 10}, run={"half_cycles": 20, "integration": "jump", "jump_tolerance": 0.01}, output=output
+    )
     straight, _ = run_case(whole, output=tmp_path / "whole", log=lambda _: None)
     run_case(first, output=tmp_path / "parts", log=lambda _: None)
     resumed, _ = run_case(whole, output=tmp_path / "parts", log=lambda _: None, resume=True)
@@ -151,7 +134,7 @@ def test_run_goes_on_from_a_grid_that_has_grown(tmp_path: Path) -> None:
 )
 def test_what_does_not_go_with_a_grid_that_grows(more: dict[str, Any]) -> None:
     """Is told by the key."""
-    good = ball({"across": 10}).resolved()
+    good = growing({"across": 10}).resolved()
     for table, values in more.items():
         good[table] = {**good.get(table, {}), **values}
     with pytest.raises(ValueError, match=r"across"):

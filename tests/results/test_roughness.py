@@ -7,13 +7,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from waves import FULL, HEIGHT, LENGTH, wavy
 
-from fenwear import Case, run_case
+from fenwear import run_case
 from fenwear.bodies.grid import RegularGrid
 from fenwear.bodies.topography import roughness
 from fenwear.results.roughness import bearing_heights, levelled
-
-HEIGHT, LENGTH = 1e-4, 0.05
 
 
 def test_wave_on_a_form() -> None:
@@ -43,32 +42,9 @@ def test_rectangle_around_what_has_worn() -> None:
 def test_run_tells_how_rough_it_is(tmp_path: Path) -> None:
     """A wave in full contact wears off: its numbers in every record, and those of the end in the summary."""
     worn = LENGTH / (np.pi * 2e5 / (1 - 0.3**2) * 0.8)
-    load = 2 * np.pi * 2e5 / (1 - 0.3**2) * HEIGHT / LENGTH
-    case = Case.model_validate(
-        {
-            "geometry": {"file": "blocks.geo", "degree": 2, "parameters": {"margin": 0.2}},
-            "model": {"kind": "plane", "plane": "strain"},
-            "materials": {"steel": {"young": 2e5, "poisson": 0.3}, "hard": {"young": 2e9, "poisson": 0.3}},
-            "punch": {
-                "regions": {"punch_body": "hard"},
-                "supports": [{"on": "punch_far", "fix": ["x"]}],
-                "no_turning_about": ["y"],
-                "loads": [{"on": "punch_far", "force": [0, -load]}],
-                "operator": "half-space",
-            },
-            "strip": {
-                "regions": {"strip_body": "steel"},
-                "supports": [{"on": "strip_far", "fix": ["x", "z"]}],
-                "operator": "half-space",
-                "topography": {"amplitude": HEIGHT, "wavelength": [LENGTH]},
-            },
-            "grid": {"nodes": 321, "size": [1.0]},
-            "wear": {"strip": {"coefficient": worn}},
-            "motion": {"kind": "reciprocating", "amplitude": 0.01, "period": 1.0},
-            "run": {"half_cycles": 20, "integration": "jump", "jump_tolerance": 1e-3},
-            "output": {"report": False, "uncertainty": False, "fields_at": []},
-        }
-    )
+    load = 2 * FULL
+    quiet = {"report": False, "uncertainty": False, "fields_at": []}
+    case = wavy(load, 321, worn, quiet, half_cycles=20, integration="jump", jump_tolerance=1e-3)
     summary, folder = run_case(case, output=tmp_path / "wave", log=lambda _: None)
     with h5py.File(folder / "history.nc") as file:
         rms = file["roughness_rms_strip"][:]

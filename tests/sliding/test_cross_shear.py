@@ -95,3 +95,15 @@ def test_bad_laws_per_area() -> None:
             WearLaw.model_validate(wrong)
     with pytest.raises(CaseError, match=r"wear\.punch\.per_area: expected with exponents of 1"):
         load_case("example1", ["wear.punch={per_area=1e-9, pressure_exponent=2}"])
+
+
+def test_debris_is_lost_by_cross_shear(assembled: Callable[..., Tribosystem]) -> None:
+    """On a circle, where cs = 1/2 everywhere, as by the life that the law has there."""
+    found = []
+    for life in ("{expression='50*(1 + 10*cs)', unit='mm'}", "'300 mm'"):
+        body = f"contact.third_body={{share=0.5, life={life}}}"
+        *_, last = march(assembled("example1", *PATHS, circle(8), body), 3)
+        found.append(last.between)
+    assert found[1][0, 0].min() > 0
+    np.testing.assert_allclose(found[0][0], found[1][0], rtol=1e-9)
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-4)  # near 1/2, see above

@@ -15,7 +15,7 @@ import pytest
 from markupsafe import escape
 
 from fenwear import Case, Tribosystem, assemble, load_case, make_case, march, steady
-from fenwear.assembly import place_case, with_case
+from fenwear.assembly import place_case, regridded, with_case
 from fenwear.bodies.ready import meshes_folder
 from fenwear.case import changed_case, plausibility_warnings
 from fenwear.case.templates import write_case_of
@@ -33,7 +33,8 @@ from fenwear.plausibility.chamfer import contact_chamfer
 from fenwear.plausibility.ends import contact_ends
 from fenwear.plausibility.few import few_text
 from fenwear.plausibility.layer import heated_layer, layer_warnings
-from fenwear.plausibility.rim import contact_rim
+from fenwear.plausibility.rim import ContactRim, contact_rim
+from fenwear.plausibility.states import clipped_text, contact_limits
 from fenwear.plausibility.thickness import thickness
 from fenwear.report.page import page
 from fenwear.results.summary import net_of
@@ -187,6 +188,28 @@ def test_a_contact_grid_may_be_too_small(size: str, clipped: bool, assembled: As
         width = 2 * (3 * 20 * 5 / (4 * 210e3 / (2 * (1 - 0.3**2)))) ** (1 / 3)
         assert f"a width of about {width:.2g}" in found[0]
         assert "set grid.size" in found[0]
+
+
+@pytest.mark.parametrize("grid", ["nodes=9", "across=8"])
+def test_a_contact_grid_over_the_whole_surface(grid: str, assembled: Assembled) -> None:
+    """The ball goes on beyond what is meshed for its contact: a scar that comes there is clipped, as on the mesh."""
+    bodies = ("punch.operator='half-space'", "strip.operator='half-space'", "motion.positions=2")
+    coarse = ("geometry.parameters.core=0", "geometry.parameters.core_elements=0", "geometry.parameters.across=4")
+    system = assembled("ball-on-flat", f"grid={{{grid}}}", *bodies, *coarse)
+    limits = contact_limits(system)
+    if "across" in grid:
+        assert limits is None or not limits.clips.any()  # it can still grow
+        whole = system.bodies.punch.reach
+        assert whole is not None
+        system = regridded(system, whole.grid)
+        limits = contact_limits(system)
+    assert isinstance(limits, ContactRim)
+    assert not limits.of_grid
+    found = system.pair.punch.grid
+    assert found is not None
+    outer = ((found.places == 0) | (found.places == np.array(found.counts) - 1)).any(axis=1)
+    np.testing.assert_array_equal(limits.clips, outer)
+    assert "meshed contact surface" in clipped_text(limits, limits.where(outer), None, system.case)
 
 
 def test_half_a_flat_is_clipped(assembled: Assembled, tmp_path: Path) -> None:

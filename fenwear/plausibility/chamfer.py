@@ -73,7 +73,7 @@ def contact_chamfer(system: Tribosystem) -> Chamfer | None:
         return None
     normal /= np.linalg.norm(normal)
     if pair.punch.dim == 3:
-        edges, inward, outward = rim_edges(punch)
+        edges, inward, outward = rim_edges(punch, pair.punch)
         at_trace = np.zeros(len(pair.punch.trace))
         np.maximum.at(at_trace, edges[:, :2].ravel(), np.repeat(_cotangents(inward, outward, normal), 2))
         cotangent = at_trace[pair.punch.nodes]

@@ -54,6 +54,7 @@ class ContactEnds:
         gap: Gap of the unworn bodies there, its least value taken off (k,), mm.
         closed_by_load: D of Hertz over the load, mm per N/mm.
         around: Of a ring its mean circumference, mm; 1 in a plane, whose forces are those over the thickness.
+        of_grid: Whether an end is that of a contact grid within the surface.
     """
 
     goes_on: tuple[bool, bool]
@@ -62,6 +63,7 @@ class ContactEnds:
     gap: Array
     closed_by_load: float
     around: float = 1.0
+    of_grid: bool = False
 
     @property
     def width(self) -> float:

@@ -46,6 +46,7 @@ class ContactRim:
         width: Of the surface along the direction in which it is widest, mm.
         curvatures: k_1 >= k_2 of the unworn gap, 1/mm; None where it is no paraboloid.
         modulus: E*, MPa.
+        of_grid: Whether it is the rim of a contact grid within the surface.
     """
 
     clips: Mask
@@ -53,6 +54,7 @@ class ContactRim:
     width: float
     curvatures: tuple[float, float] | None
     modulus: float
+    of_grid: bool = False
 
     @property
     def reach(self) -> float | None:
@@ -106,8 +108,8 @@ def contact_rim(system: Tribosystem) -> ContactRim | None:
     pair = system.pair
     if pair.punch.dim != 3:
         return None
-    smooth, _ = _rim(system.bodies.punch)
-    _, edges = _rim(system.bodies.strip)
+    smooth, _ = smooth_rim(system.bodies.punch, pair.punch)
+    _, edges = smooth_rim(system.bodies.strip, pair.strip)
     clips = np.zeros(len(pair.punch.trace), dtype=bool)
     clips[smooth.ravel()] = True
     at_nodes = clips[pair.punch.nodes]
@@ -120,24 +122,27 @@ def contact_rim(system: Tribosystem) -> ContactRim | None:
     return ContactRim(at_nodes, x, float(widths.max()), curvatures(system), contact_modulus(system.case))
 
 
-def rim_edges(elastic: ElasticBody) -> tuple[NDArray[np.int64], Array, Array]:
+def rim_edges(elastic: ElasticBody, surface: ContactSurface) -> tuple[NDArray[np.int64], Array, Array]:
     """Return the trace nodes on each edge of the rim (m, k), two corners first, and where the surface lies; collective.
+
+    Args:
+        elastic: The body.
+        surface: Its contact surface, or the meshed one of a body on a contact grid.
 
     Returns:
         The edges, and unit vectors (m, 3) at right angles to them into the contact surface and into the boundary
         beyond it, which are zero where nothing is beyond.
     """
-    surface = elastic.surface
     edges, middles = _outer_edges(surface)
-    beyond, ends = _beyond(elastic, edges)
+    beyond, ends = _beyond(elastic, surface, edges)
     first, second = surface.trace[edges[:, 0]], surface.trace[edges[:, 1]]
     inward, outward = (_across(first, second, point) for point in (middles, beyond))
     return edges, inward, np.where(ends[:, None], outward, 0.0)
 
 
-def _rim(elastic: ElasticBody) -> tuple[_Ints, _Ints]:
-    """Return the trace nodes on each edge of the rim (., k), two corners first: where the body goes on, and not."""
-    edges, inward, outward = rim_edges(elastic)
+def smooth_rim(elastic: ElasticBody, surface: ContactSurface) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the edges of the rim as `rim_edges` does: where the body goes on smoothly, and where not; collective."""
+    edges, inward, outward = rim_edges(elastic, surface)
     goes_on = np.einsum("ij,ij->i", inward, outward) < -SMOOTH
     return edges[goes_on], edges[~goes_on]
 
@@ -163,9 +168,9 @@ def _closures(cell: str, degree: int) -> tuple[_Ints, int]:
     return np.array([sorted(edge) for edge in edges]), corners
 
 
-def _beyond(elastic: ElasticBody, edges: _Ints) -> tuple[Array, Mask]:
+def _beyond(elastic: ElasticBody, surface: ContactSurface, edges: _Ints) -> tuple[Array, Mask]:
     """Return the middle of the facet beyond each edge of the rim (m, 3), and whether there is one; collective."""
-    body, surface = elastic.body, elastic.surface
+    body = elastic.body
     mesh, dim = body.mesh, body.mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
     facets = np.setdiff1d(exterior_facet_indices(mesh.topology), body.facet_tags.find(contact_tag(body)))

@@ -136,18 +136,18 @@ def few_across(system: Tribosystem, limits: ContactEnds | ContactRim | None, pre
 def clipped_text(limits: ContactEnds | ContactRim, where: str, needed: float | None, case: Case) -> str:
     """Say that the contact is clipped, and how wide the surface should be."""
     how = "; set geometry.parameters.contact_width" if "contact_width" in case.geometry.parameters else ""
-    if case.grid is not None:
+    if limits.of_grid:
         how = "; set grid.size, within the contact surface"
     wide = "" if needed is None else f"; a width of about {needed:.3g} mm is needed, it has {limits.width:.3g} mm"
     return (
-        f"contact reaches the end of the {_ending(case)} {where}, where the bodies go on smoothly: "
+        f"contact reaches the end of the {_ending(limits)} {where}, where the bodies go on smoothly: "
         f"it is clipped there, and pressures and depths are not those of a surface that is wide enough{wide}{how}"
     )
 
 
-def _ending(case: Case) -> str:
+def _ending(limits: ContactEnds | ContactRim) -> str:
     """Return what ends where contact is clipped."""
-    return "meshed contact surface" if case.grid is None else "contact grid"
+    return "contact grid" if limits.of_grid else "meshed contact surface"
 
 
 def mean_pressures(pressure: Array, weights: Array) -> Array:
@@ -216,7 +216,7 @@ def steady_warnings(system: Tribosystem, state: SteadyState) -> list[str]:
     if limits is not None and where:
         reach = f"; a width of about {limits.reach:.4g} mm is needed, from edge to edge" if limits.reach else ""
         texts.append(
-            f"contact reaches the end of the {_ending(system.case)} {where}, where the bodies go on "
+            f"contact reaches the end of the {_ending(limits)} {where}, where the bodies go on "
             f"smoothly: the scar of the cyclic steady state is as wide as what is meshed, "
             f"{limits.width:.4g} mm, whatever that is, and so are its pressures{reach}. "
             "A scar that still grows is followed by `run`"

@@ -29,6 +29,7 @@ from fenwear.interface.edges import Edges
 from fenwear.parallel import release
 from fenwear.sliding.wear import WornDepths
 
+FLAT = 1e-6  # of the contact: what lies in a plane
 SWALLOWED = 0.2  # of a load: nodes at the end of its group that a support beside it holds may take less of it
 
 
@@ -248,5 +249,15 @@ def _moved(
 
 
 def edges_of(bodies: Bodies, surface: ContactSurface) -> Edges:
-    """Return the distances from the edges of a contact on the punch's surface."""
-    return Edges(surface, rings=bodies.punch.law.kind == "axisymmetric")
+    """Return the distances from the edges of a contact on the punch's surface.
+
+    What both bodies end at, held square to it alone, is a plane of symmetry, beyond which the contact goes on.
+    """
+    size, surfaces = surface.extent(), (surface, bodies.strip.surface)
+    planes = []
+    for axis, place in bodies.punch.mirrors:
+        shared = any(axis == other and abs(place - there) < FLAT * size for other, there in bodies.strip.mirrors)
+        ends = [(float(one.trace[:, axis].min()), float(one.trace[:, axis].max())) for one in surfaces]
+        if shared and any(all(abs(end[side] - place) < FLAT * size for end in ends) for side in (0, 1)):
+            planes.append((axis, place))
+    return Edges(surface, rings=bodies.punch.law.kind == "axisymmetric", planes=planes)

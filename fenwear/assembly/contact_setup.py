@@ -344,7 +344,7 @@ class ContactSetup:
         given["contact.third_body.life"] = None if third is None else third.life
         return [key for key, value in given.items() if isinstance(value, Dependence) and value.passes]
 
-    @property
+    @cached_property
     def constant_coefficients(self) -> bool:
         """Whether friction, wear and loss of debris are alike at any temperature, pressure, speed, depth, distance."""
         return self.friction.constant and self.wear.constant and not self.layers.varies
@@ -403,6 +403,20 @@ class ContactSetup:
         return tuple(found)
 
     @cached_property
+    def _speeds(self) -> tuple[Array, ...]:
+        """Mean speeds of the nodes in each phase, and of the motion in the middle position at last (n,), mm/s."""
+        motion, pair = self.motion, self.pair
+        phases = (phase.speed * ratio for phase, ratio in zip(motion.phases, self.sliding_ratio, strict=True))
+        if motion.steps:
+            return *phases, self.path.sum(axis=0) / motion.period
+        return *phases, motion.mean_speed * self.sliding.field.rate(pair.opposite, pair.normal)
+
+    @cached_property
+    def _initial(self) -> Array:
+        """The initial temperature at the nodes (n,), K."""
+        return np.full(len(self.pair.weights), 0.0 if self.heat is None else self.heat.initial)
+
+    @cached_property
     def _regions(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         """Shares of the regions of punch and strip at the contact nodes (n,); none where there is one region alone."""
         punch, strip = self.bodies.regions
@@ -437,34 +451,30 @@ class ContactSetup:
             cycle: Of the pressures of all phases, by `SlidingWays.shear`; by default they are not known.
             touching: Which nodes touch (n,), for the edges of the contact; by default those that carry a pressure.
         """
-        n = len(self.pair.weights)
-        initial = np.full(n, 0.0 if self.heat is None else self.heat.initial)
-        slid = self.sliding_ratio[phase or 0]
-        if self.motion.steps:
-            slid = self.path.sum(axis=0)
-        if phase is not None:
-            speed = self.motion.phases[phase].speed * self.sliding_ratio[phase]
-        elif self.motion.steps:
-            speed = slid / self.motion.period
-        else:
-            speed = self.motion.mean_speed * self.sliding.field.rate(self.pair.opposite, self.pair.normal)
-        pair = self.pair if phase is None else self.pairs[phase]
-        none = np.zeros(n)
-        if touching is None:
-            touching = np.full(n, True) if pressure is None else pressure > 0
+        n, initial = len(self.pair.weights), self._initial
+        slid = self.path.sum(axis=0) if self.motion.steps else self.sliding_ratio[phase or 0]
+        pair, none = self.pair if phase is None else self.pairs[phase], np.zeros(n)
+        depths = none, none
+        if worn is not None:
+            depths = worn.punch, pair.wear_interpolation @ worn.strip if self.strip_wears else none
+        edge = None
+        if self.edges is not None:
+            if touching is None:
+                touching = np.full(n, True) if pressure is None else pressure > 0
+            edge = self.edges.distance(touching)
         return ContactConditions(
             np.full(n, self.rigid.mean_pressure) if pressure is None else pressure,
-            speed,
+            self._speeds[-1 if phase is None else phase],
             (initial, initial) if temperatures is None else temperatures,
             self._places[-1 if phase is None else phase],
-            (none, none) if worn is None else (worn.punch, pair.wear_interpolation @ worn.strip),
+            depths,
             slid * self.slid_after(self.clock.half_cycles if half_cycles is None else half_cycles),
             self._regions,
             self.ways.shear(None) if cycle is None else cycle,
             self.layers.known(pair, worn),
             covering(self.coatings, pair, None if worn is None else (worn.punch, worn.strip)),
             self.layers.thickness(worn),
-            None if self.edges is None else self.edges.distance(touching),
+            edge,
         )
 
     def friction_ratio(self, direction: int) -> Array:

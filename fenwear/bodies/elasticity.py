@@ -124,6 +124,7 @@ class ElasticBody:
         self.reach: Reach | None = None
         self._held = held = Supports(body, self.space, description, law.kind, self.trace)
         self.pivot, self.rigid_modes, self.mode_names = held.pivot, held.modes, held.names
+        self.mirrors = held.mirrors
         self._bcs, self.supported, self.imposed = held.conditions, held.held, held.imposed
 
         u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)

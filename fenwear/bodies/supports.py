@@ -22,6 +22,7 @@ from fenwear.errors import CaseError, InputError
 # For each model the columns of the rigid basis (translations, then rotations), first those that pressure balances
 # with their names, then those in which friction would carry the body away.
 SLIDE, SPIN = "slide along {0}: hold its {0} somewhere", "spin about {0}: hold it against turning"
+FLAT = 1e-6  # of the body: what lies in a plane
 WRAPPED = 0.5  # component of normals, both ways, from which on a contact holds a body along that axis
 PLANE = {1: "lambda_F", 2: "lambda_M"}, {0: SLIDE.format("x")}
 RIGID_MODES: dict[Kind, tuple[dict[int, str], dict[int, str]]] = {
@@ -53,6 +54,8 @@ class Supports:
             "lambda_Fy" where the contact wraps around the body or is wrapped by it; of a body of several parts that
             share no node with the name of the part's contact, as "lambda_F_left", or its number, as "lambda_F_2".
         guided: What guides hold of each part that has any.
+        mirrors: Planes of which supports hold the motion across them and no other, as planes of symmetry are held: the
+            number of the axis that they are square to, and where on it they are, mm.
     """
 
     def __init__(self, body: BodyMesh, space: fem.FunctionSpace, description: Body, kind: Kind, contact: Trace) -> None:
@@ -79,6 +82,22 @@ class Supports:
         self.modes, self.names, self._loose = self._free_modes(self._owned(own), description.no_turning_about)
         self.conditions = own + self._regularise()
         self.held = self._owned(self.conditions)
+        self.mirrors = self._mirrors(description.supports)
+
+    def _mirrors(self, supports: Sequence[Support]) -> list[tuple[int, float]]:
+        """Return the planes that supports hold as those of symmetry; collective."""
+        found, mesh = [], self.body.mesh
+        for support in supports:
+            if support.on not in self.body.curves or len(support.fix) != 1 or any(support.by or ()):
+                continue
+            axis = self._component(support.fix[0], self.body.name)
+            facets = self.body.facet_tags.find(self.body.curves[support.on])
+            along = mesh.geometry.x[compat.facet_nodes(mesh, facets).ravel(), axis]
+            low = mesh.comm.allreduce(float(along.min(initial=np.inf)), MPI.MIN)
+            high = mesh.comm.allreduce(float(along.max(initial=-np.inf)), MPI.MAX)
+            if high - low < FLAT * self._size():
+                found.append((axis, (low + high) / 2))
+        return found
 
     def _described(self, supports: Sequence[Support]) -> list[fem.DirichletBC]:
         key, found = f"{self.body.name}.supports", []

@@ -18,6 +18,7 @@ of them, and what it finds is taken on as it is.
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -249,7 +250,7 @@ class Inequality:
             kept = last
             for self.iterations in range(CHORDS):
                 f = self._function(x)
-                wanted = self._wanted(x, f, key) if self.iterations else key
+                wanted = self._wanted(x, f, kept) if self.iterations else key
                 same = wanted == key
                 if not same:
                     if wanted in seen:
@@ -260,9 +261,9 @@ class Inequality:
                     kept = self._factor(self._jacobian(x), key)
                     f = self._function(x)
                 rest = f[kept.free]
-                size = float(np.linalg.norm(rest))
+                size = math.sqrt(rest @ rest)
                 small = size < TOLERANCE or (size > FALLS * before and size < self._tolerance)
-                if small and same and self._wanted(x, f, key) == key:
+                if small and same and (wanted if self.iterations else self._wanted(x, f, kept)) == key:
                     self.residual, self._worn_out = f, self.iterations > SERVES
                     return x
                 if size > FALLS * before:
@@ -274,11 +275,13 @@ class Inequality:
             pass
         return None
 
-    def _wanted(self, x: Array, f: Array, key: bytes) -> bytes:
+    def _wanted(self, x: Array, f: Array, kept: _Kept) -> bytes:
         """Return which unknowns are free next: those within their bounds, and those that their residual lets go."""
-        free = np.frombuffer(key, dtype=bool)
-        wanted = np.where(free, x > self._lower, f < -TOLERANCE)
+        wanted, held = x > self._lower, kept.bounded
+        if len(held):
+            wanted[held] = f[held] < -TOLERANCE
         if self._bounded_above:
+            free = np.frombuffer(kept.key, dtype=bool)
             above = np.where(free, x < self._upper, f > TOLERANCE)
             wanted = np.where(free, wanted & above, np.where(x >= self._upper, above, wanted))
         return wanted.tobytes()

@@ -150,10 +150,12 @@ class PhaseStep:
         if before is None or len(known) < 2 or before is not known[0]:
             return before
         hardness, shares = self.system.layers.hardness, ONWARDS[len(known) - 1]
-        further = sum(share * one.pressure for share, one in zip(shares, known, strict=True))
-        kept = (before.pressure > 0) & (further > 0) & (before.pressure < hardness) & (further < hardness)
-        rigid = sum(share * one.rigid for share, one in zip(shares, known, strict=True))
-        return replace(before, pressure=np.where(kept, further, before.pressure), rigid=np.asarray(rigid))
+        further = np.tensordot(shares, [one.pressure for one in known], 1)
+        kept = (before.pressure > 0) & (further > 0)
+        if hardness < np.inf:
+            kept &= (before.pressure < hardness) & (further < hardness)
+        rigid = np.tensordot(shares, [one.rigid for one in known], 1)
+        return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
 
     def _update(
         self,
@@ -186,7 +188,8 @@ class PhaseStep:
             self._contact.slide([self._friction_ratio])
             if self._thermal is not None:
                 self._thermal.slide(heating_friction(system, mu, self.phase))
-        passing = system.passing(system.wear.phases([conditions], [self.phase]), [self.phase], evolution, [conditions])
+        wear = self._passing.wear if system.wear.constant else system.wear.phases([conditions], [self.phase])
+        passing = system.passing(wear, [self.phase], evolution, [conditions])
         return replace(passing, ended=end) if ended else passing
 
     @cached_property
@@ -275,7 +278,8 @@ class PhaseStep:
         worn: WornDepths,
     ) -> PhaseEnd:
         previous = None if before is None else before.pressure[0]
-        meter = self._meter if self._constant else PhaseMeter(self.system, self.phase, self._mu, passing.wear)
+        alike = self.system.friction.constant and passing.wear is self._passing.wear
+        meter = self._meter if alike else self._meter.at(self._mu, passing.wear)
 
         def left() -> tuple[Totals, WornDepths]:
             pressure = contact.pressure[0]

@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,7 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import ContactSetup
 from fenwear.interface import RigidEquilibrium
+from fenwear.interface.placement import in_model
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.wear import PhasesWear, WornDepths
 
@@ -39,6 +41,8 @@ SUMS = (
     "mass_strip",
 )  # fmt: skip
 DISTANCE, LOAD_DISTANCE, DRAG_DISTANCE = (SUMS.index(name) for name in ("distance", "load_distance", "drag_distance"))
+LOAD_PATH, WORK = (SUMS.index(name) for name in ("load_path", "work"))
+VOLUMES = tuple(SUMS.index(f"volume_{body}") for body in ("punch", "strip"))  # each with its mass behind it
 AROUND = 0.1  # mean normal of a part of the contact below which it looks all ways
 MILLIGRAM = 1e9  # in N s²/mm, a tonne
 
@@ -91,9 +95,9 @@ class PhaseMeter:
 
     def __init__(self, system: ContactSetup, phase: int, mu: Array, wear: PhasesWear) -> None:
         pair, slid = system.pairs[phase], system.sliding_ratio[phase]
-        areas = system.bodies.punch.thickness * pair.weights
-        path = system.motion.phases[phase].distance * slid
-        self._energy = mu * path
+        self._system, self._phase = system, phase
+        self._areas = system.bodies.punch.thickness * pair.weights
+        self._path = system.motion.phases[phase].distance * slid
         positions, phases = system.motion.positions, system.motion.phases
         first = phase // positions * positions
         whole = sum(one.distance for one in phases[first : first + positions])
@@ -101,18 +105,32 @@ class PhaseMeter:
         speed = np.linalg.norm(system.field_of(phase).velocity(pair.opposite), axis=1)
         self._weights, self._moved = pair.weights, pair.weights * system.motion.phases[phase].distance * speed
         self._mean_distance = float(self._moved.sum() / pair.weights.sum())  # where nothing presses
+        self._approach = approach(system.rigids[phase])
+        unknown = np.full(len(slid), np.nan)
+        self._weigh = [
+            np.array([self._areas, unknown if density is None else MILLIGRAM * density * self._areas])
+            for density in opposite_densities(system, phase)
+        ]
+        self._take(mu, wear)
+
+    def at(self, mu: Array, wear: PhasesWear) -> PhaseMeter:
+        """Return the same at other coefficients."""
+        found = copy(self)
+        found._take(mu, wear)
+        return found
+
+    def _take(self, mu: Array, wear: PhasesWear) -> None:
+        system, areas = self._system, self._areas
+        self._energy = mu * self._path
         self._rows = np.zeros((len(SUMS), len(areas)))
-        self._rows[SUMS.index("load_path")] = areas * path
-        self._rows[SUMS.index("work")] = areas * self._energy
-        self._load = areas * _along_approach(system, phase, mu)
-        friction = system.friction_in_space(phase, mu)
+        self._rows[LOAD_PATH] = areas * self._path
+        self._rows[WORK] = areas * self._energy
+        friction, normal = system.friction_in_space(self._phase, mu), system.pairs[self._phase].normal
+        traction = normal + in_model(friction, normal.shape[1])
+        self._load = areas * np.einsum("id,id->i", traction, self._approach)
         self._drag = areas[:, None] * friction
         self._curved = []  # worn volume and mass of bodies whose wear is not linear in p
-        for body, own, density in zip(
-            ("punch", "strip"), (wear.punch, wear.strip), opposite_densities(system, phase), strict=True
-        ):
-            first = SUMS.index(f"volume_{body}")
-            weigh = np.array([areas, np.full(len(areas), np.nan) if density is None else MILLIGRAM * density * areas])
+        for first, own, weigh in zip(VOLUMES, (wear.punch, wear.strip), self._weigh, strict=True):
             if own is None:
                 self._rows[first + 1] = 0.0 * weigh[1]
             elif own.linear:
@@ -155,13 +173,6 @@ def with_coated(system: ContactSetup, totals: Totals, lost: WornDepths) -> Total
             mass = np.nan if density is None else float(MILLIGRAM * (areas * density) @ depth)
             sums[first : first + 2] = float(areas @ depth), mass
     return Totals(sums, totals.energy, totals.pressure)
-
-
-def _along_approach(system: ContactSetup, phase: int, mu: Array) -> Array:
-    """Return what pressure and friction of each node give the load, over the pressure (n,)."""
-    rigid = system.rigids[phase]
-    traction = rigid.pair.normal + system.phase_friction(phase, mu)
-    return np.asarray(np.einsum("id,id->i", traction, approach(rigid)))
 
 
 def approach(rigid: RigidEquilibrium) -> Array:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -67,7 +68,7 @@ class Layers:
     memory: Memory | None = None
     begun: Held | None = None
 
-    @property
+    @cached_property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows of the state: of debris and of what has flown, mm each, and of what laws remember."""
         remembered = () if self.memory is None else tuple(map(row_of_state, self.memory.contact))
@@ -172,7 +173,7 @@ class Layers:
 
         Where pressures are `capped` at the hardness what flows is left out.
         """
-        found = np.zeros_like(pressure) if self.closure is None else self.closure.closure(pressure)
+        found = np.zeros(pressure.shape) if self.closure is None else self.closure.closure(pressure)
         return found if capped or self.hardness == np.inf else found + self.flow(pressure)
 
     def slope(self, pressure: Array, *, capped: bool = False) -> Array | None:

@@ -70,7 +70,7 @@ class Debris:
             and conditions.edge is not None
         ):
             found = found + np.exp(-conditions.edge / law.edge_length) / law.edge_life
-        return np.broadcast_to(found, shape)
+        return found if found.shape == shape else np.broadcast_to(found, shape)
 
     def over(self, slid: Array, conditions: Sequence[ContactConditions] | None = None) -> DebrisCycle:
         """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm.
@@ -86,7 +86,10 @@ class Debris:
             raise ValueError("expected the conditions of the phases where what is lost depends on them")
         else:
             x = slid * np.array([self.lost(one) for one in conditions])
-        kept = np.divide(-np.expm1(-x), x, out=np.ones_like(x), where=x > 0)
+        x = np.maximum(x, LEAST)  # where nothing slides all is kept
+        kept = -np.expm1(-x) / x
+        if len(x) == 1:
+            return DebrisCycle(self.share, kept, x[0])
         after = np.cumsum(np.vstack([x[1:], np.zeros_like(x[:1])])[::-1], axis=0)[::-1]
         return DebrisCycle(self.share, kept * np.exp(-after), x.sum(axis=0))
 

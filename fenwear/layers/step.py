@@ -154,14 +154,16 @@ class LayerStep:
 
     def opening(self, pressure: Array) -> Array:
         """Return the gap opened in each phase (m, n), mm, by the pressures (m, n)."""
-        passing, found = self.passing, np.zeros_like(pressure)
-        if self.implicit:
-            found = found + self._wear.opening(pressure)
-            if passing.debris is not None:
-                found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
-            filled = passing.filled(pressure, self.before, self.cycles)
-            found = found if filled is None else found - self._length * filled
-        return found + passing.layers.closing(pressure, capped=self.capped)
+        passing = self.passing
+        closed = passing.layers.closing(pressure, capped=self.capped)
+        if not self.implicit:
+            return closed
+        found = self._wear.opening(pressure)
+        if passing.debris is not None:
+            found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
+        filled = passing.filled(pressure, self.before, self.cycles)
+        found = found if filled is None else found - self._length * filled
+        return found + closed
 
     def local(self, pressure: Array) -> Array | None:
         """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""

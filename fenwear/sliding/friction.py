@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal, Self
 
 import numpy as np
@@ -107,13 +108,13 @@ class Friction:
     field: SlidingField = ALONG_X
     of_coatings: tuple[float | None, float | None] = (None, None)
 
-    @property
+    @cached_property
     def constant(self) -> bool:
         """Whether mu depends on nothing but the place."""
         varies = isinstance(self.contact.friction, Dependence) and self.contact.friction.varies
         return not varies and self.of_coatings == (None, None) and not self.mixed
 
-    @property
+    @cached_property
     def mixed(self) -> bool:
         """Whether the share of the load that asperities carry changes with more than the place."""
         return self.contact.lubrication is not None and self.contact.lubrication.varies

@@ -362,7 +362,7 @@ class Wear:
     friction: Friction
     coatings: tuple[Array | None, Array | None] = (None, None)
 
-    @property
+    @cached_property
     def constant(self) -> bool:
         """Whether no coefficient depends on more than the place."""
         return stays((self.punch, self.strip), self.friction)

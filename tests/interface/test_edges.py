@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from combinations import SMALL
 
-from fenwear import assemble, load_case
+from fenwear import assemble, load_case, march
 from fenwear.interface.edges import Edges, rim_points
 
 HELD = (
@@ -43,3 +43,32 @@ def test_of_solids_it_is_their_rim() -> None:
     found = Edges(surface).distance(np.full(len(x), True))
     assert found == pytest.approx(np.minimum(x - low, high - x).min(axis=1), abs=1e-9)
     assert len(rim_points(surface)) == 2 * (len(np.unique(x[:, 0].round(9))) + len(np.unique(x[:, 1].round(9)))) - 4
+
+
+def test_nothing_ends_at_planes_of_symmetry() -> None:
+    """A quarter of a block has the distances, and the debris that edges lose, of the whole one, at every node."""
+    found = []
+    for quarter, across in ((0, 4), (1, 2)):
+        parameters = f"{{quarter={quarter}, across_x={across}, across_y={across}, margin_x=0.5, margin_y=0.5}}"
+        geometry = f"file='solid_blocks.geo', degree=1, follow_wear='never', parameters={parameters}"
+        settings = (f"geometry={{{geometry}}}", *HELD)
+        if quarter:
+            for body in ("punch", "strip"):
+                planes = [f"{{on='{body}_middle_{axis}', fix=['{axis}']}}" for axis in "xy"]
+                planes += ["{on='strip_far', fix=['x', 'y', 'z']}"] if body == "strip" else []
+                settings = (*settings, f"{body}.supports=[{', '.join(planes)}]")
+            settings = (*settings, "punch.loads=[{on='punch_far', force=['0 N', '0 N', '-0.25 kN']}]")
+        else:
+            held = "punch.supports=[{at=[0, 0, 1], fix=['x', 'y']}]"
+            settings = (*settings, held, "punch.no_turning_about=['x', 'y', 'z']")
+        third = "contact={friction=0, third_body={share=0.5, life='3 mm', edge_life='0.1 mm', edge_length='0.1 mm'}}"
+        system = assemble(load_case("ball-on-flat", [*settings, third]))
+        *_, last = march(system, 20)
+        x, edges = system.pair.punch.x, system.edges
+        assert edges is not None
+        own = (x[:, :2] >= -1e-9).all(axis=1)
+        order = np.lexsort(x[own, :2].round(6).T)
+        distance = edges.distance(np.full(len(x), True))
+        found.append([row[own][order] for row in (distance, last.end.worn.punch, last.end.worn.between[0])])
+    for whole, quarter in zip(*found, strict=True):
+        assert quarter == pytest.approx(whole, rel=1e-8)

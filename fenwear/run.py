@@ -440,7 +440,7 @@ class _Run:
     def _note_growth(self, last: Block) -> str:
         """Note the growth rate of a stationary end with heat; return why there is none, if it could be."""
         contacts, motion = joined(self.state.contacts), self.system.motion
-        if last.heat is None or contacts is None or self.system.track_deepens or self.system.sticks:
+        if last.heat is None or contacts is None or self.system.track_changes or self.system.sticks:
             return ""
         surfaces = (last.heat.temperature_punch[-1], last.heat.temperature_strip[-1])
         phase = self.state.half_cycle % motion.half_cycles * motion.positions

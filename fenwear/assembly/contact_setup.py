@@ -230,6 +230,28 @@ class ContactSetup:
             slid.append(self.motion.sliding(exponent)[:, None] * self.sliding_ratio**exponent)
         return Wear(*self.sliding.wear, (slid[0], slid[1]), self.pairs, self.friction, self.coatings)
 
+    @property
+    def strip_carries(self) -> bool:
+        """Whether debris lies on the strip's material."""
+        third = self.friction.contact.third_body
+        return third is not None and self.names.role_of(third.carried_by) == "strip"
+
+    @property
+    def strip_changes(self) -> bool:
+        """Whether something of the strip's material changes: it wears, or carries debris."""
+        return self.strip_wears or self.layers.strip_carries
+
+    @cached_property
+    def carried_areas(self) -> Array:
+        """Areas that nodes of the strip stand for where it carries debris (n_strip,), mm or mm².
+
+        On a closed track, of which the mesh is a part, those by which what is put on it keeps its volume.
+        """
+        if self.sliding.track is None:
+            return self.pair.strip.weights
+        onto = self.pair.wear_projection.toarray()
+        return np.asarray(np.linalg.lstsq(onto.T, self.pair.weights, rcond=None)[0])
+
     @cached_property
     def coatings(self) -> tuple[Array | None, Array | None]:
         """Thickness of the coatings of punch and strip at their own contact nodes, mm; None for a body without.
@@ -250,7 +272,9 @@ class ContactSetup:
         case = self.made_from
         modulus = None if case is None else common_modulus(case, *self.bodies.regions)
         initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
-        found = layers_of(self.friction.contact, self.pair, modulus, self.sliding.wear, initial)
+        contact = self.friction.contact
+        carries = self.strip_carries and not self.sticks  # what sticks hardly moves: it lies where it is on either body
+        found = layers_of(contact, self.pair, modulus, self.sliding.wear, initial, strip_carries=carries)
         if found.hardness <= mean:
             message = f"expected more than the mean pressure of {mean:.6g} MPa: nothing softer carries the load"
             raise CaseError(InputError("contact.hardness", message))
@@ -333,6 +357,11 @@ class ContactSetup:
         return self.strip_wears and self.sliding.to_and_fro
 
     @property
+    def track_changes(self) -> bool:
+        """Whether the strip wears, or carries debris, to and fro under the punch: each position finds another track."""
+        return self.strip_changes and self.sliding.to_and_fro
+
+    @property
     def passing_laws(self) -> list[str]:
         """Keys of coefficients that change as long as a run goes on: with the worn depth, or with what is slid."""
         laws = zip(("punch", "strip"), self.sliding.wear, strict=True)
@@ -366,6 +395,8 @@ class ContactSetup:
     def gap(self, phase: int, worn: WornDepths) -> Array:
         """Return the gap of the unloaded, worn bodies in a phase (n,), mm."""
         pair, between = self.pairs[phase], self.layers.opening(worn.between)
+        if (lies := self.layers.on_strip(worn)) is not None:
+            between = between - pair.wear_interpolation @ lies
         if self.bodies.moved is not None:
             worn = worn - self.bodies.moved
         elif not self.strip_wears:
@@ -406,10 +437,9 @@ class ContactSetup:
     def _speeds(self) -> tuple[Array, ...]:
         """Mean speeds of the nodes in each phase, and of the motion in the middle position at last (n,), mm/s."""
         motion, pair = self.motion, self.pair
-        phases = (phase.speed * ratio for phase, ratio in zip(motion.phases, self.sliding_ratio, strict=True))
-        if motion.steps:
-            return *phases, self.path.sum(axis=0) / motion.period
-        return *phases, motion.mean_speed * self.sliding.field.rate(pair.opposite, pair.normal)
+        found = [np.asarray(phase.speed * own) for phase, own in zip(motion.phases, self.sliding_ratio, strict=True)]
+        mean = motion.mean_speed * self.sliding.field.rate(pair.opposite, pair.normal)
+        return (*found, self.path.sum(axis=0) / motion.period if motion.steps else mean)
 
     @cached_property
     def _initial(self) -> Array:
@@ -454,7 +484,7 @@ class ContactSetup:
         n, initial = len(self.pair.weights), self._initial
         slid = self.path.sum(axis=0) if self.motion.steps else self.sliding_ratio[phase or 0]
         pair, none = self.pair if phase is None else self.pairs[phase], np.zeros(n)
-        depths = none, none
+        depths: tuple[Array, Array] = none, none
         if worn is not None:
             depths = worn.punch, pair.wear_interpolation @ worn.strip if self.strip_wears else none
         edge = None

@@ -56,7 +56,7 @@ class Sliding:
 
 def make_sliding(case: Case, parts: int = 1) -> Sliding:
     """Return the sliding of a case, with each phase of the motion cut into `parts` of equal time."""
-    motion = make_motion(case.motion, strip_wears=case.wear.strip is not None and case.passes).in_parts(parts)
+    motion = make_motion(case.motion, strip_wears=case.strip_changes and case.passes).in_parts(parts)
     sliding_field = _sliding_field(case, motion)
     one_way = isinstance(case.motion, OneWay | Rotation)
     return Sliding(
@@ -91,7 +91,7 @@ def _closed_track(case: Case) -> float | None:
     if isinstance(case.motion, OneWay):
         return case.motion.track
     turns = isinstance(case.motion, Rotation) and case.passes  # rings have their whole track under the punch
-    return 2 * math.pi if turns and case.wear.strip is not None else None
+    return 2 * math.pi if turns and case.strip_changes else None
 
 
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:

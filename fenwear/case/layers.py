@@ -42,6 +42,11 @@ class ThirdBody(Part):
     initial: Annotated[Length, Field(ge=0)] = Field(
         default=0.0, description="thickness at the start, such as of a powder or a solid lubricant"
     )
+    carried_by: str = Field(
+        default="punch",
+        description="body whose surface it lies on and moves with, by its name: on the strip it passes through the "
+        "contact and comes back, or lies along a closed track",
+    )
 
     @model_validator(mode="after")
     def _together(self) -> Self:

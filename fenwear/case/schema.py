@@ -23,7 +23,7 @@ from fenwear.case.diffusion import diffusion_of
 from fenwear.case.laws import Dependence, Stick, Wear, WearLaw
 from fenwear.case.materials import Material
 from fenwear.case.motions import Cycle, Motions, OneWay, Oscillation, Rotation
-from fenwear.case.names import Names, renamed
+from fenwear.case.names import ROLES, Names, renamed
 from fenwear.case.quantities import Part
 from fenwear.case.setup import Setup
 from fenwear.case.thermal import Heat
@@ -265,6 +265,17 @@ class Case(Part):
         return self.motion.axis != "y"
 
     @property
+    def debris_on_strip(self) -> bool:
+        """Whether debris lies on the strip."""
+        third = self.contact.third_body
+        return third is not None and self.names.role_of(third.carried_by) == "strip"
+
+    @property
+    def strip_changes(self) -> bool:
+        """Whether something of the strip's material changes as it passes: it wears, or carries debris."""
+        return self.wear.strip is not None or self.debris_on_strip
+
+    @property
     def diffusion(self) -> dict[str, float]:
         """What ready geometries grade the strip by, see `diffusion_of`: the same for all stages of a program."""
         if self._diffusion is not None:
@@ -288,7 +299,7 @@ class Case(Part):
         least = 1 if one_way else 2
         if self.run.integration == "jump" and self.run.half_cycles < least:
             problems.append("run.half_cycles: expected at least one whole cycle for cycle jumps")
-        if self.wear.strip is not None and self.passes and not self.sticks:
+        if self.strip_changes and self.passes and not self.sticks:
             problems += self._track_problems()
         if not self.passes and self.model.kind == "plane" and self.heat is not None:
             problems.append("motion.axis: expected 'x' with heat: a plane model does not follow heat out of the plane")
@@ -322,12 +333,25 @@ class Case(Part):
                 for name, material in self.materials.items()
                 for key in material.dependent
             ]
-        problems += self._debris_problems() + self._region_problems()
+        problems += self._debris_problems() + self._carrier_problems() + self._region_problems()
         friction = self.contact.friction
         for body, law in self.wear.by_body.items():
             if law is not None and (law.beta, law.energy) != (None, None) and friction == 0:
                 problems.append(f"wear.{body}: expected friction where beta or energy gives the coefficient")
         return problems
+
+    def _carrier_problems(self) -> list[str]:
+        """Return what is wrong with the body that carries debris."""
+        third, names = self.contact.third_body, self.names
+        if third is None:
+            return []
+        if names.role_of(third.carried_by) not in ROLES:
+            known = " or ".join(repr(name) for name in names.by_roles.values())
+            return [f"contact.third_body.carried_by: expected {known}, got {third.carried_by!r}"]
+        if self.debris_on_strip and self.contact.asks("debris", self.wear.laws):
+            told = "expected 'punch' where a law depends on debris: it knows what lies at a place of the contact"
+            return [f"contact.third_body.carried_by: {told}"]
+        return []
 
     def _debris_problems(self) -> list[str]:
         """Return which coefficients ask for the thickness of debris where there is none."""

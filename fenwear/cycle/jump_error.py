@@ -48,7 +48,11 @@ def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: Ru
         for one, other in zip(whole.contacts, halves.contacts, strict=True)
     )
     share, depth = 1 / (2**ORDER - 1), wrong / max(worn, 1e-300)
-    depth = max(depth, _creep_difference(system, apart, step, halves.worn))
+    depth = max(
+        depth,
+        _creep_difference(system, apart, step, halves.worn),
+        _carried_difference(system, apart, step, halves.worn),
+    )
     return Estimate(
         max(share * depth, _through_difference(system, before, whole, halves)),
         share * pressure,
@@ -63,6 +67,13 @@ def _creep_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, 
     if creep is None:
         return 0.0
     wrong, moved, there = (float(weights @ np.abs(creep.depth(one.crept))) for one in (apart, step, end))
+    return wrong / max(moved, REST * there, 1e-300)
+
+
+def _carried_difference(system: Tribosystem, apart: WornDepths, step: WornDepths, end: WornDepths) -> float:
+    """Return the same of debris that the strip carries: along a track it is thin, and nothing beside what is worn."""
+    lies, weights = [system.layers.on_strip(one) for one in (apart, step, end)], system.pair.strip.weights
+    wrong, moved, there = (0.0 if one is None else float(weights @ np.abs(one)) for one in lies)
     return wrong / max(moved, REST * there, 1e-300)
 
 
@@ -86,6 +97,8 @@ def area(system: Tribosystem, worn: WornDepths) -> float:
     """Return the integral of the size of depths over both surfaces, and of what lies between."""
     pair = system.pair
     between = pair.weights @ np.broadcast_to(np.abs(system.layers.opening(worn.between)), pair.weights.shape)
+    if (lies := system.layers.on_strip(worn)) is not None:
+        between += pair.strip.weights @ np.abs(lies)  # as of its wear
     return float(pair.weights @ np.abs(worn.punch) + pair.strip.weights @ np.abs(worn.strip) + between)
 
 

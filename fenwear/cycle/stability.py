@@ -84,7 +84,7 @@ def growth_rate(
 ) -> float:
     """Return the rate at which the least stable disturbance of a state grows, 1/s; collective.
 
-    Negative: every disturbance dies out. Not for a strip whose worn material moves to and fro. The
+    Negative: every disturbance dies out. Not for a strip whose worn material, or debris on it, moves to and fro. The
     state is that of the given pressures and of the temperatures that repeat under them. The cycle's map
     of temperature and worn depth is linearised there, friction, wear and conductance with it, for the
     same nodes in contact, and its eigenvalue largest in size taken: ln |lambda| over
@@ -142,7 +142,7 @@ def _factors(
     heat, states = repeating_temperatures(system, pressure, conductances)
     n = pressure.shape[1]
     dim = (0 if heat is None else heat.dim) + (0 if system.creep is None else len(system.creep.beginning()))
-    dim += 0 if system.layers.debris is None else n
+    dim += 0 if system.layers.debris_here is None else n
     cycle, rest = np.eye(dim + n), _rested(system, pressure, heat, states)
     for phase in range(len(pressure)):
         conductance = None if conductances is None else conductances[phase]
@@ -293,7 +293,7 @@ def _rested(
         ConvergenceError: debris has no thickness at which as much is lost as comes.
     """
     layers = system.layers
-    if layers.memory is None and layers.debris is None:
+    if layers.memory is None and layers.debris_here is None:
         return None
     warm: list[tuple[Array, Array] | None] = [None] * len(pressure)
     if heat is not None and states:
@@ -302,7 +302,7 @@ def _rested(
         system.conditions(k, np.asarray(p), own) for k, (p, own) in enumerate(zip(pressure, warm, strict=True))
     ]
     rest = system.rested(conditions)
-    if layers.debris is None:
+    if layers.debris_here is None:
         return rest
     thickness = np.asarray(layers.thickness(rest))
     for _ in range(MAX_ITERATIONS):
@@ -327,7 +327,7 @@ def _lies_after(
     worn: WornDepths | None,
 ) -> WornDepths | None:
     """Return what lies between after a phase, of what does at its start."""
-    if worn is None or system.layers.debris is None:
+    if worn is None or system.layers.debris_here is None:
         return worn
     conditions = _conditions(system, phase, pressure, heat, state, worn)
     passing = system.passing(system.wear.phases([conditions], [phase]), [phase], None, [conditions])
@@ -383,7 +383,7 @@ def _laws(
     if not lies:
         return _Laws(friction(*around), rate, mu_p, mu_s, worn_p, worn_s)
     mu_s, worn_s = np.hstack([mu_s, np.diag(mu_t[2])]), np.hstack([worn_s, worn_t[2]])
-    debris = system.layers.debris
+    debris = system.layers.debris_here
     assert debris is not None
     taken, path = depths(*around).sum(axis=0)[None], system.path[phase][None]
 

@@ -239,6 +239,11 @@ def _check_exists(system: Tribosystem) -> None:
             "for ever, most where every position touches it. Follow the wear by `run` with run.integration = "
             '"jump", or take wear.strip away'
         )
+    if system.track_changes:
+        raise ConvergenceError(
+            "no cyclic steady state is solved for where debris goes to and fro with the strip: it lies otherwise under "
+            'the punch in each position. Follow it by `run` with run.integration = "jump", or let the punch carry it'
+        )
     if system.passing_laws:
         raise ConvergenceError(
             f"no cyclic steady state exists: {system.passing_laws[0]} changes with the worn depth or the distance "

@@ -36,7 +36,7 @@ from fenwear.interface.placement import in_space
 from fenwear.layers.closure import Closure, ExponentialClosure, PowerClosure, RoughClosure
 from fenwear.layers.debris import LIFE, Debris
 from fenwear.layers.memory import Held, Memory
-from fenwear.sliding.wear import WornDepths
+from fenwear.sliding.wear import NOTHING, WornDepths
 
 RMS = np.sqrt(np.pi / 2)  # of Gaussian heights over Sa
 DEBRIS = ("debris_thickness", "debris_ejected")
@@ -58,6 +58,7 @@ class Layers:
         hardness: Largest pressure, MPa.
         memory: States of laws of one's own; None without.
         begun: These at the start; None without.
+        strip_carries: Whether debris lies on the strip's material.
     """
 
     nodes: int
@@ -67,17 +68,28 @@ class Layers:
     hardness: float = np.inf
     memory: Memory | None = None
     begun: Held | None = None
+    strip_carries: bool = False
 
     @cached_property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows of the state: of debris and of what has flown, mm each, and of what laws remember."""
         remembered = () if self.memory is None else tuple(map(row_of_state, self.memory.contact))
         flown = (PLASTIC,) if self.hardness < np.inf else ()
-        return (*(() if self.debris is None else DEBRIS), *flown, *remembered)
+        return (*(() if self.debris_here is None else DEBRIS), *flown, *remembered)
+
+    @property
+    def carried_rows(self) -> tuple[str, ...]:
+        """Names of the first rows of what the strip carries, of debris, mm; others are what laws remember there."""
+        return DEBRIS if self.strip_carries else ()
 
     def row(self, name: str) -> int:
         """Return the number of a row of the state, by its name in `rows`."""
         return self.rows.index(name)
+
+    @property
+    def debris_here(self) -> Debris | None:
+        """That which lies at the contact's nodes; None without, or where the strip carries it."""
+        return None if self.strip_carries else self.debris
 
     def given(self, pressure: Array) -> Array:
         """Return by how much pressures (..., n) close what lies between, mm."""
@@ -97,26 +109,32 @@ class Layers:
     def unworn(self, strip: int) -> WornDepths:
         """Return the depths at the start, none, of the contact's nodes and so many of the strip, and the state then."""
         state = np.zeros((len(self.rows), self.nodes))
+        carried = np.zeros((len(DEBRIS), strip)) if self.strip_carries else NOTHING
         if self.debris is not None:
-            state[self.row(DEBRIS[0])] = self.debris.initial
-        found = WornDepths(np.zeros(self.nodes), np.zeros(strip), state)
+            lies = carried[0] if self.strip_carries else state[self.row(DEBRIS[0])]
+            lies[:] = self.debris.initial
+        found = WornDepths(np.zeros(self.nodes), np.zeros(strip), state, carried=carried)
         return found if self.begun is None else self.with_held(found, self.begun)
 
     def held(self, worn: WornDepths) -> Held:
         """Return what laws remember at these depths; what they do at the start where that is not told."""
         if self.begun is None:
-            return Held(worn.between[len(self.rows) :], worn.carried)
+            return Held(worn.between[len(self.rows) :], worn.carried[len(self.carried_rows) :])
         first = len(self.rows) - len(self.begun.contact)
         contact = worn.between[first:] if len(worn.between) else self.begun.contact
-        return Held(contact, worn.carried if len(worn.carried) else self.begun.strip)
+        return Held(contact, worn.carried[len(self.carried_rows) :] if len(worn.carried) else self.begun.strip)
 
     def thickness(self, worn: WornDepths | None) -> Array | None:
-        """Return the thickness of the debris (n,), mm, by default that at the start; None without."""
-        if self.debris is None:
+        """Return the thickness of the debris (n,), mm, by default that at the start; None without at the nodes."""
+        if self.debris_here is None:
             return None
         if worn is None or not len(worn.between):
             return np.full(self.nodes, self.debris.initial)
         return np.asarray(worn.between[self.row(DEBRIS[0])])
+
+    def on_strip(self, worn: WornDepths) -> Array | None:
+        """Return the thickness of the debris that the strip carries (n_strip,), mm; None without."""
+        return np.asarray(worn.carried[0]) if self.strip_carries and len(worn.carried) else None
 
     def with_thickness(self, worn: WornDepths, thickness: Array) -> WornDepths:
         """Return the depths with debris of another thickness (n,), mm."""
@@ -142,7 +160,9 @@ class Layers:
     def with_held(self, worn: WornDepths, held: Held) -> WornDepths:
         """Return the depths with other states of laws."""
         first = len(self.rows) - len(held.contact)
-        return replace(worn, between=np.concatenate([worn.between[:first], held.contact]), carried=held.strip)
+        lies = len(self.carried_rows)
+        carried = np.concatenate([worn.carried[:lies], held.strip]) if lies else held.strip
+        return replace(worn, between=np.concatenate([worn.between[:first], held.contact]), carried=carried)
 
     def flown(self, worn: WornDepths, flowed: Array | None) -> WornDepths:
         """Return depths where surfaces have flown (n,) more, mm; None for nothing."""
@@ -163,7 +183,7 @@ class Layers:
         """Return the gap that a state opens (n,), mm."""
         if not len(state):
             return 0.0
-        found = np.zeros(self.nodes) if self.debris is None else -state[self.row(DEBRIS[0])]
+        found = np.zeros(self.nodes) if self.debris_here is None else -state[self.row(DEBRIS[0])]
         if self.memory is not None:
             found = found - self.memory.fills @ state[len(state) - len(self.memory.fills) :]
         return found + state[self.row(PLASTIC)] if self.hardness < np.inf else found
@@ -222,15 +242,21 @@ class Layers:
         found = worn
         if self.memory is not None:
             found = self.with_held(worn, self.memory.bounded(self.held(worn)))
+        if self.strip_carries:
+            return replace(found, carried=_settled(found.carried, 0, 1)) if len(worn.carried) else found
         if self.debris is None or not len(worn.between):
             return found
-        thickness, ejected = map(self.row, DEBRIS)
-        if found.between[thickness].min(initial=0.0) >= 0:
-            return found
-        state = found.between.copy()
-        state[ejected] += np.minimum(state[thickness], 0.0)
-        state[thickness] = np.maximum(state[thickness], 0.0)
-        return replace(found, between=state)
+        return replace(found, between=_settled(found.between, *map(self.row, DEBRIS)))
+
+
+def _settled(state: Array, thickness: int, ejected: int) -> Array:
+    """Return rows of a state without a thickness below zero: nothing of it was ejected."""
+    if state[thickness].min(initial=0.0) >= 0:
+        return state
+    found = state.copy()
+    found[ejected] += np.minimum(found[thickness], 0.0)
+    found[thickness] = np.maximum(found[thickness], 0.0)
+    return found
 
 
 def row_of_state(name: str) -> str:
@@ -244,6 +270,8 @@ def layers_of(
     modulus: float | None = None,
     wear: Sequence[WearLaw | None] = (None, None),
     temperature: float = 0.0,
+    *,
+    strip_carries: bool = False,
 ) -> Layers:
     """Return what the table of the contact puts between the surfaces of a pair, and what laws remember there.
 
@@ -253,6 +281,7 @@ def layers_of(
         modulus: E* of the materials at the contact, MPa; None where there is none for all of it.
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
+        strip_carries: Whether debris lies on the strip's material.
 
     Raises:
         CaseError: a value is not positive somewhere, or E* is missing.
@@ -279,7 +308,8 @@ def layers_of(
     hardness = np.inf if contact.hardness is None else contact.hardness
     memory = memory_of(contact.friction, wear, temperature)
     begun = None if memory is None else memory.beginning(pair)
-    return Layers(n, closure, winkler, debris, hardness, memory, begun)
+    on_strip = debris is not None and strip_carries
+    return Layers(n, closure, winkler, debris, hardness, memory, begun, on_strip)
 
 
 def memory_of(friction: object, wear: Sequence[WearLaw | None], temperature: float) -> Memory | None:

@@ -17,6 +17,9 @@ wears W at a constant rate, that is exactly
 and one phase after the other makes a cycle t -> E t + G, linear in t. At a constant G that is the solution after whole
 cycles n of dt/dn = X (G / (1 - E) - t), X = -ln E, so that jumps take this as its rate. What is ejected in a march is
 metered by its own integral: there worn = stored + ejected is a check.
+
+Debris that the strip carries lies on its material: a place of it loses and gets in a phase what is its share of the
+contact then, as of wear, and takes it along. There it is the same cycle, of the strip's nodes.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.case import Dependence
@@ -72,12 +76,19 @@ class Debris:
             found = found + np.exp(-conditions.edge / law.edge_length) / law.edge_life
         return found if found.shape == shape else np.broadcast_to(found, shape)
 
-    def over(self, slid: Array, conditions: Sequence[ContactConditions] | None = None) -> DebrisCycle:
+    def over(
+        self,
+        slid: Array,
+        conditions: Sequence[ContactConditions] | None = None,
+        onto: Sequence[csr_array] | None = None,
+    ) -> DebrisCycle:
         """Return what a cycle does whose phases, one after the other, slide by these distances (m, n), mm.
 
         Args:
             slid: The distances.
             conditions: Of the phases, for a loss that changes with them.
+            onto: What puts it on the material of the body that carries it in each phase, as wear is put there; None
+                where it lies at the contact's nodes.
         """
         if self.law is None:
             assert self.life is not None
@@ -86,6 +97,8 @@ class Debris:
             raise ValueError("expected the conditions of the phases where what is lost depends on them")
         else:
             x = slid * np.array([self.lost(one) for one in conditions])
+        if onto is not None:
+            x = np.array([place @ own for place, own in zip(onto, x, strict=True)])
         x = np.maximum(x, LEAST)  # where nothing slides all is kept
         kept = -np.expm1(-x) / x
         if len(x) == 1:

@@ -45,7 +45,9 @@ class LayerEvolution:
         conditions: Sequence[ContactConditions] | None = None,
     ) -> LayerEvolution:
         """Return what phases do that slide by these distances (m, n), mm, at conditions that debris may be lost by."""
-        return cls(layers, wear, None if layers.debris is None else layers.debris.over(slid, conditions), evolution)
+        onto = [pair.wear_projection for pair in wear.pairs] if layers.strip_carries else None
+        debris = None if layers.debris is None else layers.debris.over(slid, conditions, onto)
+        return cls(layers, wear, debris, evolution)
 
     def worn(
         self, pressure: Array, before: WornDepths, cycles: float | None = None, flowed: Array | None = None
@@ -61,13 +63,15 @@ class LayerEvolution:
         worn = self.wear.begun(before, cycles).worn(pressure)
         if not len(before.between) and not len(before.carried):
             return worn
-        changes = np.zeros_like(before.between)
-        if self.debris is not None:
+        changes, carried = np.zeros_like(before.between), np.zeros_like(before.carried)
+        if self.layers.strip_carries:
+            carried[: len(DEBRIS)] = self.debris_changes(pressure, before, cycles)
+        elif self.debris is not None:
             rows = [self.layers.row(name) for name in DEBRIS]
             changes[rows] = self.debris_changes(pressure, before, cycles)
         if flowed is not None:
             changes[self.layers.row(PLASTIC)] = flowed
-        found = WornDepths(worn.punch, worn.strip, changes)
+        found = WornDepths(worn.punch, worn.strip, changes, carried=carried)
         return (
             found if self.evolution is None else self.layers.with_held(found, self._evolved(pressure, before, cycles))
         )
@@ -91,10 +95,15 @@ class LayerEvolution:
         return memory.fills @ self._evolved(pressure, before, cycles).contact
 
     def debris_changes(self, pressure: Array, before: WornDepths, cycles: float | None) -> tuple[Array, Array]:
-        """Return what is added to the thickness of the debris, and what is ejected (n,) each, as `worn`."""
+        """Return what is added to the thickness of the debris, and what is ejected, as `worn`.
+
+        At the contact's nodes (n,) each, or at those of a strip that carries it (n_strip,).
+        """
         if self.debris is None:
             return np.zeros(pressure.shape[1]), np.zeros(pressure.shape[1])
-        taken, thickness = self.wear.begun(before, cycles).taken(pressure), before.between[self.layers.row(DEBRIS[0])]
+        taken = self._where_it_lies(self.wear.begun(before, cycles).taken(pressure))
+        lies = self.layers.on_strip(before)
+        thickness = before.between[self.layers.row(DEBRIS[0])] if lies is None else lies
         if cycles is None:
             return self.debris.change(thickness, taken)
         return self.debris.rate(thickness, taken, cycles)
@@ -103,7 +112,15 @@ class LayerEvolution:
         """Return the thickness of the debris that such cycles leave in the end (n,), mm; None without."""
         if self.debris is None:
             return None
-        return (self.debris.fed * self.wear.taken(pressure)).sum(axis=0) / self.debris.loss
+        fed = (self.debris.fed * self._where_it_lies(self.wear.taken(pressure))).sum(axis=0)
+        lies = fed / self.debris.loss
+        return self.wear.pairs[0].wear_interpolation @ lies if self.layers.strip_carries else lies
+
+    def _where_it_lies(self, depths: Array) -> Array:
+        """Return depths of the phases at the contact's nodes (m, n) where debris lies: there, or on the strip."""
+        if not self.layers.strip_carries:
+            return depths
+        return np.array([pair.wear_projection @ own for pair, own in zip(self.wear.pairs, depths, strict=True)])
 
     def step(
         self, before: WornDepths, cycles: float | None = None, *, implicit: bool = True, capped: bool = False
@@ -160,7 +177,10 @@ class LayerStep:
             return closed
         found = self._wear.opening(pressure)
         if passing.debris is not None:
-            found = found - self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
+            added = self._length * passing.debris_changes(pressure, self.before, self.cycles)[0]
+            if passing.layers.strip_carries:
+                added = np.array([pair.wear_interpolation @ added for pair in passing.wear.pairs])
+            found = found - added
         filled = passing.filled(pressure, self.before, self.cycles)
         found = found if filled is None else found - self._length * filled
         return found + closed
@@ -169,27 +189,60 @@ class LayerStep:
         """Return the gap that unit pressures open at their own nodes in all phases (m, n); None where others open."""
         if not self.implicit:
             return np.zeros_like(pressure)
+        if self.passing.layers.strip_carries:
+            return None
         found = self._wear.local(pressure)
         return None if found is None else found - self._covered(pressure)
 
     def border(self, pressure: Array) -> tuple[Array, Array]:
         """Return L (m, n, q) and R (m, q, n) of what pressures open in all phases, L_k R_j."""
         left, right = self._wear.border(pressure)
-        if self.passing.debris is None and not self._fills:
+        if self.passing.layers.strip_carries:
+            left, right = self._with_carried(left, right, pressure)
+        elif self.passing.debris is None and not self._fills:
+            return left, right
+        if self.passing.layers.strip_carries and not self._fills:
             return left, right
         unit = np.eye(pressure.shape[1])
         left = np.concatenate([left, np.broadcast_to(unit, (len(left), *unit.shape))], axis=2)
         return left, np.concatenate([right, -self._covered(pressure)[:, None, :] * unit], axis=1)
+
+    def _with_carried(self, left: Array, right: Array, pressure: Array) -> tuple[Array, Array]:
+        """Return both with what the strip carries between, as its wear."""
+        passing, pairs = self.passing, self.passing.wear.pairs
+        assert passing.debris is not None
+        slopes, taken = passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)
+        reads = np.array([pair.wear_interpolation.toarray() for pair in pairs])
+        puts = np.array(
+            [
+                -(pair.wear_projection.toarray() * slope[:, None] * own)
+                for pair, slope, own in zip(pairs, slopes, taken, strict=True)
+            ]
+        )
+        return np.concatenate([left, reads], axis=2), np.concatenate([right, puts], axis=1)
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return what unit pressures open at the punch's nodes in all phases, and wear off the strip (m, n), mm/MPa."""
         if not self.implicit:
             return None, None
         punch, strip = self._wear.by_body(pressure)
+        if self.passing.layers.strip_carries:
+            return punch, self._carried_below(pressure, strip)
         if self.passing.debris is None:
             return punch, strip
         covered = self._covered(pressure)
         return -covered if punch is None else punch - covered, strip
+
+    def _carried_below(self, pressure: Array, strip: Array | None) -> Array:
+        """Return what unit pressures wear off the strip less what they put on it (m, n), as at the places below them.
+
+        A step to the solution, on grids, whose residual has what is put on the strip as it is.
+        """
+        passing = self.passing
+        assert passing.debris is not None
+        pairs = zip(passing.wear.pairs, passing.debris.slope(self.cycles), strict=True)
+        put = np.array([pair.wear_interpolation @ slope for pair, slope in pairs]) * self._worn.taken_slope(pressure)
+        return -put if strip is None else strip - put
 
     @property
     def curved(self) -> bool:
@@ -204,7 +257,7 @@ class LayerStep:
     def _covered(self, pressure: Array) -> Array:
         """Return the thickness at the end by unit pressures (m, n), mm/MPa."""
         passing, found = self.passing, np.zeros_like(pressure)
-        if passing.debris is not None:
+        if passing.debris is not None and not passing.layers.strip_carries:
             found = passing.debris.slope(self.cycles) * self._worn.taken_slope(pressure)
         filled = passing.filled(pressure, self.before, self.cycles) if self._fills else None
         if filled is None:

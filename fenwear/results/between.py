@@ -24,6 +24,9 @@ OF_DEBRIS: dict[str, Variable] = {
     "ejected_volume": (("half_cycle",), "mm3", "volume of the debris ejected from the start"),
     "debris_balance_error": (("half_cycle",), "1", "worn volume that is neither stored nor ejected, over the worn one"),
 }
+ON_STRIP: dict[str, Variable] = {
+    "debris_thickness_strip": (("half_cycle", "x_strip"), "mm", "thickness of the debris on the strip at the end"),
+}
 OF_FLOW: dict[str, Variable] = {
     "plastic_depth": (("half_cycle", "x"), "mm", "depth that has flown beyond the hardness, apart from wear"),
     "plastic_volume": (("half_cycle",), "mm3", "volume that has flown beyond the hardness, apart from wear"),
@@ -33,8 +36,10 @@ STATE, STATES = "state_", "states"  # how variables of states begin; where summa
 
 def variables(placed: ContactSetup) -> dict[str, Variable]:
     """Return the variables of what lies between the surfaces."""
-    rows = placed.layers.rows
-    own = {**(OF_DEBRIS if DEBRIS[0] in rows else {}), **(OF_FLOW if PLASTIC in rows else {})}
+    layers = placed.layers
+    own = {**({} if layers.debris is None else OF_DEBRIS), **(OF_FLOW if PLASTIC in layers.rows else {})}
+    if layers.strip_carries:
+        own |= ON_STRIP
     return {**own, **_of_states(placed)}
 
 
@@ -56,9 +61,9 @@ def _states(block: Block) -> dict[str, Array]:
     layers = block.system.layers
     if layers.memory is None:
         return {}
-    first = len(layers.rows) - len(layers.memory.contact)
+    first, own = len(layers.rows) - len(layers.memory.contact), len(layers.carried_rows)
     found = {f"{STATE}{name}": block.between[:, first + k] for k, name in enumerate(layers.memory.contact)}
-    return found | {f"{STATE}{name}_strip": block.carried[:, k] for k, name in enumerate(layers.memory.strip)}
+    return found | {f"{STATE}{name}_strip": block.carried[:, own + k] for k, name in enumerate(layers.memory.strip)}
 
 
 def values(block: Block) -> dict[str, Array]:
@@ -72,12 +77,19 @@ def values(block: Block) -> dict[str, Array]:
     found |= _states(block)
     if system.layers.debris is None:
         return found
-    stored, ejected = (block.between[:, rows.index(name)] for name in DEBRIS)
+    if system.layers.strip_carries:
+        areas = system.bodies.punch.thickness * system.carried_areas
+        stored, ejected = block.carried[:, 0], block.carried[:, 1]
+        lies, on_strip = stored @ system.pair.wear_interpolation.T, {"debris_thickness_strip": stored}
+    else:
+        stored, ejected = (block.between[:, rows.index(name)] for name in DEBRIS)
+        lies, on_strip = stored, {}
     begun = float(areas.sum()) * system.layers.debris.initial
     fed = begun + sum(block.totals.of(f"volume_{body}") for body in ("punch", "strip"))
     return {
         **found,
-        "debris_thickness": stored,
+        **on_strip,
+        "debris_thickness": lies,
         "debris_volume": stored @ areas,
         "ejected_volume": ejected @ areas,
         "debris_balance_error": np.abs(fed - (stored + ejected) @ areas) / np.maximum(fed, 1e-300),

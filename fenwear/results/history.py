@@ -158,14 +158,14 @@ def _columns(system: Tribosystem) -> dict[str, Column]:
         "x": Column(("x",), pair.x, {"units": "mm", "long_name": text}),
         "height": Column(("x",), pair.punch.unworn[:, 1], {"units": "mm", "long_name": "height z of the unworn punch"}),
     }
-    if system.strip_wears:
+    if system.strip_changes:
         along = "position along the strip, on its material, as x in the middle position"
         columns["x_strip"] = Column(("x_strip",), pair.strip.abscissa, {"units": "mm", "long_name": along})
         unworn = {"units": "mm", "long_name": "height z of the unworn strip"}
         columns["height_strip"] = Column(("x_strip",), pair.strip.unworn[:, 1], unworn)
     if arc:
         columns |= _outline(pair.punch, "")
-    if system.strip_wears and pair.strip.arc is not None:
+    if system.strip_changes and pair.strip.arc is not None:
         columns |= _outline(pair.strip, "_strip")
     return {**columns, **part_columns(system, plane=True), **steps.columns(system)}
 

@@ -74,7 +74,7 @@ def surface_cells(surface: ContactSurface) -> NDArray[np.int64]:
 
 def surface_columns(placed: ContactSetup) -> dict[str, Column]:
     """Return coordinates and facets of the contact surfaces that a history has values on, by name."""
-    return columns_of_pair(placed.pair, placed.sliding.field, with_strip=placed.strip_wears)
+    return columns_of_pair(placed.pair, placed.sliding.field, with_strip=placed.strip_changes)
 
 
 def columns_of_pair(pair: ContactPair, field: SlidingField, *, with_strip: bool) -> dict[str, Column]:
@@ -86,7 +86,7 @@ def columns_of_pair(pair: ContactPair, field: SlidingField, *, with_strip: bool)
 
 def part_columns(placed: ContactSetup, plane: bool) -> dict[str, Column]:
     """Return the named contact that each node of the surfaces is of, and in the plane its part where there are more."""
-    ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.strip_wears else {})
+    ends = {"": placed.pair.punch} | ({"_strip": placed.pair.strip} if placed.strip_changes else {})
     found = {}
     for end, surface in ends.items():
         over = (f"{'x' if plane else 'node'}{end}",)

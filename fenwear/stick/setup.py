@@ -63,6 +63,11 @@ def unheated_problem(
     """Return the same without heat; collective. Arguments as of `partial_slip_problem`."""
     sliding, surface = make_sliding(case), bodies.punch.surface
     _check_passing(case, surface)
+    if case.debris_on_strip and _moves(case, surface):
+        message = (
+            "expected 'punch' where a strip passes under a contact that sticks: what it carries is followed in place"
+        )
+        raise CaseError(InputError("contact.third_body.carried_by", message))
     interface = StickInterface(
         bodies,
         sliding,

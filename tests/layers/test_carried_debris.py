@@ -1,0 +1,110 @@
+"""Debris that the strip carries: through the contact and back, along a closed track, and never lost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from combinations import SMALL, STICK
+
+from fenwear import Tribosystem, assemble, load_case, steady
+from fenwear.cycle import Block, evolve
+from fenwear.errors import CaseError, ConvergenceError
+from fenwear.results.between import values
+
+MOVES = (
+    "contact.law='gross-sliding'",
+    "stick={}",
+    "geometry.follow_wear='never'",
+    "geometry.parameters.overlap='0.1 mm'",
+    "motion.positions=4",
+    "motion.amplitude='20 um'",
+)
+BOTH = "wear={punch={coefficient='1e-6 1/MPa'}, strip={coefficient='1e-6 1/MPa'}}"
+ROUND, TRACK = 0.7, 400.0  # mm slid in a half-cycle, and round the track
+ONE_WAY = f"motion={{kind='one-way', direction='rightward', speed='7 mm/s', duration='0.1 s', track='{TRACK} mm'}}"
+
+
+def system_of(*more: str) -> Tribosystem:
+    return assemble(load_case("fretting-partial-slip", [*SMALL, *MOVES, *more]))
+
+
+def carried(share: float, life: str) -> str:
+    return f"contact.third_body={{share={share}, life='{life}', carried_by='strip'}}"
+
+
+def end(system: Tribosystem, how: str, tolerance: float = 1e-3) -> Block:
+    return list(evolve(system, integration=how, tolerance=tolerance))[-1]
+
+
+@pytest.mark.parametrize("how", ["explicit", "implicit", "jump"])
+def test_what_is_never_lost_is_as_if_less_were_worn(how: str) -> None:
+    """A strip of which 60 % of the worn stays on it for ever opens the gap as one that wears at 40 %, at any place."""
+    runs = [
+        end(system_of("run.half_cycles=40", f"wear={{strip={{coefficient='{k} 1/MPa'}}}}", *lies), how)
+        for k, lies in ((1e-6, [carried(0.6, "1e30 mm")]), (0.4e-6, []))
+    ]
+    stays, less = (run.end.worn.strip for run in runs)
+    assert 0.4 * stays == pytest.approx(less, rel=1e-10, abs=1e-10 * less.max())
+    assert runs[0].pressure[-1] == pytest.approx(runs[1].pressure[-1], abs=1e-8 * runs[1].pressure.max())
+
+
+def test_jumps_go_with_the_march() -> None:
+    """Within 2 % everywhere, as its explicit and implicit steps are from each other; worn = stored + ejected."""
+    system = system_of("run.half_cycles=100", BOTH, carried(0.6, "3 mm"))
+    explicit, jumps = (end(system, how, 3e-3) for how in ("explicit", "jump"))
+    for run in (explicit, jumps):
+        found = values(run)
+        assert found["debris_balance_error"][-1] < 1e-12
+        assert found["debris_thickness_strip"][-1].max() > 0.1 * run.end.worn.strip.max()
+    for of in (lambda run: run.end.worn.punch, lambda run: run.end.worn.strip, lambda run: run.end.worn.carried[0]):
+        apart = np.abs(of(jumps) - of(explicit)).max()
+        assert apart < 0.02 * of(explicit).max()
+    with pytest.raises(ConvergenceError, match="debris goes to and fro with the strip"):
+        steady(system_of("wear={punch={coefficient='1e-6 1/MPa'}}", carried(0.6, "3 mm")))
+
+
+def test_along_a_closed_track_against_the_closed_form() -> None:
+    """t = share V / (L x) (1 - e^-Nx): V worn in a half-cycle, of whose way a place is x lives long under the punch."""
+    share, life, count = 0.6, 50.0, 100
+    lies = f"contact.third_body={{share={share}, life='{life} mm', carried_by='strip'}}"
+    few = ("geometry.degree=1", f"run.half_cycles={count}", ONE_WAY, lies)
+    system = assemble(load_case("example2", few))
+    width, thickness = float(system.pair.weights.sum()), system.bodies.punch.thickness
+    for how, tolerance, error in (("explicit", 1.0, 1e-10), ("jump", 0.03, 3e-3), ("jump", 3e-4, 1e-4)):
+        block = end(system, how, tolerance)
+        x, worn = width * ROUND / TRACK / life, float(block.totals.of("volume_punch")[-1]) / thickness / count
+        wanted = share * worn / (TRACK * x) * -np.expm1(-count * x)
+        assert block.end.worn.carried[0] == pytest.approx(wanted, rel=error)
+        assert values(block)["debris_balance_error"][-1] < 1e-12
+        assert values(block)["debris_volume"][-1] == pytest.approx(thickness * TRACK * wanted, rel=error)
+    assert steady(system).debris == pytest.approx(share * worn / (TRACK * x), rel=1e-8)
+
+
+def test_what_sticks_stays_where_it_is_on_either_body() -> None:
+    found = []
+    for body in ("punch", "strip"):
+        lies = f"contact.third_body={{share=0.6, life='3 mm', carried_by='{body}'}}"
+        settings = [*SMALL, "contact.law='coulomb'", *STICK, "run.half_cycles=4", lies]
+        found.append(end(assemble(load_case("fretting-partial-slip", settings)), "explicit"))
+    punch, strip = (run.end.worn.between for run in found)
+    assert strip == pytest.approx(punch, rel=1e-9, abs=1e-9 * punch.max())
+
+
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (
+            ["contact.third_body={share=0.5, life='1 mm', carried_by='disc'}"],
+            "carried_by: expected 'punch' or 'strip', got",
+        ),
+        (
+            [carried(0.5, "1 mm"), "wear.punch.coefficient={expression='1e-8*exp(-debris)', unit='1/MPa'}"],
+            "carried_by: exp",
+        ),
+        ([carried(0.5, "1 mm"), "motion.positions=1"], "motion.positions: expected 2 or more"),
+        ([carried(0.5, "1 mm"), ONE_WAY.replace(f", track='{TRACK} mm'", "")], "motion.track: missing"),
+    ],
+)
+def test_what_makes_no_sense_is_told_by_its_key(settings: list[str], told: str) -> None:
+    with pytest.raises(CaseError, match=told):
+        load_case("example2", settings)

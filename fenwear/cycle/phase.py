@@ -154,7 +154,7 @@ class PhaseStep:
         kept = (before.pressure > 0) & (further > 0)
         if hardness < np.inf:
             kept &= (before.pressure < hardness) & (further < hardness)
-        rigid = np.tensordot(shares, [one.rigid for one in known], 1)
+        rigid = np.asarray(np.tensordot(shares, [one.rigid for one in known], 1), dtype=np.float64)
         return ContactState(np.where(kept, further, before.pressure), before.gap, rigid, before.iterations)
 
     def _update(

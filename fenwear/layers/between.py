@@ -126,10 +126,11 @@ class Layers:
 
     def thickness(self, worn: WornDepths | None) -> Array | None:
         """Return the thickness of the debris (n,), mm, by default that at the start; None without at the nodes."""
-        if self.debris_here is None:
+        here = self.debris_here
+        if here is None:
             return None
         if worn is None or not len(worn.between):
-            return np.full(self.nodes, self.debris.initial)
+            return np.full(self.nodes, here.initial)
         return np.asarray(worn.between[self.row(DEBRIS[0])])
 
     def on_strip(self, worn: WornDepths) -> Array | None:

@@ -213,13 +213,8 @@ class LayerStep:
         assert passing.debris is not None
         slopes, taken = passing.debris.slope(self.cycles), self._worn.taken_slope(pressure)
         reads = np.array([pair.wear_interpolation.toarray() for pair in pairs])
-        puts = np.array(
-            [
-                -(pair.wear_projection.toarray() * slope[:, None] * own)
-                for pair, slope, own in zip(pairs, slopes, taken, strict=True)
-            ]
-        )
-        return np.concatenate([left, reads], axis=2), np.concatenate([right, puts], axis=1)
+        puts = np.array([pair.wear_projection.toarray() for pair in pairs]) * slopes[:, :, None] * taken[:, None, :]
+        return np.concatenate([left, reads], axis=2), np.concatenate([right, -puts], axis=1)
 
     def by_body(self, pressure: Array) -> tuple[Array | None, Array | None]:
         """Return what unit pressures open at the punch's nodes in all phases, and wear off the strip (m, n), mm/MPa."""
@@ -241,7 +236,8 @@ class LayerStep:
         passing = self.passing
         assert passing.debris is not None
         pairs = zip(passing.wear.pairs, passing.debris.slope(self.cycles), strict=True)
-        put = np.array([pair.wear_interpolation @ slope for pair, slope in pairs]) * self._worn.taken_slope(pressure)
+        below = np.array([pair.wear_interpolation @ slope for pair, slope in pairs])
+        put = below * self._worn.taken_slope(pressure)
         return -put if strip is None else strip - put
 
     @property
@@ -267,7 +263,7 @@ class LayerStep:
             more = pressure.copy()
             more[k] += size
             other = passing.filled(more, self.before, self.cycles)
-            found[k] += 0.0 if other is None else self._length * (other - filled) / size
+            found[k, :] += 0.0 if other is None else self._length * (other - filled) / size
         return found
 
     @property

@@ -25,7 +25,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray
 
-from fenwear import load_case
+from fenwear import assemble, load_case, march
 from fenwear.run import run_case
 
 COARSE = os.environ.get("FENWEAR_DEMO_COARSE") == "1"  # set by the docs build: fewer elements
@@ -138,6 +138,37 @@ right.plot(1e3 * history.x, 1e3 * history.debris_thickness[-1], label="debris")
 right.plot(1e3 * history.x, 1e3 * history.wear[-1], label="worn")
 right.set(ylabel="third body (µm)", xlabel="x (µm)")
 right.legend(frameon=False)
+plt.show()
+
+# %% [markdown]
+# ## A Stribeck curve
+#
+# Mixed lubrication with a film that grows with the speed: at each speed a half-cycle of the same contact one way. With the share of
+# the load that asperities carry both friction and wear fall, from those of the dry contact to those of the fluid.
+
+# %%
+ROUGHNESS = 0.4  # µm
+FILM = (
+    f"contact.lubrication={{film={{expression='0.02 * v ** 0.6', unit='um'}}, roughness='{ROUGHNESS} um', "
+    "share_over_lambda=[[0, 1], [0.5, 0.6], [1, 0.3], [2, 0.1], [3, 0]], fluid_friction=0.01}"
+)
+curve = []
+for speed in np.geomspace(1, 2000, 6 if COARSE else 12):
+    one_way = f"motion={{kind='one-way', direction='rightward', speed='{speed} mm/s', duration='{1 / speed} s'}}"
+    case = load_case("fretting-partial-slip", [*CONTACT, one_way, FILM, "run.integration='explicit'"])
+    *_, last = march(assemble(case), 1)
+    totals = last.totals
+    friction = totals.of("work")[-1] / totals.of("load_path")[-1]
+    curve.append((0.02 * speed**0.6 / ROUGHNESS, friction, totals.of("volume_punch")[-1] / totals.of("distance")[-1]))
+ratio, friction, worn = np.array(curve).T
+
+fig, left = plt.subplots(figsize=(5.5, 3), layout="constrained")
+left.semilogx(ratio, friction, "o-", ms=4, color="black", label="friction")
+left.set(xlabel="lambda, film over roughness", ylabel="coefficient of friction", ylim=(0, None))
+right = left.twinx()
+right.semilogx(ratio, 1e9 * worn, "s--", ms=4, color="C3", label="wear")
+right.set(ylabel="worn over 1 m (µm² over 1 mm)", ylim=(0, None))
+fig.legend(loc="outside upper center", ncols=2, frameon=False)
 plt.show()
 
 # %%

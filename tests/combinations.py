@@ -98,7 +98,8 @@ FEATURES: dict[str, tuple[str, tuple[str, ...]]] = {
         "fretting-partial-slip",
         (
             *SMALL,
-            "contact.third_body={share=0.6, life='0.3 mm'}",
+            "contact.third_body={share=0.6, life='0.3 mm', edge_life='0.3 mm', edge_length='0.02 mm'}",
+            "contact.lubrication={asperity_share={expression='0.9 + 0.1 * exp(-p / 500)'}, fluid_friction=0.6}",
             "contact.layer={kind='exponential', length='1 um', pressure='10 MPa'}",
             "contact.hardness='550 MPa'",
             "punch.creep={terms=[{compliance=0.2, time='2e-3 s'}]}",

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from combinations import SMALL as SMALLEST
+from combinations import STICK
 
 from fenwear import CaseError, Tribosystem, assemble, jump, load_case, march, steady
 
@@ -30,6 +32,21 @@ def test_a_curve_of_stribeck_in_the_rigid_limit(speed: float, share: float, asse
         assert depth == pytest.approx(1e-7 * share * MEAN * speed * steps, rel=1e-9, abs=1e-15)
         mu = last.totals.of("work")[-1] / last.totals.of("load_path")[-1]
         assert mu == pytest.approx(share * 0.2 + (1 - share) * 0.01, rel=1e-9)
+
+
+def test_with_stick_jumps_fall_to_the_march() -> None:
+    """A share by the pressure, in partial slip, at every place."""
+    film = "contact.lubrication={asperity_share={expression='min(1, 0.3 + p / 2000)'}, fluid_friction=0.6}"
+    cycles, worn = 40, "wear={punch={coefficient='8e-6 1/MPa'}}"
+    settings = [*SMALLEST, "contact.law='coulomb'", *STICK, worn, film]
+    system = assemble(load_case("fretting-partial-slip", settings))
+    *_, marched = march(system, 2 * cycles)
+    errors = []
+    for tolerance in (0.3, 3e-3):
+        *_, last = jump(system, 2 * cycles, tolerance=tolerance)
+        errors.append(float(np.abs(last.wear[-1] - marched.wear[-1]).max() / marched.wear[-1].max()))
+    assert errors[0] < 0.1
+    assert errors[1] < 5e-3
 
 
 def test_wear_by_powers_of_the_pressure_and_by_energy(assembled: Assemble) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import faulthandler
 import gc
+import itertools
 import os
 import subprocess
 import sys
@@ -195,7 +196,12 @@ def fenwear(run_python: Callable[..., Any], forks: str) -> Callable[..., Any]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what starts a process with the fixtures above, whose imports take seconds, and what long.txt names."""
+    """Mark what starts a process with the fixtures above, whose imports take seconds, and what long.txt names.
+
+    On several ranks, those marked mpi("a", "b") run with the parameters of these ids alone.
+    """
+    if MPI.COMM_WORLD.size > 1:
+        items[:] = _on_ranks(items)
     long = set((TESTS / "long.txt").read_text("utf-8").split())
     for item in items:
         if "run_python" in getattr(item, "fixturenames", ()):
@@ -204,6 +210,19 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if long & {path, f"{path}::{name}"}:
             item.add_marker("long")
     items[:] = _long_first(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+
+
+def _on_ranks(items: list[pytest.Item]) -> list[pytest.Item]:
+    """Return the tests that several ranks run, each with the parameters that its mark names."""
+    chosen: list[pytest.Item] = []
+    for name, found in itertools.groupby(items, lambda item: item.nodeid.partition("[")[0]):
+        alike = {item.name.partition("[")[2][:-1]: item for item in found}
+        for own, item in alike.items():
+            mark = item.get_closest_marker("mpi")
+            asked = mark.args if mark else ()
+            assert len(alike) == 1 or alike.keys() >= set(asked), (name, asked)
+            chosen += [item] if not asked or own in asked else []
+    return chosen
 
 
 def _long_first(items: list[pytest.Item], workers: int) -> list[pytest.Item]:

@@ -228,6 +228,7 @@ def test_what_goes_with_what(feature: str, law: str, way: str, tmp_path: Path) -
     WALKED[way](feature, law, tmp_path)
 
 
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="compares several ranks with one")
 @pytest.mark.mpi
 @pytest.mark.parametrize(("feature", "law"), [cell[:2] for cell in OPEN if cell[2] == "ranks"])
 def test_on_ranks(feature: str, law: str) -> None:

@@ -6,6 +6,7 @@ import dataclasses
 import json
 import re
 import shlex
+from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -13,6 +14,8 @@ import pytest
 from markupsafe import escape
 
 from fenwear import assemble, load_case, march, steady, vary
+from fenwear_verify import registered
+from fenwear_verify.command import verify
 from fenwear_verify.paper import (
     READINGS,
     Reading,
@@ -270,6 +273,22 @@ def test_page() -> None:
     lines = markdown([hostile]).splitlines()
     assert lines[0].count("|") == lines[1].count("|") == len(COLUMNS) + 1
     assert lines[2].endswith("| p\\|q |")
+
+
+def test_it_stands_on_the_page_of_the_verification(tmp_path: Path) -> None:
+    """And in its numbers; rows that are not reproduced are no disagreement."""
+    said: list[str] = []
+    found, directory = verify(registered(["time-steps"]), SCOPE, tmp_path / "v", said.append)
+    assert found["agree"]
+    assert found["paper"]["seconds"] > 0
+    assert {row["verdict"] for row in found["paper"]["rows"]} >= {"reproduced", "not reproduced"}
+    text = "\n".join(said)
+    assert all(f"{row['quantity']}: {row['verdict']}\n" in text for row in found["paper"]["rows"])
+    assert json.loads((directory / "verification.json").read_text()) == found
+    content = (directory / "verification.html").read_text("utf-8")
+    assert re.findall(r"<(?:img|script|iframe|link)\b[^>]*?(?:src|href)=\"(data|)", content) == ["data"] * (1 + 7)
+    assert '<section id="paper">' in content
+    assert '<section id="time-steps">' in content
 
 
 def test_what_programs_get() -> None:

@@ -16,7 +16,7 @@ from fenwear.errors import CaseError, InputError
 from fenwear.report.compare_figure import has_stick, runs_figure
 from fenwear.report.figures import of_half_cycles
 from fenwear.report.key_numbers import flat, label_of, number_text, read_case, read_summary, unit_of
-from fenwear.report.style import name_bodies
+from fenwear.report.style import name_bodies, save
 from fenwear.report.surface import model_of
 from fenwear.results.cycles import by_cycles, resolves
 from fenwear.results.degrees import in_kelvin
@@ -189,7 +189,7 @@ def draw_comparison(comparison: Comparison, path: Path) -> Path:
     with writing(path):
         figure = comparison_figure(comparison)
         name_bodies([figure], comparison.bodies)
-        figure.savefig(path, dpi=150)
+        save(figure, path, dpi=150)
     return path
 
 

@@ -15,7 +15,7 @@ from fenwear.report.figures import FOLDER, all_figures, read_history
 from fenwear.report.gaps import gaps_of, part_lines
 from fenwear.report.key_numbers import names_in, read_case
 from fenwear.report.sections import geometry_figure, stress_figure
-from fenwear.report.style import STANDARD, Style, name_bodies, wrapped
+from fenwear.report.style import STANDARD, Style, name_bodies, save, wrapped
 from fenwear.report.surface import model_of
 from fenwear.results.disk import write_text
 
@@ -57,7 +57,7 @@ def draw_figures(
     for name, figure in drawn.items():
         for ending in dict.fromkeys(("png", *formats)):  # the report shows the PNG
             paths.append(folder / f"{name}.{ending}")
-            figure.savefig(paths[-1], dpi=DPI)
+            save(figure, paths[-1], DPI)
     captions = folder / CAPTIONS
     write_text(captions, names.told("".join(f"{name}: {caption(name, history, look)}\n\n" for name in drawn)))
     return [*paths, captions]

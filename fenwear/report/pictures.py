@@ -23,7 +23,7 @@ from fenwear.report.course import shown_unit
 from fenwear.report.key_numbers import names_in
 from fenwear.report.magnification import magnification
 from fenwear.report.solid_pictures import draw_solids
-from fenwear.report.style import direction_words, further, name_bodies, save_gif, strip_moves
+from fenwear.report.style import direction_words, further, name_bodies, save, save_gif, strip_moves
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -122,7 +122,7 @@ def draw_here(directory: Path, formats: Sequence[str] = ()) -> list[Path]:
             figure = bodies_figure(data, field, view, bodies_image(data, field, view))
             png = paths[-1]
             name_bodies([figure], names)
-            figure.savefig(png, dpi=150)
+            save(figure, png, dpi=150)
             paths += further(figure, png, formats)
             with Image.open(png) as picture:
                 small = picture.convert("RGB").resize((picture.width * 2 // 3, picture.height * 2 // 3))

@@ -21,7 +21,7 @@ from fenwear.arrays import Array, Mask
 from fenwear.case.names import BY_ROLE, Names
 from fenwear.report.course import shown_unit
 from fenwear.report.magnification import magnification
-from fenwear.report.style import GREY, further, name_bodies
+from fenwear.report.style import GREY, further, name_bodies, save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,7 +102,7 @@ def draw_solids(
             png = folder / f"{name}_{field}_{int(data.attrs['half_cycle']):06d}.png"
             figure = solid_figure(data, field, view, shown[field])
             name_bodies([figure], names)
-            figure.savefig(png, dpi=150)
+            save(figure, png, dpi=150)
             paths += [png, *further(figure, png, formats)]
     return paths
 

@@ -263,11 +263,22 @@ def name_bodies(figures: Iterable[Figure], names: Names) -> None:
             text.set_text(names.told(text.get_text()))
 
 
+def save(figure: Figure, path: Path, dpi: int) -> None:
+    """Write a figure; a PNG is laid out and drawn once, where `savefig` does both twice."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    if path.suffix == ".png":
+        figure.set_dpi(dpi)
+        FigureCanvasAgg(figure).print_png(path)
+    else:
+        figure.savefig(path, dpi=dpi)
+
+
 def further(figure: Figure, png: Path, formats: Sequence[str]) -> list[Path]:
     """Write a figure beside its PNG in further formats; return the files."""
     found = [png.with_suffix(f".{ending}") for ending in dict.fromkeys(formats) if ending != "png"]
     for path in found:
-        figure.savefig(path, dpi=300)
+        save(figure, path, dpi=300)
     return found
 
 

@@ -31,7 +31,7 @@ def strip_fields(friction: float, transverse: float, axis: str, degree: int) -> 
     return strip, strip.out_of_plane.function_space.tabulate_dof_coordinates()[:, 1]
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi("x-0.6-2")
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize(("axis", "traction"), [("x", 0.3 * 2), ("y", -0.2 * 2)])
 def test_uniform_shear(axis: str, traction: float, degree: int) -> None:

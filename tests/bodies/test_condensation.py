@@ -48,7 +48,7 @@ def condensed(body: ElasticBody) -> CondensedBody:
 
 
 @pytest.mark.parametrize("name", ["punch", "strip"])
-@pytest.mark.mpi
+@pytest.mark.mpi("punch")
 def test_compliance_is_symmetric_and_positive(assembled: Callable[..., Tribosystem], name: str) -> None:
     """Maxwell and Betti, and the work of any pressure is positive."""
     body = getattr(assembled("example1", *SMALL).bodies, name)
@@ -60,7 +60,7 @@ def test_compliance_is_symmetric_and_positive(assembled: Callable[..., Tribosyst
 @pytest.mark.parametrize("every_axis", [False, True])
 @pytest.mark.parametrize("kind", ["normal", "tangential"])
 @pytest.mark.parametrize("name", ["punch", "strip"])
-@pytest.mark.mpi
+@pytest.mark.mpi("punch-normal-True", "strip-tangential-False")
 def test_compliance_equals_a_direct_solve(
     assembled: Callable[..., Tribosystem], name: str, kind: str, every_axis: bool
 ) -> None:
@@ -103,7 +103,7 @@ def test_operator(assembled: Callable[..., Tribosystem], every_axis: bool) -> No
 
 
 @pytest.mark.parametrize("degree", range(1, 9))
-@pytest.mark.mpi
+@pytest.mark.mpi("1", "3")
 def test_weights_integrate_polynomials(assembled: Callable[..., Tribosystem], degree: int) -> None:
     """Gauss-Lobatto with degree + 1 nodes: exact up to degree 2 k - 1, positive; the interval is [-30, 30]."""
     nodes = assembled("example1", *SMALL, f"geometry.degree={degree}").bodies.punch.surface

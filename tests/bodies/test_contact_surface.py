@@ -27,7 +27,7 @@ def elastic(parameters: dict[str, float], degree: int, file: str = "solid_blocks
 
 
 @pytest.mark.parametrize(("tetrahedra", "degree"), [*((0, k) for k in (1, 2, 3, 4)), *((1, k) for k in (1, 2, 3))])
-@pytest.mark.mpi
+@pytest.mark.mpi("0-2", "1-3")
 def test_flat_surface(tetrahedra: int, degree: int) -> None:
     """Positive weights that add up to the area, unit normals out of the body, nodes in the element's order."""
     surface = elastic({"width": 1.5, "across_x": 3, "punch_tetrahedra": tetrahedra}, degree).surface

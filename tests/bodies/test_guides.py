@@ -43,7 +43,7 @@ def pressed(system: Tribosystem) -> tuple[Array, float]:
     return pressure, float((x[:, 1] * force[:, 0] - x[:, 0] * force[:, 1]).sum())
 
 
-@pytest.mark.mpi
+@pytest.mark.mpi("2.0")
 @pytest.mark.parametrize("wall", [2.0, 4.0])
 def test_a_couple_dents_nothing(wall: float) -> None:
     """As if the housing took the friction's moment evenly: then the guide has nothing to hold."""

@@ -85,7 +85,7 @@ def test_only_what_a_change_leaves_is_taken(
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed", "emptied", "another"])
-@pytest.mark.mpi
+@pytest.mark.mpi("changed")
 def test_a_broken_file_is_computed_again(setup: Setup, damage: str) -> None:
     """On every rank, though one of them alone finds it broken."""
     first, _ = setup()
@@ -147,7 +147,7 @@ def test_a_limit_that_is_no_number_is_named(setup: Setup, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("change", ["", "heat.convection=90", "heat.steps=6", "motion.amplitude=20"])
-@pytest.mark.mpi
+@pytest.mark.mpi("heat.steps=6")
 def test_reduced_heat_is_kept_too(setup: Setup, monkeypatch: pytest.MonkeyPatch, change: str) -> None:
     """With the same bits, and reduced again by --fresh or where conduction or motion is another."""
     made: list[object] = []

@@ -126,7 +126,7 @@ def integral(body: BodyMesh, region: str | None = None, curve: str | None = None
 
 
 @pytest.mark.parametrize("degree", [1, 3, 8])
-@pytest.mark.mpi
+@pytest.mark.mpi("3")
 def test_facing_nodes_coincide(degree: int) -> None:
     """The two contact surfaces have the same nodes, to the last digits, whatever the partition."""
     system = assemble(

@@ -54,7 +54,14 @@ def by_columns() -> Callable[[str], list[CondensedBody]]:
 
 @pytest.mark.parametrize("way", ["substructures", "surface", "spread"])
 @pytest.mark.parametrize("name", ["example1", "example1-heat", "ball-on-flat", "ring-on-ring"])
-@pytest.mark.mpi
+@pytest.mark.mpi(
+    "example1-heat-substructures",
+    "example1-heat-surface",
+    "example1-heat-spread",
+    "ball-on-flat-substructures",
+    "ball-on-flat-surface",
+    "ball-on-flat-spread",
+)
 def test_all_ways_give_the_same(
     by_columns: Callable[[str], list[CondensedBody]], name: str, way: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -123,7 +130,7 @@ def test_one_factor_for_the_loads_of_all_phases(way: str, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("name", ["example1", "ball-on-flat", "ring-on-ring"])
-@pytest.mark.mpi
+@pytest.mark.mpi("ball-on-flat")
 def test_substructures_solve_for_any_forces(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Inside, on the boundaries between ranks and on supports: K times the solution is the forces again."""
     system, _ = condensed(name, "substructures", monkeypatch)

@@ -29,7 +29,7 @@ def one_way(direction: str, distance: float) -> str:
 
 @pytest.mark.parametrize("settings", [(), OPENING])
 @pytest.mark.parametrize("implicit", [False, True])
-@pytest.mark.mpi
+@pytest.mark.mpi("False-settings0", "True-settings1")
 def test_equilibrium_in_every_half_cycle(
     assembled: Callable[..., Tribosystem], settings: tuple[str, ...], implicit: bool
 ) -> None:

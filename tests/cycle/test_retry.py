@@ -58,7 +58,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Callable[[Tribosystem], list[int
         ("example1-heat", (*COARSE, "heat.partition=0.2", "heat.operator=full")),
     ],
 )
-@pytest.mark.mpi
+@pytest.mark.mpi("example1-settings1-True", "example1-heat-settings3-False")
 def test_half_cycles_in_parts(
     assembled: Assemble,
     failing: Callable[[Tribosystem], list[int]],

@@ -17,7 +17,7 @@ COEFFICIENT = 1.25e-8 * np.pi
 
 @pytest.mark.parametrize("plane", ["stress", "strain"])
 @pytest.mark.parametrize("name", ["example1", "example1-lz40", "example2"])
-@pytest.mark.mpi
+@pytest.mark.mpi("example1-stress", "example1-lz40-strain")
 def test_sum_of_the_two_pressures_is_uniform(assembled: Callable[..., Tribosystem], name: str, plane: str) -> None:
     """Verification 11 and the paper: p+ + p- = 2 p_m; where one vanishes the other is 33.33 MPa."""
     system = assembled(name, f"model.plane='{plane}'")
@@ -117,10 +117,13 @@ def test_friction_can_tip_the_punch_out_of_any_steady_state(
 
 
 @pytest.mark.slow
-def test_forty_thousand_marched_half_cycles_end_there(assembled: Callable[..., Tribosystem]) -> None:
-    """Verification 11: marched and directly solved pressures within 0.1 MPa."""
-    system = assembled("example1", "geometry.degree=2")
-    *_, last = march(system, 40_000)
+def test_marched_half_cycles_end_there(assembled: Callable[..., Tribosystem]) -> None:
+    """Verification 11: marched and directly solved pressures within 0.1 MPa.
+
+    What wears four times as fast is there after a quarter of the 40,000 half-cycles of Example 1.
+    """
+    system = assembled("example1", "geometry.degree=2", f"wear.punch.coefficient={4 * COEFFICIENT!r}")
+    *_, last = march(system, 10_000)
     order = [1, 0] if last.direction[-1] == 1 else [0, 1]
     np.testing.assert_allclose(last.pressure[-2:][order], steady(system).pressure, rtol=0, atol=0.1)
 
@@ -142,7 +145,7 @@ ONE_WAY = [(f"monotonic-lz{h}", b, d) for h in (20, 40) for b in (0.5, 1.0, 2.0)
 
 
 @pytest.mark.parametrize(("name", "b", "direction"), ONE_WAY)
-@pytest.mark.mpi
+@pytest.mark.mpi("monotonic-lz20-0.5-leftward", "monotonic-lz40-2.0-rightward")
 def test_one_way_is_the_optimum(assembled: Callable[..., Tribosystem], name: str, b: float, direction: str) -> None:
     """The steady state of one-way sliding is the optimum, with its wear velocity (duration 0.1 s)."""
     system = assembled(name, f"motion.direction='{direction}'", f"wear.punch.pressure_exponent={b}",

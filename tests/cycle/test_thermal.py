@@ -225,7 +225,7 @@ def from_steady(system: Tribosystem, bulge: float = 0.0) -> tuple[RunState, Any]
 
 @pytest.mark.parametrize("partition", [0.1, 0.5])
 @pytest.mark.parametrize("settings", [(), ("heat.ambient=35", "heat.conductance=perfect")])
-@pytest.mark.mpi
+@pytest.mark.mpi("settings1-0.5")
 def test_a_cycle_reproduces_the_steady_state(assembled: Assemble, partition: float, settings: tuple[str, ...]) -> None:
     """Stable or not, the steady state is a fixed point of the march where the wear of a half-cycle is negligible."""
     quiet = ("wear.punch.coefficient=1e-11", f"heat.partition={partition}")

@@ -69,9 +69,9 @@ def end_of_wave_step(
     [
         (0.0, math.inf),
         (3.0, math.inf),
-        pytest.param(-150.0, math.inf, marks=pytest.mark.mpi),
+        pytest.param(-150.0, math.inf, marks=pytest.mark.mpi("-150.0-inf-2")),
         (0.0, 0.1),
-        pytest.param(150.0, 0.02, marks=pytest.mark.mpi),
+        pytest.param(150.0, 0.02, marks=pytest.mark.mpi("150.0-0.02-3")),
     ],
 )
 def test_order_in_space(rectangle: Make, conducting: Make, degree: int, velocity: float, duration: float) -> None:

@@ -37,7 +37,7 @@ def last(blocks: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("every", ["explicit", "implicit", "jump"])
-@pytest.mark.mpi
+@pytest.mark.mpi("jump")
 def test_volume_is_k_f_s(assembled: Assemble, every: str) -> None:
     """Each number of the sheet of Example 1 by hand, to rounding, of marches and of jumps."""
     system = assembled("example1", *SMALL, f"wear.punch.coefficient={K}", "materials.composite.density='846 kg/m^3'")

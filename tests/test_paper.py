@@ -286,7 +286,8 @@ def test_it_stands_on_the_page_of_the_verification(tmp_path: Path) -> None:
     assert all(f"{row['quantity']}: {row['verdict']}\n" in text for row in found["paper"]["rows"])
     assert json.loads((directory / "verification.json").read_text()) == found
     content = (directory / "verification.html").read_text("utf-8")
-    assert re.findall(r"<(?:img|script|iframe|link)\b[^>]*?(?:src|href)=\"(data|)", content) == ["data"] * (1 + 7)
+    assert content.count("<img ") == 1 + 7
+    assert set(re.findall(r"<(?:img|script|iframe|link)\b[^>]*?(?:src|href)=\"(data|)", content)) == {"data"}
     assert '<section id="paper">' in content
     assert '<section id="time-steps">' in content
 

@@ -269,7 +269,8 @@ def save(figure: Figure, path: Path, dpi: int) -> None:
 
     if path.suffix == ".png":
         figure.set_dpi(dpi)
-        FigureCanvasAgg(figure).print_png(path)
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.print_png(path)
     else:
         figure.savefig(path, dpi=dpi)
 

@@ -270,7 +270,7 @@ class ContactSetup:
                 hardness does not carry the load.
         """
         case = self.made_from
-        modulus = None if case is None else common_modulus(case, *self.bodies.regions)
+        modulus = None if case is None else common_modulus(case, self.bodies.regions, self.pair)
         initial, mean = 0.0 if self.heat is None else self.heat.initial, self.rigid.mean_pressure
         contact = self.friction.contact
         carries = self.strip_carries and not self.sticks  # what sticks hardly moves: it lies where it is on either body
@@ -282,7 +282,7 @@ class ContactSetup:
 
     def layer_conductance(self) -> Callable[[Array], Array] | None:
         """Return h_c by the pressures (n,), where what lies between gives it; see `fenwear.layers.conductance`."""
-        return conductance_of(self.layers, self.made_from, self.bodies.regions)
+        return conductance_of(self.layers, self.made_from, self.bodies.regions, self.pair)
 
     def passing(
         self,

@@ -21,7 +21,7 @@ from typing import TypeVar
 import numpy as np
 
 from fenwear.arrays import Array
-from fenwear.case import Case, Contact, Dependence, WearLaw
+from fenwear.case import Case, Contact, Dependence, Material, WearLaw
 from fenwear.case.layers import (
     STIFFNESS,
     ExponentialLayer,
@@ -44,6 +44,7 @@ PLASTIC = "plastic_depth"
 SOFT = 0.03  # mm
 MOST_FLOWS, FLOWED, FLAT = 500, 1e-8, 1e-9  # iterations; change over what has flown, least depth (mm), that end them
 T = TypeVar("T")
+Regions = tuple[Mapping[str, Array], Mapping[str, Array]]
 
 
 @dataclass(frozen=True)
@@ -268,7 +269,7 @@ def row_of_state(name: str) -> str:
 def layers_of(
     contact: Contact,
     pair: ContactPair,
-    modulus: float | None = None,
+    modulus: float | Array | None = None,
     wear: Sequence[WearLaw | None] = (None, None),
     temperature: float = 0.0,
     *,
@@ -279,7 +280,7 @@ def layers_of(
     Args:
         contact: The table.
         pair: The surfaces.
-        modulus: E* of the materials at the contact, MPa; None where there is none for all of it.
+        modulus: E* of the materials at the contact, of all of it or at the nodes (n,), MPa; None where none is known.
         wear: The wear laws of punch and strip.
         temperature: The initial one, K.
         strip_carries: Whether debris lies on the strip's material.
@@ -340,28 +341,37 @@ def _at_nodes(law: PowerLayer | ExponentialLayer | RoughLayer, place: Mapping[st
     ]
 
 
-def _rough(law: RoughLayer, modulus: float | None, values: list[Array]) -> Closure:
-    young = law.modulus or modulus
+def _rough(law: RoughLayer, modulus: float | Array | None, values: list[Array]) -> Closure:
+    young = modulus if law.modulus is None else law.modulus
     if young is None:
-        message = "missing, but required where a body has several materials at the contact"
+        message = "missing, but required where bodies are made without a case"
         raise CaseError(InputError("contact.layer.modulus", message))
     roughness, radius, density = values
     height = RMS * roughness
     return RoughClosure(height, 4 / 3 * young * density * np.sqrt(radius) * height**1.5)
 
 
-def common_modulus(case: Case, punch: Mapping[str, Array], strip: Mapping[str, Array]) -> float | None:
-    """Return E*, 1/E* = sum of (1 - nu^2)/E at the initial temperature, MPa; None where a body has several there.
+def common_modulus(case: Case, regions: Regions, pair: ContactPair) -> float | Array:
+    """Return E*, 1/E* = sum of (1 - nu^2)/E at the initial temperature, MPa; (n,) where a body has several materials.
 
     Args:
         case: With the materials.
-        punch, strip: Shares of the regions in the contact nodes (n,), by their names.
+        regions: Shares of the regions of punch and strip in their own contact nodes, by their names.
+        pair: The surfaces opposite each other.
     """
-    materials, given = case.initial_materials, 0.0
-    for shares, body in ((punch, case.punch), (strip, case.strip)):
+    return 1 / over_materials(case, regions, pair, lambda one: (1 - one.poisson**2) / float(one.young))
+
+
+def over_materials(
+    case: Case, regions: Regions, pair: ContactPair, value: Callable[[Material], float]
+) -> float | Array:
+    """Return the sum over both bodies of a value of their materials; at the nodes (n,) where a body has several."""
+    materials, found, onto = case.initial_materials, 0.0, (None, pair.wear_interpolation)
+    for shares, body, reads in zip(regions, (case.punch, case.strip), onto, strict=True):
         own = body.materials_at(shares)
-        if len(own) != 1:
-            return None
-        material = materials[own.pop()]
-        given += (1 - material.poisson**2) / float(material.young)
-    return 1 / given
+        if len(own) == 1:
+            found = found + value(materials[own.pop()])
+            continue
+        at = np.sum([share * value(materials[body.regions[name]]) for name, share in shares.items()], axis=0)
+        found = found + (at if reads is None else reads @ at)
+    return found

@@ -12,39 +12,34 @@ h_c = 2 k eta sqrt(R sigma) F_(1/2)(d / sigma), with F_(1/2) the integral of (z 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 
 from fenwear.arrays import Array
 from fenwear.case import Case
 from fenwear.case.layers import RoughLayer
-from fenwear.errors import CaseError, InputError
-from fenwear.layers.between import Layers, common_modulus
+from fenwear.interface import ContactPair
+from fenwear.layers.between import Layers, Regions, common_modulus, over_materials
 
 Conductance = Callable[[Array], Array]
 
 
-def conductance_of(
-    layers: Layers, case: Case | None, regions: tuple[Mapping[str, Array], Mapping[str, Array]]
-) -> Conductance | None:
+def conductance_of(layers: Layers, case: Case | None, regions: Regions, pair: ContactPair) -> Conductance | None:
     """Return h_c of the nodes (n,), N/(mm s K), by their pressures (n,), MPa; None where the case gives it otherwise.
 
     Args:
         layers: What lies between.
         case: With heat.conductance = "layer".
-        regions: Shares of the regions of punch and strip in the contact nodes (n,), by their names.
-
-    Raises:
-        CaseError: a body has several materials at the contact.
+        regions: Shares of the regions of punch and strip in their own contact nodes, by their names.
+        pair: The surfaces opposite each other.
     """
     if case is None or case.heat is None or case.heat.conductance != "layer":
         return None
     given = getattr(case.contact.layer, "modulus", None) if isinstance(case.contact.layer, RoughLayer) else None
-    modulus, conductivity = given or common_modulus(case, *regions), _conductivity(case, *regions)
-    if modulus is None or conductivity is None:
-        raise CaseError(InputError("heat.conductance", "expected one material of each body at the contact for 'layer'"))
-    share = conductivity / modulus
+    modulus = common_modulus(case, regions, pair) if given is None else given
+    resistance = over_materials(case, regions, pair, lambda one: 0.5 / float(one.conductivity or np.nan))
+    share = 1 / (resistance * modulus)  # 2 k_1 k_2 / (k_1 + k_2) over E*
 
     def conductance(pressure: Array) -> Array:
         given_way = np.zeros_like(pressure) if layers.winkler is None else layers.winkler
@@ -53,14 +48,3 @@ def conductance_of(
         return np.asarray(share / slope)
 
     return conductance
-
-
-def _conductivity(case: Case, punch: Mapping[str, Array], strip: Mapping[str, Array]) -> float | None:
-    """Return 2 k_1 k_2 / (k_1 + k_2) at the initial temperature, N/(s K); None where a body has several materials."""
-    materials, resistance = case.initial_materials, 0.0
-    for shares, body in ((punch, case.punch), (strip, case.strip)):
-        own = body.materials_at(shares)
-        if len(own) != 1:
-            return None
-        resistance += 0.5 / float(materials[own.pop()].conductivity or np.nan)
-    return 1 / resistance

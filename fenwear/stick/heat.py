@@ -239,7 +239,7 @@ def stick_heat(interface: StickInterface, case: Case, steps: int) -> StickHeat |
         fresh=interface.fresh,
     )
     expanded = expansions(interface, exchange, bodies, case.heat.initial)
-    exchange = exchange.through(conductance_of(interface.layers, case, bodies.regions))
+    exchange = exchange.through(conductance_of(interface.layers, case, bodies.regions, interface.middle.pair))
     return StickHeat(heated_directly(exchange), expanded, interface, stays=passage is None)
 
 

@@ -119,7 +119,8 @@ class StickInterface(OppositeBodies):
         middle = pair(bodies.punch.surface, bodies.strip.surface, halfway=not moves)
         self.layers = Layers(len(middle.weights))
         if case is not None:
-            modulus, initial = common_modulus(case, *bodies.regions), 0.0 if case.heat is None else case.heat.initial
+            modulus = common_modulus(case, bodies.regions, middle)
+            initial = 0.0 if case.heat is None else case.heat.initial
             self.layers = layers_of(case.contact, middle, modulus, sliding.wear, initial)
         if bodies.followed is None:
             check_distance(middle)

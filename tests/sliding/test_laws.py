@@ -15,6 +15,7 @@ from fenwear.case import Case, changed_case, own_laws
 from fenwear.case.own_laws import evaluate_law
 from fenwear.cycle.stability import growth_rate
 from fenwear.errors import CaseError, ConvergenceError
+from fenwear.layers.closure import RoughClosure
 from fenwear.life.model import Model
 from fenwear.sliding.wear import StepWear
 
@@ -22,6 +23,7 @@ Assemble = Callable[..., Tribosystem]
 SMALL = ("geometry.degree=2", "geometry.parameters.elements_along_contact=16", "geometry.follow_wear=never")
 # One way, without friction: all pressures come to one that wears evenly.
 PLAIN = (*SMALL, "contact.friction=0", "motion={kind='one-way', direction='rightward', speed=100, duration=1}")
+HEIGHT = 1e-3 * (np.pi / 2) ** 0.5  # mm: rms of a roughness Sa of 1 um
 MEAN = 1e4 / 600
 
 
@@ -90,6 +92,28 @@ def test_two_linings_side_by_side(tmp_path: Any) -> None:
     assert pressure @ system.pair.weights == pytest.approx(1000, rel=1e-9)
     with pytest.raises(CaseError, match=r"wear\.punch.coefficient.regions.punch_middle: no such region"):
         two_linings(tmp_path, "wear.punch.coefficient={regions={punch_left=1e-8, punch_middle=1}}")
+
+
+def test_rough_linings_of_two_materials_close_and_conduct_as_each_does(tmp_path: Any) -> None:
+    """By E* and the mean conductivity of the place: h_c = 2 k_1 k_2 / (k_1 + k_2) / E* dp/d(delta)."""
+    thermal = "density='7800 kg/m^3', heat_capacity='460 J/(kg K)', expansion='12e-6 1/K'"
+    settings = (
+        f"materials.steel={{young=2e5, poisson=0.3, conductivity='45 W/(m K)', {thermal}}}",
+        f"materials.lining={{young=2e4, poisson=0.2, conductivity='5 W/(m K)', {thermal}}}",
+        "punch.regions={punch_left='steel', punch_right='lining'}",
+        "contact.layer={kind='rough', roughness='1 um', asperity_radius='50 um', asperity_density='1000 1/mm^2'}",
+        "heat={convection='20 W/(m^2 K)', conductance='layer'}",
+    )
+    system = assemble(two_linings(tmp_path, *settings))
+    x, closure, conductance = system.pair.x, system.layers.closure, system.layer_conductance()
+    assert isinstance(closure, RoughClosure)
+    assert conductance is not None
+    pressure = np.full(len(x), 50.0)
+    found, slope = conductance(pressure), closure.slope(pressure)
+    for side, young, poisson, k in ((x < -0.1, 2e5, 0.3, 45.0), (x > 0.1, 2e4, 0.2, 5.0)):
+        modulus = 1 / ((1 - 0.3**2) / 2e5 + (1 - poisson**2) / young)
+        np.testing.assert_allclose(closure.stiffness[side], 4 / 3 * modulus * 1e3 * 0.05**0.5 * HEIGHT**1.5)
+        np.testing.assert_allclose(found[side] * slope[side], 2 * k * 45 / (k + 45) / modulus)
 
 
 def test_coating_worn_through(assembled: Assemble) -> None:

@@ -220,7 +220,7 @@ class GriddedPhases:
 
         return solve
 
-    def improved(self, x: Array, f: Array, tolerance: float) -> Array:
+    def improved(self, x: Array, f: Array, enough: float, below: float) -> Array:
         """Return a solution of the inequality, better by some digits, from one with pressures >= 0.
 
         The change is looked for in single precision, on a box around what touches: f is what changes are worth there.
@@ -228,19 +228,20 @@ class GriddedPhases:
         Args:
             x: Unknowns.
             f: Their residual.
-            tolerance: Of the residual, which is enough.
+            enough: The norm of it that need not be less.
+            below: How far below zero gaps may be.
 
         Raises:
             LinAlgError: nothing touches, or the loads are not balanced by what does.
         """
         n, (parts, rest) = self.n, (one.reshape(self.m, -1) for one in (x, f))
-        touched = np.flatnonzero(((parts[:, :n] > 0) | (rest[:, :n] < -tolerance)).any(axis=0))
+        touched = np.flatnonzero(((parts[:, :n] > 0) | (rest[:, :n] < -below)).any(axis=0))
         if not len(touched):
             raise np.linalg.LinAlgError("singular matrix")
         on = self.grid.around(touched, np.float32)
         slopes = None if self.opened is None else on.slopes(self.opened)
         change = _Change(on, slopes, on.box.spread(parts[:, :n]), on.box.spread(rest[:, :n]), rest[:, n:])
-        p, a, touches = change.solve(tolerance)
+        p, a, touches = change.solve(enough, below)
         found = parts.copy()
         changed = found[:, on.box.nodes] + on.box.values(p)
         found[:, on.box.nodes] = np.where(on.box.values(touches.astype(on.dtype)) > 0, np.maximum(changed, 0.0), 0.0)
@@ -279,29 +280,29 @@ class _Change:
         self.on, self.slopes = on, slopes
         self.before, self.gaps, self.forces = (one.astype(on.dtype) for one in (before, gaps, forces))
 
-    def solve(self, tolerance: float) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def solve(self, enough: float, below: float) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Return the changes of pressures (m, ...) and motions (m, r), and what touches, sets of nodes in turn."""
         least = -self.before
         p, a = np.zeros_like(self.before), np.zeros_like(self.forces)
         gaps, forces = self.gaps, self.forces
-        closed, all_motions = (self.before > 0) | (gaps < -tolerance), np.ones(forces.shape, dtype=bool)
+        closed, all_motions = (self.before > 0) | (gaps < -below), np.ones(forces.shape, dtype=bool)
         first, last, changed, idle = 0.0, np.inf, closed.sum(), False
         solver: _Closed | None = None
         for number in range(SETS):
             size = float(np.sqrt((gaps[closed] ** 2).sum() + (forces**2).sum()))
             first = max(first, size)
-            enough = max(SHARE * tolerance, DIGITS * first)
-            done = size <= enough or size > FALLS * last
+            wanted = max(SHARE * enough, DIGITS * first)
+            done = size <= wanted or size > FALLS * last
             if number and done and (idle or not changed):
                 break
             last, idle = size, done
             solver = _Closed(self.on, self.slopes, closed, all_motions, solver)
             final = changed <= FEW * closed.sum()
-            by_p, by_a, _ = solver.solve(-gaps, -forces, max(enough / size, 0.0 if final else ROUGH))
+            by_p, by_a, _ = solver.solve(-gaps, -forces, max(wanted / size, 0.0 if final else ROUGH))
             p, a = np.maximum(p + by_p, least), a + by_a
             by = self.on.multiply(p, a, self.slopes)
             gaps, forces = self.gaps + by[0], self.forces + by[1]
-            now = (p > least) | (~closed & (gaps < -tolerance))
+            now = (p > least) | (~closed & (gaps < -below))
             changed, closed = (now != closed).sum(), now
         return p, a, p > least
 

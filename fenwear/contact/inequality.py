@@ -131,7 +131,7 @@ class Inequality:
         self.curved = False  # whether the derivative changes with the solution
         self.by_digits = False  # whether solutions may cost by their digits
         self.sets_first = False  # whether sets are gone through before SNES starts; without upper bounds
-        self.close = CLOSE  # residual that ends solves where they cost by their digits
+        self.close = 0.0  # residual of a row in the mean that ends solves, where they cost by their digits
         self.singular = False  # whether the last set that SNES took had no factor
 
     @cached_property
@@ -318,19 +318,20 @@ class Inequality:
 
     def _improved(self, start: Array) -> Array | None:
         """Return the solution by some digits after each other; None where they do not come."""
-        x, tolerance = start.copy(), max(self.close, self._tolerance)
+        x, least = start.copy(), max(CLOSE, self._tolerance)
+        below = max(self.close, least)
         f = self._function(x)
         for self.iterations in range(ROUNDS):
-            free = x > self._lower
-            size = float(np.linalg.norm(f[free]))
-            if size < tolerance and f.min(where=~free, initial=0.0) >= -tolerance:
+            wrong = (x > self._lower) | (f < -below)
+            enough = max(self.close * float(np.sqrt(wrong.sum())), least)  # as many digits for any number of nodes
+            if np.linalg.norm(f[wrong]) < enough:
                 self.residual = f
                 return x
             operator = self._jacobian(x)
             if not isinstance(operator, Approximate):
                 return None
             try:
-                x = operator.improved(x, f, tolerance)
+                x = operator.improved(x, f, enough, below)
             except np.linalg.LinAlgError:
                 return None
             f = self._function(x)

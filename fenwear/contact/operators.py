@@ -45,13 +45,14 @@ class Operator(Protocol):
 class Approximate(Protocol):
     """An operator whose solutions cost by their digits."""
 
-    def improved(self, x: Array, f: Array, tolerance: float) -> Array:
+    def improved(self, x: Array, f: Array, enough: float, below: float) -> Array:
         """Return unknowns within their bounds that fulfil the inequality better than others, by some digits.
 
         Args:
             x: Unknowns within their bounds.
             f: Their residual.
-            tolerance: Of the residual, which is enough.
+            enough: The norm of it that need not be less.
+            below: How far below zero it may be at the bounds.
 
         Raises:
             LinAlgError: there are none.

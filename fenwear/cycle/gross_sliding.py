@@ -37,7 +37,6 @@ from fenwear.assembly.variants import same_conduction
 from fenwear.case import Case
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat
 from fenwear.cycle.driver import Loading, Watch
-from fenwear.cycle.jump_error import ORDER
 from fenwear.cycle.jump_step import Stepper
 from fenwear.cycle.phase import PhaseEnd, PhaseStep
 from fenwear.cycle.retry import SmallerSteps
@@ -132,7 +131,7 @@ class Jumps:
                 length = max(1, tried // 2)
                 continue
             largest = estimate.largest
-            factor = SAFETY * (tolerance / max(largest, 1e-300)) ** (1 / (ORDER + 1))
+            factor = SAFETY * estimate.longer(tolerance)
             warmed = tried > 1 and stepper.system.team.each(self, "change", end.temperature) > WARMED
             if (largest <= tolerance and not warmed) or tried == 1:
                 break

@@ -38,6 +38,15 @@ class Estimate:
         """The largest of all."""
         return max(self.depth, self.pressure, self.temperature, self.state)
 
+    def longer(self, tolerance: float) -> float:
+        """Return how many times as long a jump of that tolerance is.
+
+        Depths are measured by what the jump wears, and err with the square of its length; the others with its cube.
+        """
+        by_wear = tolerance / max(self.depth, 1e-300)
+        whole = tolerance / max(self.pressure, self.temperature, self.state, 1e-300)
+        return float(min(by_wear ** (1 / ORDER), whole ** (1 / (ORDER + 1))))
+
 
 def estimated(system: Tribosystem, before: RunState, whole: RunState, halves: RunState) -> Estimate:
     """Return the error of two half steps from their difference to the whole one, by Richardson."""

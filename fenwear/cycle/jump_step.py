@@ -40,7 +40,6 @@ import numpy as np
 from fenwear.arrays import Array
 from fenwear.assembly import CreepStage, Tribosystem, with_reduced_heat
 from fenwear.contact import CondensedContact, ContactState
-from fenwear.contact.inequality import CLOSE
 from fenwear.cycle.block import HalfCycle, HalfCycleHeat, PhaseRecord
 from fenwear.cycle.coupled import Coupled, DepthEvolution
 from fenwear.cycle.driver import Loading, Watch, as_given, unwatched
@@ -247,7 +246,7 @@ class Stepper:
     def _solve_to(self, share: float) -> None:
         """Solve contact to a share of the tolerance, where its digits cost."""
         if isinstance(self.contact, CondensedContact):
-            self.contact.inequality.close = max(share * self.tolerance, CLOSE)
+            self.contact.inequality.close = share * self.tolerance
 
     def step(self, state: RunState, cycles: float, since: float = 0.0, near: _Trend | None = None) -> RunState:
         """Return the state `cycles` cycles later, by the two stages of one step.

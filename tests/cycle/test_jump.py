@@ -129,9 +129,9 @@ def test_mean_pressures_at_a_growing_edge() -> None:
     for tolerance in (0.03, 3e-3, 3e-4):
         apart = np.abs(means(jump(system, ends[-1], tolerance=tolerance, stops=frozenset(ends))) - expected)
         errors.append((apart.max(axis=1) / expected.max(axis=1)).max())
-    assert errors[0] < 2e-3
+    assert errors[0] < 1e-3
     assert errors[1] < 0.6 * errors[0]
-    assert errors[2] < 0.6 * errors[1]
+    assert errors[2] < 3.2e-4  # 3.07e-4 of which are of the half-cycle by which phases of a jump and a march differ
 
 
 def test_worn_area_of_a_jump_is_exact(assembled: Callable[..., Tribosystem]) -> None:

@@ -19,7 +19,7 @@ from fenwear.plausibility.layer import layer_warnings
 from fenwear.plausibility.rim import ContactRim, contact_rim
 from fenwear.plausibility.size import size_warnings
 from fenwear.plausibility.stroke import stroke_warnings
-from fenwear.plausibility.thickness import thickness, worn_through
+from fenwear.plausibility.thickness import least_thickness, thickness, worn_through
 from fenwear.results.shakedown import shakedown_text
 from fenwear.results.summary import net_of
 
@@ -40,10 +40,11 @@ class StateMonitor:
         self._first_clipped = 0
         self._first = True  # block
         self._thick: dict[str, Array] = {}
+        self._least: dict[str, float] = {}
 
     def move(self, system: Tribosystem) -> None:
         """Look at another contact grid from now on; collective."""
-        self.system, self.limits, self._thick = system, contact_limits(system), {}
+        self.system, self.limits, self._thick, self._least = system, contact_limits(system), {}, {}
 
     def see(self, block: Block) -> list[str]:
         """Take the next block and return what is to be said of it that was not said of an earlier one."""
@@ -79,6 +80,10 @@ class StateMonitor:
     def _worn_through(self, block: Block, name: str, elastic: ElasticBody, depths: Array) -> str:
         """Say that a body is worn through; "" if it is not."""
         if depths.max(initial=0.0) < SHALLOW * elastic.surface.extent():
+            return ""
+        if name not in self._least:
+            self._least[name] = least_thickness(elastic)
+        if depths.max(initial=0.0) < self._least[name]:
             return ""
         if name not in self._thick:
             self._thick[name] = thickness(elastic)

@@ -38,6 +38,18 @@ def thickness(elastic: ElasticBody) -> Array:
     return np.where(np.isfinite(found), found, reach)
 
 
+def least_thickness(elastic: ElasticBody) -> float:
+    """Return a length, mm, that a body is at least thick below its contact nodes; collective.
+
+    The distance of the box around the nodes from those around what else the body ends at: of no cost, and enough where
+    the contact lies far from it.
+    """
+    x, opposite = elastic.surface.x, _opposite(elastic)
+    low, high = opposite.min(axis=1), opposite.max(axis=1)
+    apart = np.maximum(np.maximum(low - x.max(axis=0), x.min(axis=0) - high), 0.0)
+    return float(np.linalg.norm(apart, axis=1).min(initial=np.inf))
+
+
 def _opposite(elastic: ElasticBody) -> Array:
     """Return the corners (f, d, d) of segments or triangles of the boundary beside the contact surface; collective."""
     body, mesh = elastic.body, elastic.body.mesh

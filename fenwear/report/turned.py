@@ -13,6 +13,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ AROUND = 72  # parts of a ring
 RAISED = 0.15  # of the surface's size: the largest worn depth as it is drawn
 COLOURS = {"YlGnBu": "YlGnBu", "YlOrBr": "YlOrBr", "YlOrRd": "YlOrRd"}
 HEIGHT = 560  # pixels
+DIGITS, LEAST = 5, 1e-30  # of numbers, and of what counts as one
 
 
 @dataclass(frozen=True)
@@ -71,22 +73,16 @@ def turned_figure(history: xarray.Dataset, half_cycles: Sequence[int]) -> dict[s
     import plotly.graph_objects as go
 
     shown = list(quantities(history).values())
-    traces, frames = [], []
-    for number, n in enumerate(half_cycles):
-        meshes = [_mesh(history, quantity, n, half_cycles) for quantity in shown]
-        frames.append(go.Frame(name=f"{n:,}", data=meshes))
-        if number == len(half_cycles) - 1:
-            traces = meshes
-    for k, trace in enumerate(traces):
+    last = [_mesh(history, quantity, half_cycles) for quantity in shown]
+    for k, trace in enumerate(last):
         trace.visible = k == 0
-    figure = go.Figure(data=traces, layout=_layout(shown, half_cycles))
+    figure = go.Figure(data=last, layout=_layout(shown, half_cycles))
     found: dict[str, Any] = json.loads(figure.to_json())
     # What changes from half-cycle to half-cycle alone, so that the chosen quantity stays.
-    steps = [
-        {name: [list(mesh[name]) for mesh in frame.data] for name in ("x", "y", "z", "intensity")} for frame in frames
-    ]
-    for step, change in zip(found["layout"]["sliders"][0]["steps"], steps, strict=True):
-        step["args"] = [change]
+    for step, n in zip(found["layout"]["sliders"][0]["steps"], half_cycles, strict=True):
+        heights = {body: _short(_raised(history, body, n)) for body in {quantity.body for quantity in shown}}
+        values = [_short(_values(history, quantity, n)) for quantity in shown]
+        step["args"] = [{"z": [heights[quantity.body] for quantity in shown], "intensity": values}]
     return found
 
 
@@ -116,29 +112,40 @@ def _layout(shown: Sequence[Quantity], half_cycles: Sequence[int]) -> dict[str, 
     }
 
 
-def _mesh(history: xarray.Dataset, quantity: Quantity, half_cycle: int, half_cycles: Sequence[int]) -> Any:
-    """Return a quantity on its surface, whose worn depth is raised so that it can be seen."""
+def _mesh(history: xarray.Dataset, quantity: Quantity, half_cycles: Sequence[int]) -> Any:
+    """Return a quantity on its surface at the last of some half-cycles, whose worn depth is raised so that it shows."""
     import plotly.graph_objects as go
 
-    x, triangles, repeat = _solid_or_rings(history, quantity.body)
-    end = "_strip" if quantity.body == "strip" else ""
-    depth = history[f"wear{end}"].sel(half_cycle=half_cycle).values
-    most = float(history[f"wear{end}"].max())
-    # Seen from the gap: what is worn off is a hollow.
-    raised = x[:, 2] - (RAISED * float(np.ptp(x, axis=0).max()) / most if most > 0 else 0.0) * np.tile(depth, repeat)
+    x, triangles, _ = _solid_or_rings(history, quantity.body)
     values = quantity.factor * history[quantity.variable]
     low, high = float(values.min()), float(values.max())
     if quantity.variable == "pressure":
         low, high = 0.0, min(high, pressure_top(history, half_cycles))
     i, j, k = triangles.T
     return go.Mesh3d(
-        x=_short(x[:, 0]), y=_short(x[:, 1]), z=_short(raised), i=i.tolist(), j=j.tolist(), k=k.tolist(),
-        intensity=_short(np.tile(values.sel(half_cycle=half_cycle).values, repeat)),
+        x=_short(x[:, 0]), y=_short(x[:, 1]), z=_short(_raised(history, quantity.body, half_cycles[-1])),
+        i=i.tolist(), j=j.tolist(), k=k.tolist(), intensity=_short(_values(history, quantity, half_cycles[-1])),
         cmin=low, cmax=high if high > low else low + 1.0, colorscale=COLOURS[quantity.colours],
         colorbar={"title": quantity.unit, "len": 0.7}, name=quantity.title, showscale=True,
         hovertemplate=f"%{{intensity:.4g}} {quantity.unit}<br>x = %{{x:.4g}} mm, y = %{{y:.4g}} mm",
         lighting={"ambient": 0.75, "diffuse": 0.5, "specular": 0.05},
     )  # fmt: skip
+
+
+def _raised(history: xarray.Dataset, body: str, half_cycle: int) -> Array:
+    """Return the heights of a worn surface as they are drawn: seen from the gap, what is worn off is a hollow."""
+    x, _, repeat = _solid_or_rings(history, body)
+    end = "_strip" if body == "strip" else ""
+    depth, most = history[f"wear{end}"].sel(half_cycle=half_cycle).values, float(history[f"wear{end}"].max())
+    scale = RAISED * float(np.ptp(x, axis=0).max()) / most if most > 0 else 0.0
+    return np.asarray(x[:, 2] - scale * np.tile(depth, repeat))
+
+
+def _values(history: xarray.Dataset, quantity: Quantity, half_cycle: int) -> Array:
+    """Return what colours a surface at a half-cycle."""
+    _, _, repeat = _solid_or_rings(history, quantity.body)
+    values = quantity.factor * history[quantity.variable].sel(half_cycle=half_cycle).values
+    return np.asarray(np.tile(values, repeat))
 
 
 def _solid_or_rings(history: xarray.Dataset, body: str) -> tuple[Array, Any, int]:
@@ -157,9 +164,10 @@ def _solid_or_rings(history: xarray.Dataset, body: str) -> tuple[Array, Any, int
     return x, np.concatenate([first.reshape(-1, 3), second.reshape(-1, 3)]), AROUND + 1
 
 
-def _short(values: Array) -> list[float]:
-    """Return values with as many digits as can be seen."""
-    return [float(f"{v:.5g}") for v in values]
+def _short(values: Array) -> list[float | None]:
+    """Return values with as many digits as can be seen; None for what is not known."""
+    size = 10.0 ** (DIGITS - 1 - np.floor(np.log10(np.maximum(np.abs(values), LEAST))))
+    return [value if isfinite(value) else None for value in (np.round(values * size) / size).tolist()]
 
 
 _PAGE = """<div id="turned" style="height: {height}px"></div>

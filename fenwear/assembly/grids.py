@@ -156,11 +156,14 @@ def _reading(body: ElasticBody, grid: RegularGrid) -> csr_array:
         CaseError: the grid reaches beyond the surface.
     """
     charted = _charted(body, grid)
-    s, found = charted.s, reading_at(charted, grid.flat)
+    first, last, spacing = np.array(grid.corner), np.array(grid.corner) + grid.sides, np.array(grid.spacing)
+    low, high = charted.s.min(axis=0), charted.s.max(axis=0)
+    far = (first < low - spacing).any() or (last > high + spacing).any()  # where its nodes might not fit the memory
+    found = None if far else reading_at(charted, grid.flat)
     if found is None:
         spans: Sequence[str] = [
-            " by ".join(f"{low:.4g} to {high:.4g}" for low, high in zip(one.min(axis=0), one.max(axis=0), strict=True))
-            for one in (grid.flat, s)
+            " by ".join(f"{at:.4g} to {end:.4g}" for at, end in zip(*ends, strict=True))
+            for ends in ((first, last), (low, high))
         ]
         text = f"spans {spans[0]} mm on the {body.body.name}, whose contact surface spans {spans[1]} only"
         raise CaseError(InputError("grid.size", f"{text}: expected a grid within it"))

@@ -306,6 +306,7 @@ def test_sphere_on_a_layer(radius: float) -> None:
     [
         (["grid.size=['0.5 mm', '0.5 mm']"], "grid.size"),
         (["grid.middle=['1 mm', '0 mm']"], "grid.size"),
+        (["motion.amplitude='1000 km'"], "grid.size"),  # before there are nodes
         (["grid.size=['0.3 mm']"], "grid.size"),
         (["contact.law='coulomb'", "contact.solver='full'"], "grid"),
     ],

@@ -193,7 +193,7 @@ class Inequality:
             last = self._kept = _Kept(operator, key, rows, bounded, operator.factor(kept))
         return last
 
-    def solve(self, start: Array, *, near: bool = False, line_search: bool = False) -> Array:
+    def solve(self, start: Array, *, near: bool = False, line_search: bool = False, most: int | None = None) -> Array:
         """Return the solution (size,).
 
         Args:
@@ -201,6 +201,7 @@ class Inequality:
             near: Whether the solution may well have the unknowns of the start at their bounds, and no others.
             line_search: Whether steps are cut to where the residual is least: slower, but it ends where
                 full steps go to and fro between two sets of unknowns at their bounds.
+            most: Iterations of SNES, where they are fewer than its own options allow.
 
         Raises:
             ConvergenceError: SNES did not converge.
@@ -212,7 +213,7 @@ class Inequality:
         x = (self._by_chords(start) if stepwise else self._on_set(start)) if near else None
         if x is None and self.sets_first and not line_search:
             x = self._through_sets(start)
-        return self._by_snes(start, line_search) if x is None else x
+        return self._by_snes(start, line_search, most) if x is None else x
 
     def _on_set(self, start: Array) -> Array | None:
         """Return the solution where it has the same free unknowns as the start, else None."""
@@ -351,17 +352,20 @@ class Inequality:
             signed = np.where(x[bounded] == self._lower[bounded], signed, -signed)
         return bool(signed.min() >= 0)
 
-    def _by_snes(self, start: Array, line_search: bool) -> Array:
+    def _by_snes(self, start: Array, line_search: bool, most: int | None = None) -> Array:
         snes = self._searching if line_search else self._full_steps
         x: Array = start.copy()
         self.singular = False
-        snes.setTolerances(atol=self._tolerance)
+        limit = snes.getTolerances()[3]
+        snes.setTolerances(atol=self._tolerance, max_it=limit if most is None else min(most, limit))
         try:
             snes.solve(None, PETSc.Vec().createWithArray(x, comm=PETSc.COMM_SELF))
         except (np.linalg.LinAlgError, PETSc.Error) as error:  # PETSc passes on what its callbacks raise, or wraps it
             if not isinstance(error.__cause__ or error, np.linalg.LinAlgError):
                 raise
             raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular") from None
+        finally:
+            snes.setTolerances(max_it=limit)
         if self.singular:
             raise ConvergenceError(f"{self.name} did not converge: its Jacobian is singular")
         check(snes, self.name)

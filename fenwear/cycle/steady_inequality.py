@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from fenwear.arrays import Array
 from fenwear.assembly import Tribosystem
-from fenwear.contact import ContactState
+from fenwear.contact import ContactSolver, ContactState
 from fenwear.contact.inequality import AT_BOUND, Inequality
 from fenwear.contact.operators import Operator
 from fenwear.contact.row_blocks import SpreadPhases
@@ -21,6 +22,7 @@ from fenwear.memory import GIB, free_memory, memory_size
 from fenwear.optimum import Optimum
 from fenwear.parallel import agreed
 from fenwear.sliding.friction import ContactConditions
+from fenwear.sliding.wear import StepWear
 
 DRIVE = 1e-6  # scaled stiffness of the shape at nodes that are open in all phases
 GRAZING = 1e-7  # of the wear by the mean pressure: a motion of open nodes that leaves them where they are
@@ -28,7 +30,14 @@ SOFTENED = (1.0, 0.3, 0.1, 0.03, 0.01, 1e-3, 1e-4, 0.0)  # shares of the pressur
 LARGE = 4000  # nodes from which on no matrix of them is made
 NUMBER, COUPLED = 8, 3  # bytes; copies of what the heat of all phases opens in all phases, as they are scaled
 SMALL = GIB  # below which no estimate refuses anything
+STEPS = 0.1, 1.0  # wear by the mean pressure over the elastic gap, of steps from afar
+LONGER = 10.0, 1e2, 1e3, 1e4, 1e5  # and of those before the last one, which has no end
+UNBALANCED = 0.3  # of the mean pressure times the surface: from there on a start is far
+AT_ONCE = 30  # Newton iterations, before the wear is followed and in its steps
 OPEN = 1e4  # bound of omega over the elastic gap of the mean pressure: never touched again
+
+# Unknowns, their residual, Newton iterations, the largest pressure without a cap, and what failed.
+_Found = tuple[Array, Array, int, float, ConvergenceError | None]
 
 
 class SteadyInequality:
@@ -71,6 +80,8 @@ class SteadyInequality:
         self.x = self._start()
         self.peak_without_cap = 0.0
         self._solved = False
+        # Of a step towards the state: the inverse of its length, and the shape where it begins.
+        self._step: tuple[float, Array] | None = None
         self.inequality = Inequality(
             lower, upper, self._residual, self._jacobian, "fenwear_steady_", "the cyclic steady state"
         )
@@ -108,6 +119,9 @@ class SteadyInequality:
         f = self.equations.multiply(x) + self.offset
         pressure = x[: m * n].reshape(m, n) * self.p_scale
         f[self.omega] -= self.wear.opening(pressure)[0] / self.wear_scale
+        if self._step is not None:
+            inverse, before = self._step
+            f[self.omega] += inverse * (x[self.omega] - before)
         # A rim that looks square to the motion, where nothing wears, either: rounding would drive it for ever.
         still = (pressure.max(axis=0) <= AT_BOUND * self.p_scale) & (np.abs(f[self.omega]) < GRAZING)
         f[self.omega] = np.where(still, 0.0, f[self.omega])
@@ -120,6 +134,8 @@ class SteadyInequality:
         slopes = self.wear.slopes(pressure * self.p_scale)
         # Open in all phases no equation holds omega: let the excess of wear or motion drive it to its bound or back.
         held = np.where(pressure.max(axis=0) <= AT_BOUND, DRIVE, 0.0)
+        if self._step is not None:
+            held += self._step[0]
         layer = None if self.closure is None else self.closure.slope(pressure * self.p_scale)
         known = self._known
         if known is not None and np.array_equal(held, known[1]) and all(map(_same, slopes, known[0])):
@@ -152,40 +168,101 @@ class SteadyInequality:
             scale = self.p_scale / self.gap_scale
             by_heat = None if coupling is None else coupling.reshape(m * n, m * n) * scale
             self.equations, self._known = self.equations.with_heat(by_heat), None
-        found = self._found
-        if isinstance(self.equations, SpreadShape):
-            self.x, f, iterations, self.peak_without_cap, failure = self.equations.phases.team.lead(found)
-        else:
-            self.x, f, iterations, self.peak_without_cap, failure = found()
+        failure: ConvergenceError | None = None
+        if not (follow := self._may_follow and self._far):
+            self.x, f, iterations, self.peak_without_cap, failure = self._lead(self._found)
+            follow = failure is not None and self._may_follow
+        if follow:
+            contact = self.system.phase_contact(range(m))  # ranks that share its rows make it together
+            self.x, f, iterations, self.peak_without_cap, failure = self._lead(partial(self._followed, contact))
         if failure is not None:
             raise failure
         self._solved = True
         pressure, gap = (v[: m * n].reshape(m, n) for v in (self.x * self.p_scale, f * self.gap_scale))
         return ContactState(pressure, gap, np.zeros((m, self.r)), iterations)
 
-    def _found(self) -> tuple[Array, Array, int, float, ConvergenceError | None]:
-        """Return unknowns, their residual, Newton iterations, the largest pressure without a cap, and what failed."""
-        x, failure = self.x, None
+    def _lead(self, find: Callable[[], _Found]) -> _Found:
+        """Return what rank 0 finds, where ranks share the rows with the help of all; collective there."""
+        return self.equations.phases.team.lead(find) if isinstance(self.equations, SpreadShape) else find()
+
+    @property
+    def _may_follow(self) -> bool:
+        """Whether a first solution of several phases is looked for, of wear that no cap holds."""
+        return self.m > 1 and not self._solved and self.wear.cap == np.inf
+
+    @property
+    def _far(self) -> bool:
+        """Whether the start leaves much of the loads of some phase unbalanced, as an even pressure in a bore does."""
+        forces = np.einsum("krn,kn->kr", self.equations.balances, self.equations.parts(self.x)[0])
+        loads = self._cold[(self.m + 1) * self.n :].reshape(forces.shape)
+        return bool(np.abs(forces + loads).max(initial=0.0) > UNBALANCED)
+
+    def _found(self) -> _Found:
+        """Return what is found from the last unknowns, or from the start."""
+        x = self.x
         if self.m == 1 or not self._solved:
             x = self._touching(x)
+        return self._from(x, AT_ONCE if self._may_follow else None)
+
+    def _from(self, x: Array, most: int | None = None, *, near: bool = False) -> _Found:
+        """Return what Newton's method finds from a start, within so many iterations."""
+        failure = None
         try:
-            x = self._newton(x)
+            x = self._newton(x, most, near=near or self._solved)
         except ConvergenceError as error:  # raised where all ranks know how far it came
             failure = error
         return x, self.inequality.residual, self.inequality.iterations, self.peak_without_cap, failure
+
+    def _followed(self, contact: ContactSolver) -> _Found:
+        """Return what is found from where the wear leads, followed by implicit steps of ever more cycles.
+
+        Where loads and motions change much over a cycle no even pressure is near its end, and sets of nodes in contact
+        go round from it. Source: pseudo-transient continuation, C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35,
+        1998, by steps of the implicit Euler method.
+
+        Args:
+            contact: Of all phases.
+        """
+        x = begin = self._touching(self.x)
+        base = self.system.pair.initial_gap
+        moved = np.array([own.pair.initial_gap - base for own in self.system.interfaces])
+        omega, solved, worn = begin[self.omega], None, np.zeros(self.n)
+        for length in STEPS:
+            cycles = length * self.gap_scale / self.wear_scale
+            solved = contact.solve(moved + omega * self.gap_scale, solved, StepWear(self.wear, cycles))
+            worn = self.wear.opening(solved.pressure)[0] / self.wear_scale
+            omega = omega + length * worn
+            x = self._unknowns(solved, omega, worn)
+        for length in LONGER:
+            self._step = 1 / length, x[self.omega].copy()
+            found = self._from(x, AT_ONCE, near=True)
+            if found[-1] is None:
+                x = found[0]
+        self._step = None
+        found = self._from(x, AT_ONCE, near=True)
+        return found if found[-1] is None else self._from(begin)
+
+    def _unknowns(self, contact: ContactState, omega: Array, worn: Array) -> Array:
+        """Return the unknowns of contacts on a shape omega (n,) that wears by `worn` (n,) a cycle, both scaled."""
+        rigid, touched = contact.rigid * (self.lengths / self.gap_scale), worn > 0
+        velocity = np.linalg.lstsq(self.equations.modes[touched], worn[touched], rcond=None)[0]
+        shape = np.minimum(omega + self.equations.modes @ rigid[0], OPEN)
+        pressure = contact.pressure / self.p_scale
+        return np.concatenate([pressure.ravel(), shape, (rigid[1:] - rigid[0]).ravel(), velocity])
 
     def crept(self, pressure: Array) -> Array | None:
         """Return the state of what creeps in the end (size,), at pressures (m, n); None where nothing does."""
         return None if self._creep is None else self._creep.end(pressure)
 
-    def _newton(self, x: Array) -> Array:
-        """Return the solution from a start; where wear is capped by those of ever harder caps, from none at all.
+    def _newton(self, x: Array, most: int | None, *, near: bool) -> Array:
+        """Return the solution from a start, within so many iterations.
 
+        Where wear is capped it is found by those of ever harder caps, from none at all.
         At nodes beyond the cap the balance of wear says nothing of the pressure: from afar it holds nothing.
         """
         capped = self.wear
         if capped.cap == np.inf:
-            return self.inequality.solve(x, near=self._solved)
+            return self.inequality.solve(x, near=near, most=most)
         if self._solved:
             try:
                 return self.inequality.solve(x, near=True)

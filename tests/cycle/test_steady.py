@@ -102,6 +102,23 @@ def test_jumps_end_there(assembled: Callable[..., Tribosystem], settings: tuple[
     np.testing.assert_allclose(difference, 0, atol=5e-3 * np.ptp(state.shape))
 
 
+def test_a_cup_in_which_loads_and_turns_change(assembled: Callable[..., Tribosystem]) -> None:
+    """Steps of walking, none with an even pressure near: one shape, on which each rests, wears by a rigid motion."""
+    system = assembled("ball-in-cup", "geometry.parameters.across=2", "geometry.parameters.around=2")
+    state = steady(system)
+    pressure, touched = state.phase_pressure, state.phase_pressure.max(axis=0) > 0
+    motion = system.rigid.rigid_normal @ list(state.velocity.values())
+    largest = state.wear_per_cycle.max()
+    assert 0.9 < touched.mean() < 1
+    np.testing.assert_allclose(state.wear_per_cycle[touched], motion[touched], rtol=0, atol=1e-9 * largest)
+    assert (motion[~touched] < 1e-9 * largest).all()  # there nothing wears, and the motion does not press
+    worn = np.where(np.isnan(state.shape), 1.0, state.shape)
+    phases = range(len(pressure))
+    gaps = np.array([own.pair.initial_gap + worn for own in system.interfaces])
+    found = system.phase_contact(phases).solve(gaps).pressure  # by the contact of given shapes
+    np.testing.assert_allclose(found, pressure, rtol=0, atol=1e-8 * pressure.max())
+
+
 @pytest.mark.parametrize(("friction", "exists"), [(0.37, True), (0.38, False)])
 def test_friction_can_tip_the_punch_out_of_any_steady_state(
     assembled: Callable[..., Tribosystem], friction: float, exists: bool

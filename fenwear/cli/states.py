@@ -28,6 +28,8 @@ StepOption = Annotated[
     ),
 ]
 
+FOLLOWED = 16  # phases a cycle, up to which the way to the steady state is sought: with many it takes minutes
+
 
 @app.command("steady")
 def steady_command(
@@ -79,10 +81,11 @@ def steady_command(
     uncertain = _uncertain(state) if accuracy else {}
     way = time.perf_counter()
     rate = growth_rate(found, state.phase_pressure, state.conductances)
-    cycles = cycles_to_reach(found, state, 0.01) if rate < 0 else None
+    short = len(found.motion.phases) <= FOLLOWED
+    cycles = cycles_to_reach(found, state, 0.01) if rate < 0 and short else None
     seconds = {"setup": setup, "steady": state.seconds, "way_there": time.perf_counter() - way}
     if not as_json:
-        _print_way(rate, cycles, seconds, time.perf_counter() - begin)
+        _print_way(rate, short, cycles, seconds, time.perf_counter() - begin)
         return
     degrees = degrees_of(loaded)
     pressures = {d: p.tolist() for d, p in zip(state.directions, state.pressure, strict=True)}
@@ -171,7 +174,10 @@ def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str)
         show(f"  mean pressure {system.rigid.mean_pressure:.4f} MPa")
     scale = pressure_scale(system, state.phase_pressure)
     show(f"  pressure scale {scale:.4f} MPa (integral of p² over integral of p)")
-    show(f"  wear per cycle {1e3 * state.wear_per_cycle.mean():.4g} µm; " + _velocities(state.velocity, "per cycle"))
+    wear, surface = 1e3 * state.wear_per_cycle, system.pair.weights * (state.wear_per_cycle > 0)
+    mean = (surface @ wear) / (surface.sum() or 1.0)
+    show(f"  wear per cycle {mean:.4g} µm on average, {wear.max():.4g} µm at most; "
+          + _velocities(state.velocity, "per cycle"))  # fmt: skip
     if state.passes:
         times = "once" if state.passes == 1 else f"{state.passes} times"
         show(f"  properties of materials are those of these temperatures, taken anew {times}")
@@ -183,10 +189,12 @@ def _print_steady(case: str, system: Tribosystem, state: SteadyState, step: str)
     sys.stdout.flush()
 
 
-def _print_way(rate: float, cycles: int | None, seconds: dict[str, float], in_all: float) -> None:
+def _print_way(rate: float, followed: bool, cycles: int | None, seconds: dict[str, float], in_all: float) -> None:
     """Print how the state is reached, and where the time went."""
     if rate > 0:
         show(f"  unstable: disturbances grow at {rate:.3g} 1/s, so that a run moves away from this state")
+    elif not followed:
+        show('  the way there, cycles of many steps, is not followed: `run` with run.integration = "jump" does so')
     elif cycles is None:
         show("  pressure within 1 % of the pressure scale: not within ten million cycles from the initial shape")
     else:

@@ -229,7 +229,10 @@ class SteadyInequality:
         omega, solved, worn = begin[self.omega], None, np.zeros(self.n)
         for length in STEPS:
             cycles = length * self.gap_scale / self.wear_scale
-            solved = contact.solve(moved + omega * self.gap_scale, solved, StepWear(self.wear, cycles))
+            try:
+                solved = contact.solve(moved + omega * self.gap_scale, solved, StepWear(self.wear, cycles))
+            except ConvergenceError:
+                return self._from(begin)
             worn = self.wear.opening(solved.pressure)[0] / self.wear_scale
             omega = omega + length * worn
             x = self._unknowns(solved, omega, worn)

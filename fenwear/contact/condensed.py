@@ -39,6 +39,7 @@ from fenwear.remedies import (
     LINE_SEARCH,
     RIGID_START,
     RIGID_START_SEARCH,
+    SOFTER_START,
     Remedies,
 )
 
@@ -48,6 +49,7 @@ MANY = 400  # nodes from which on only what those near contact ask for is made
 SOME, TOGETHER = 100, 4000  # the same, and their pressures in all phases, where there are many phases
 LARGE = 5000  # from which on phases that wear together make no matrix of all that touch
 ZERO = 1e-12  # of the mean pressure: what an open node may have left by rounding
+STIFFER, LEAST = 3.0, 1.05  # than before, of bodies that give way less and less; and where it does not get there
 EVEN = 0.3  # of all that an even pressure gives: what of it has to act against the loads for it to be a start
 
 
@@ -408,9 +410,9 @@ class CondensedContact:
     def _solve(self, start: ContactState | None) -> tuple[Array, Array, int]:
         """Return the solution by the first way that finds it: unknowns, residual and iterations."""
         failure: ConvergenceError | None = None
-        for guess, line_search, name in self._ways(start):
+        for name, found in self._ways(start):
             try:
-                x = self.inequality.solve(guess.ravel(), near=not name and start is not None, line_search=line_search)
+                x = found()
             except ConvergenceError as error:
                 failure = failure or error  # the usual way's says most
                 continue
@@ -419,20 +421,70 @@ class CondensedContact:
             return x, self.inequality.residual, self.inequality.iterations
         raise failure or ConvergenceError(self.inequality.name)
 
-    def _ways(self, start: ContactState | None) -> Iterator[tuple[Array, bool, str]]:
-        """Yield where to start, whether with a line search, and the name of the remedy that this is."""
+    def _ways(self, start: ContactState | None) -> Iterator[tuple[str, Callable[[], Array]]]:
+        """Yield the names of ways to the solution, and what goes them; the first one, the usual way, is no remedy."""
+        n, solve = self.shape[1], self.inequality.solve
         if start is not None:
             near = np.zeros_like(self._offset)
-            near[:, : self.shape[1]] = start.pressure / self._pressure_scale
-            yield near, False, ""
-            yield near, True, LINE_SEARCH
-        if not self._carried_evenly:
-            yield self._rigid_touch(), False, RIGID_START
-            yield self._rigid_touch(), True, RIGID_START_SEARCH
+            near[:, :n] = start.pressure / self._pressure_scale
+            yield "", partial(solve, near.ravel(), near=True)
+            yield LINE_SEARCH, partial(solve, near.ravel(), line_search=True)
+        even = self._carried_evenly
+        if not even:
+            touching = self._rigid_touch().ravel()
+            yield RIGID_START, partial(solve, touching)
+            yield SOFTER_START, self._from_softer_bodies
+            yield RIGID_START_SEARCH, partial(solve, touching, line_search=True)
         full = np.zeros_like(self._offset)
-        full[:, : self.shape[1]] = 1.0
-        yield full, False, FULL_START
-        yield full, True, FULL_START_SEARCH
+        full[:, :n] = 1.0
+        yield FULL_START, partial(solve, full.ravel())
+        yield FULL_START_SEARCH, partial(solve, full.ravel(), line_search=True)
+        if even:
+            yield SOFTER_START, self._from_softer_bodies
+
+    def _from_softer_bodies(self) -> Array:
+        """Return the solution by way of bodies that touch all over, and then give way less and less.
+
+        Bodies that are softer by a factor press alike on gaps that are as much smaller. So a contact shrinks to its
+        size, where sets of nodes that start from the few which touch first go round.
+
+        Raises:
+            ConvergenceError: one of them has no solution that is found.
+        """
+        n, gaps = self.shape[1], self._offset[:, : self.shape[1]].copy()
+        softer, stiffer = max(float(np.ptp(gaps, axis=1).max()), 1.0), STIFFER
+        known, x = np.inf, np.zeros_like(self._offset)  # how soft the last ones were, and what was found of them
+        x[:, :n] = 1.0
+        try:
+            while True:
+                self._offset[:, :n] = gaps / softer
+                begin = x.copy()
+                begin[:, n:] *= known / softer if known < np.inf else 1.0
+                try:
+                    found = self._searched(begin.ravel())
+                except ConvergenceError:
+                    stiffer = np.sqrt(stiffer)
+                    if known == np.inf or stiffer < LEAST:
+                        raise
+                    softer = max(known / stiffer, 1.0)
+                    continue
+                if softer == 1.0:
+                    return found
+                x, known = found.reshape(x.shape).copy(), softer
+                softer = max(softer / stiffer, 1.0)
+        finally:
+            self._offset[:, :n] = gaps
+
+    def _searched(self, start: Array) -> Array:
+        """Return the solution from a start, with a line search where full steps do not find it.
+
+        Raises:
+            ConvergenceError: nor does that.
+        """
+        try:
+            return self.inequality.solve(start)
+        except ConvergenceError:
+            return self.inequality.solve(start, line_search=True)
 
     def _balance(self, phase: int) -> Array:
         """Return E of a phase (r, n), scaled."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -14,9 +15,11 @@ from fenwear import ConvergenceError, Tribosystem, assemble
 from fenwear.arrays import Array
 from fenwear.contact import CondensedContact, ContactState, SlidingContact
 from fenwear.contact.full import FullContact
+from fenwear.remedies import SOFTER_START
 from fenwear.sliding.wear import WornDepths
 
 P = 1000.0  # load per thickness, N/mm
+BOTH = ("polyethylene", "cobalt-chromium")  # bodies of the cup
 OPENING = ("contact.friction=0.4", "geometry.parameters.pin_height_1=40")  # c = 1.6: the rear edge lifts off
 
 
@@ -143,6 +146,24 @@ def test_warm_start_changes_nothing_but_the_work(system: Tribosystem) -> None:
     for state in (again, from_afar):
         np.testing.assert_allclose(state.pressure, cold.pressure, rtol=0, atol=1e-10 * cold.pressure.max())
     assert again.iterations == 0 < cold.iterations
+
+
+def test_a_steel_ball_on_a_few_nodes_of_a_steel_cup(assembled: Callable[..., Tribosystem]) -> None:
+    """Sets of nodes go round that start from the few which touch first: every step of walking is found all the same."""
+    coarse = ("geometry.parameters.across=2", "geometry.parameters.around=2")
+    system = assembled("ball-in-cup", *coarse, *(f"materials.{one}.young=210 GPa" for one in BOTH))
+    state, ways = None, Counter[str]()
+    for phase, own in enumerate(system.interfaces):
+        state = system.phase_contact([phase]).solve(system.gap(phase, system.unworn()), state)
+        ways += system.remedies.take()
+        pressure, gap = state.pressure[0], state.gap[0]
+        assert (pressure >= 0).all()
+        assert gap.min() > -1e-9 * own.pair.initial_gap.max()
+        assert np.abs(np.minimum(pressure / pressure.max(), gap / own.pair.initial_gap.max())).max() < 1e-9
+        rigid, ratio = own.rigid, system.friction_ratios()[phase]
+        np.testing.assert_allclose(rigid.equilibrium(ratio) @ pressure, -rigid.resultant, rtol=0, atol=1e-6)
+        assert 3 <= (pressure > 0).sum() < 8
+    assert ways[SOFTER_START] > 0
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ SOLID = (
     "geometry.parameters.pad_layers=2", "geometry.parameters.disc_layers=2",
 )  # fmt: skip
 SHARP = ("heat.split_tolerance=1e-8",)
-HALF_CYCLES = 100
+HALF_CYCLES = 400
 
 
 def dense(system: Tribosystem) -> tuple[Array, Array, Array, Array]:

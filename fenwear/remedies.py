@@ -12,6 +12,7 @@ RIGID_START_SEARCH = "contact solved from where rigid bodies would touch, with a
 SOFTER_START = "contact solved by way of softer bodies"
 SMALLER_STEPS = "solved in {} smaller steps"
 SHORTER_JUMPS = "jump shortened"
+NONE: Counter[str] = Counter()
 GRAZING = "nodes conduct whose pressure tends to nothing"
 
 
@@ -26,6 +27,8 @@ class Remedies:
         self._noted[name] += 1
 
     def take(self) -> Counter[str]:
-        """Return what was noted since the last time."""
+        """Return what was noted since the last time; mostly nothing."""
+        if not self._noted:
+            return NONE
         noted, self._noted = self._noted, Counter()
         return noted

@@ -162,7 +162,9 @@ class _Stretches:
                     failure = type(error)(f"half-cycle {state.half_cycle + 1}: {error}")
                     failure.__cause__ = error
                 return _Stretch(recorder.take(state) if recorder else None, state, failure=failure)
-            state = replace(after, periodic_phases=self._recorded(recorded, state.periodic_phases))
+            periodic, state = self._recorded(recorded, state.periodic_phases), after
+            if state.periodic_phases != periodic:
+                state = replace(state, periodic_phases=periodic)
             finished = state.periodic_phases >= self.system.motion.half_cycles or course.leave(state)
             try:
                 due = course.watch()

@@ -45,6 +45,8 @@ class WornDepths:
     carried: Array = field(default_factory=lambda: NOTHING)
 
     def __add__(self, other: WornDepths) -> WornDepths:
+        if self.plain and other.plain:
+            return WornDepths(self.punch + other.punch, self.strip + other.strip)
         return WornDepths(
             self.punch + other.punch,
             self.strip + other.strip,
@@ -56,8 +58,15 @@ class WornDepths:
     def __sub__(self, other: WornDepths) -> WornDepths:
         return self + other.times(-1.0)
 
+    @property
+    def plain(self) -> bool:
+        """Whether nothing lies between, creeps or is remembered."""
+        return not (len(self.between) or len(self.crept) or len(self.carried))
+
     def times(self, factor: float) -> WornDepths:
         """Return all of it times a factor."""
+        if self.plain:
+            return WornDepths(factor * self.punch, factor * self.strip)
         kept = (factor * state for state in (self.between, self.crept, self.carried))
         return WornDepths(factor * self.punch, factor * self.strip, *kept)
 

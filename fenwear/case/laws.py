@@ -207,6 +207,9 @@ class Coating(OfPlace):
     energy: Annotated[float, *quantity("mm^3/(N*mm)"), Field(gt=0)] | None = Field(
         default=None, description="volume of the coating worn over the energy of friction"
     )
+    per_area: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None, description="k_A of the coating, above a base that wears per_area, too, with its touching_from"
+    )
     friction: Annotated[Number, Field(ge=0)] | None = Field(
         default=None,
         description="mu of the coating, which over its last tenth goes over to contact.friction; by default that",
@@ -214,9 +217,11 @@ class Coating(OfPlace):
 
     @model_validator(mode="after")
     def _one_coefficient(self) -> Self:
-        given = [key for key in ("coefficient", "archard", "energy") if getattr(self, key) is not None]
+        keys = ("coefficient", "archard", "energy", "per_area")
+        given = [key for key in keys if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(f"give one of coefficient, archard and energy, got {' and '.join(given) or 'none'}")
+            told = "coefficient, archard, energy and per_area"
+            raise ValueError(f"give one of {told}, got {' and '.join(given) or 'none'}")
         if (self.archard is None) != (self.hardness is None):
             raise ValueError("hardness: expected together with archard, and only then")
         if self.coefficient is not None and not (math.isfinite(self.coefficient) and self.coefficient > 0):
@@ -328,8 +333,8 @@ class WearLaw(Part):
                 convert(f"1 {self.coefficient.unit}" if self.coefficient.unit else 1.0, self.unit)
             except ValueError as error:
                 raise ValueError(f"coefficient: unit: {error}") from None
-        if self.coating is not None and self.per_area is not None:
-            raise ValueError("coating: expected without per_area")
+        if self.coating is not None and (self.coating.per_area is None) != (self.per_area is None):
+            raise ValueError("coating.per_area: expected where the base wears per_area, and only there")
         if self.coating is not None and self.coating.coefficient is None and self._exponents != (1.0, 1.0):
             raise ValueError("coating: expected a coefficient with other exponents than 1")
         return self
@@ -344,7 +349,7 @@ class WearLaw(Part):
         own = self.coating
         if own is None:
             return None
-        changes = {key: getattr(own, key) for key in ("coefficient", "archard", "hardness", "energy")}
+        changes = {key: getattr(own, key) for key in ("coefficient", "archard", "hardness", "energy", "per_area")}
         return self.model_copy(update={**changes, "beta": None, "coating": None})
 
     @property

@@ -18,7 +18,7 @@ from fenwear.layers import Evolution
 from fenwear.layers.between import DEBRIS, PLASTIC
 from fenwear.layers.debris import DebrisCycle
 from fenwear.layers.memory import Held
-from fenwear.sliding.coating import CoatedBody
+from fenwear.sliding.coating import CoatedBody, covering
 from fenwear.sliding.friction import ContactConditions
 from fenwear.sliding.screw import Screw
 from fenwear.sliding.wear import WornDepths
@@ -499,6 +499,21 @@ class PartialSlipProblem:
         return (
             np.ones_like(worn.punch) if punch is None else punch.slope(worn.punch),
             np.ones_like(worn.strip) if strip is None else strip.slope(worn.strip),
+        )
+
+    def changes_between(self, before: WornDepths, after: WornDepths) -> bool:
+        """Return whether coefficients change with depths from some to others, or with what is slid meanwhile."""
+        if self.laws is None:
+            return False
+        pair = self.interface.middle.pair
+        return self.laws.passes or any(
+            of_coating is not None and first is not None and then is not None and bool((first != then).any())
+            for of_coating, first, then in zip(
+                self.laws.friction.of_coatings,
+                covering(self.laws.coatings, pair, (before.punch, before.strip)),
+                covering(self.laws.coatings, pair, (after.punch, after.strip)),
+                strict=True,
+            )
         )
 
     def _taken(self, punch: Array, strip: Array, at: PartialSlipState) -> Array:

@@ -11,6 +11,8 @@ near dF/dy: the slip of each node, times its pressure's answer to depth while th
 What lies between goes on with the depths: y has its state, too. Of coated bodies y has what their coatings would have
 lost if they went on, which grows evenly through their end (`fenwear.sliding.coating.CoatedBody`).
 The wear at the end, which the next jump begins with, gives the error by the trapezoidal rule. No depth decreases.
+Both look at begin and end alone: where coefficients change with the depth, as where a coating's friction ends,
+Simpson's rule with the wear of one more cycle, at the shape halfway, gives it, too.
 
 With heat the temperatures go over the jump by one implicit Euler step with the heat of the cycle at its end, which
 is computed again until both belong together; the trapezoidal rule gives its error, too, over the warmest contact.
@@ -210,6 +212,13 @@ def _attempt(problem: PartialSlipProblem, now: FrettingCycle, cycles: int) -> Fr
     end = whole(problem.measured(worn))
     then = _rate(problem, replace(middle.end, slid=start.slid), worn, now.number + cycles, now)
     missing = solve(end - begin - cycles / 2 * (rate + whole(then.rate)))
+    if cycles > 1 and problem.changes_between(now.worn, worn):
+        halfway = (begin + end) / 2 + cycles / 8 * (rate - whole(then.rate))  # cubic by Hermite
+        shape = parted(np.concatenate([np.clip(halfway, begin, end)[:depths], halfway[depths:]]))
+        between_them = _rate(problem, _slid_on(now, cycles / 2), shape, now.number + cycles // 2, now)
+        simpson = cycles / 6 * (rate + 4 * whole(between_them.rate) + whole(then.rate))
+        seen = solve(end - begin - simpson)
+        missing = np.where(np.abs(seen) > np.abs(missing), seen, missing)
     pair = problem.interface.middle.pair
     felt = [pair.weights * (row == DEBRIS[0]) for row in layers.rows]  # what is ejected opens nothing
     area = np.concatenate([pair.weights, pair.strip.weights, *felt, np.zeros(len(begin) - depths - n * len(felt))])
@@ -331,7 +340,7 @@ class _Implicit:
         return found
 
 
-def _slid_on(now: FrettingCycle, cycles: int) -> PartialSlipState:
+def _slid_on(now: FrettingCycle, cycles: float) -> PartialSlipState:
     """Return the end of a cycle after so many more, as far as what its nodes have slipped tells."""
     slid = now.end.slid
     if slid is None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fenwear.arrays import Array, Mask
-from fenwear.case import WearLaw
+from fenwear.case import Dependence, WearLaw
 from fenwear.interface import ContactPair
 from fenwear.interface.edges import Edges
 from fenwear.interface.placement import in_space
@@ -92,6 +92,12 @@ class LocalLaws:
         if not of_wear:
             return not self.friction.constant
         return not stays(self.wear, self.friction)
+
+    @property
+    def passes(self) -> bool:
+        """Whether a coefficient changes as long as a run goes on: with the worn depth, or with what is slid."""
+        given = [self.friction.contact.friction, *(law.given_coefficient for law in self.wear if law is not None)]
+        return any(isinstance(one, Dependence) and one.passes for one in given)
 
     def conditions(
         self,

@@ -114,6 +114,44 @@ def test_jumps_go_through_the_end_as_marches_do(law: str, bodies: str) -> None:
     assert errors[1] < 5e-3
 
 
+def test_jumps_see_where_friction_ends() -> None:
+    """It ends within a few cycles, between begin and end of a jump, where partial slip turns into another one."""
+    wear = "wear.punch={coefficient='2.5e-7 1/MPa', coating={thickness=%s, coefficient='5e-8 1/MPa', friction=0.5}}"
+    settings = [*SMALLEST, *STICK, "contact.law='coulomb'", "contact.friction=0.9", wear % (UNEVEN % 1e-6)]
+    system, half_cycles = assemble(load_case("fretting-partial-slip", settings)), 240
+    *_, marched = march(system, half_cycles)
+    thickness, exact = system.coatings[0], marched.wear[-1]
+    assert thickness is not None
+    assert 0.1 < (exact >= thickness).mean() < 0.9
+    errors = []
+    for tolerance in (0.3, 0.1):
+        *_, last = jump(system, half_cycles, tolerance=tolerance)
+        errors.append(float(np.abs(last.wear[-1] - exact).max() / exact.max()))
+        assert errors[-1] < tolerance / 10
+    assert errors[1] < errors[0]
+
+
+@pytest.mark.parametrize("law", ["gross-sliding", "coulomb"])
+def test_per_area(law: str) -> None:
+    """All that touches loses t + k_b / k_c (k_c s - t) by its way s, whatever the pressure."""
+    wear = "wear.punch={per_area=4e-6, touching_from=1e-3, coating={thickness=%s, per_area=1e-6}}"
+    stick, size = (STICK, 4e-7) if law == "coulomb" else (("stick={}",), 5.5e-7)
+    settings = [*SMALLEST, f"contact.law='{law}'", *stick, "contact.friction=0.3", wear % (UNEVEN % size)]
+    system, half_cycles = assemble(load_case("fretting-partial-slip", settings)), 100
+    thickness = system.coatings[0]
+    assert thickness is not None
+    *_, marched = march(system, half_cycles)
+    touched = marched.wear[-1] > 0
+    assert 0.1 < (marched.wear[-1][touched] >= thickness[touched]).mean() < 0.9
+    if law == "gross-sliding":
+        way = 1e-6 * marched.totals.of("distance")[-1]
+        exact = np.where(way < thickness, way, thickness + 4 * (way - thickness))
+        np.testing.assert_allclose(marched.wear[-1][touched], exact[touched], rtol=1e-9)
+    for tolerance in (0.1, 1e-3):
+        *_, last = jump(system, half_cycles, tolerance=tolerance)
+        assert np.abs(last.wear[-1] - marched.wear[-1]).max() < 1e-5 * marched.wear[-1].max()
+
+
 def test_the_end_is_that_of_the_base(assembled: Assemble) -> None:
     """Pressures of the steady state, friction of the coating or not; growth rates alike."""
     own = "wear.punch={coefficient=5e-6, coating={thickness=0.05, coefficient=1e-6, friction=0.1}}"
@@ -143,7 +181,9 @@ def test_friction_of_a_coating_holds_until_it_is_through(assembled: Assemble) ->
         ),
         ("{thickness={expression='p', unit='mm'}, coefficient=1e-9}", "place x, y, z alone, got p"),
         ("{thickness='0.1 m', coefficient=1e-9}", r"wear.punch.coating.thickness: expected less than the body"),
-        ("{thickness=1e-3}", "wear.punch.coating: give one of coefficient, archard and energy, got none"),
+        ("{thickness=1e-3}", "wear.punch.coating: give one of coefficient, archard, energy and per_area, got none"),
+        ("{thickness=1e-3, per_area=1e-9}", r"coating.per_area: expected where the base wears per_area"),
+        ("{thickness=1e-3, per_area=0}", r"wear.punch.coating.per_area: expected"),
         ("{thickness=1e-3, coefficient=0}", "wear.punch.coating.coefficient: expected a finite number above zero"),
         ("{thickness=1e-3, coefficient='1 mm'}", "coating.coefficient"),
         ("{thickness=1e-3, archard=1e-3}", "wear.punch.coating.hardness"),

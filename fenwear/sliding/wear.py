@@ -46,7 +46,7 @@ class WornDepths:
 
     def __add__(self, other: WornDepths) -> WornDepths:
         if self.plain and other.plain:
-            return WornDepths(self.punch + other.punch, self.strip + other.strip)
+            return WornDepths(self.punch + other.punch, self.strip + other.strip, *self._kept)
         return WornDepths(
             self.punch + other.punch,
             self.strip + other.strip,
@@ -66,9 +66,13 @@ class WornDepths:
     def times(self, factor: float) -> WornDepths:
         """Return all of it times a factor."""
         if self.plain:
-            return WornDepths(factor * self.punch, factor * self.strip)
-        kept = (factor * state for state in (self.between, self.crept, self.carried))
-        return WornDepths(factor * self.punch, factor * self.strip, *kept)
+            return WornDepths(factor * self.punch, factor * self.strip, *self._kept)
+        return WornDepths(factor * self.punch, factor * self.strip, *(factor * state for state in self._kept))
+
+    @property
+    def _kept(self) -> tuple[Array, Array, Array]:
+        """What is not worn; where nothing is, still as wide as the surface, which rows of a run have to be alike in."""
+        return self.between, self.crept, self.carried
 
 
 def _added(one: Array, other: Array) -> Array:
